@@ -11,17 +11,20 @@ PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
 PFSC_TESTS ?= quick
 SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
 
-.PHONY: help setup demo test test-all lint types unit fuzz benchmark models signals architecture clean
+.PHONY: help setup demo test test-all lint types unit fuzz benchmark models docs signals architecture results gallery clean
 
 help:
-	@echo "make setup      create $(VENV) and install the project with its tools"
+	@echo "make setup      create $(VENV) and install the project with its tools and $(BIN)/pfsc"
 	@echo "make demo       run the six-axis elastic path following demo into $(DEMO_OUT)"
 	@echo "make test       linters, types and the tests, but the dozen that take longest"
 	@echo "make test-all   the same with these; as continuous integration runs it"
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
-	@echo "make signals    write docs/signals.md anew from reporting/registry.toml"
-	@echo "make architecture  draw docs/architecture.svg anew"
+	@echo "make docs       build the site in out/site, its notebooks executed"
+	@echo "make signals    write docs/reference/signals.md anew from reporting/registry.toml"
+	@echo "make architecture  draw docs/images/architecture.svg anew"
+	@echo "make results    run all shipped scenarios and write the table of docs/results.md"
+	@echo "make gallery    draw docs/images/gallery/ and the README's picture anew; needs Chromium"
 	@echo "make models     write the robot models anew from their parameters"
 
 setup: $(VENV)/.installed
@@ -31,7 +34,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 		{ echo "Python 3.11 or newer is needed; found $$($(PYTHON) --version). Try: make PYTHON=python3.11"; exit 1; }
 	@echo "Setting up $(VENV); downloads about 500 MB the first time ..."
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[experiments,sweep,dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[experiments,sweep,docs,dev]'
 	@touch $@
 
 demo: setup
@@ -73,16 +76,31 @@ benchmark: setup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max
 	$(BIN)/python -m tests.benchmarks.paces
 
+# warnings are errors; executed notebooks are kept beside what they wrote
+docs: setup
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -d out/doctrees docs out/site
+	$(BIN)/python -m docs.making.links out/site
+	@echo "Open out/site/index.html"
+
 # the page of signals, metrics and figures
 signals: setup
-	$(BIN)/python -m reporting.registry > docs/signals.md
+	$(BIN)/python -m reporting.registry > docs/reference/signals.md
 
 # the picture of what imports what
 architecture: setup
 	$(BIN)/python -m docs.architecture
 
+# every shipped scenario under every law that it has targets for; what was run at this revision is kept
+results: setup
+	$(BIN)/python -m docs.results
+
+# pictures of recordings, drawn by a browser without a window
+gallery: setup
+	$(BIN)/python -m docs.pictures
+	$(BIN)/python -m docs.pictures --film
+
 models: setup
 	$(BIN)/python -m pfsc_drake.robot.models.writer
 
 clean:
-	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) out docs/tutorials/out .pytest_cache .mypy_cache .ruff_cache

@@ -1,6 +1,6 @@
 """The house: its floors, what each room may import, and the picture of both.
 
-    python -m docs.architecture     # writes docs/architecture.svg anew
+    python -m docs.architecture     # writes docs/images/architecture.svg anew
 
 The picture is drawn from the packages' own docstrings and imports; tests hold the rules.
 """
@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PICTURE = ROOT / "docs" / "architecture.svg"
+PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 
 # from the top down; a file imports from its own room and from those below, not from one beside
 FLOORS = [

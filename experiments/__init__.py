@@ -1,6 +1,36 @@
-"""Experiments: scenario files, runs, logs, metrics, figures and reports."""
+"""Experiments: scenario files, runs, logs, metrics, figures and reports.
 
+From a script or a notebook::
+
+    from experiments import load, run
+
+    result = run("pfc_panda_7r", {"controller.law": "elastic"}, duration=2.0)
+    result.log["xi"].values  # m
+    again = load("out/pfc_panda_7r")
+"""
+
+import importlib
 import os
+from typing import Any
 
 # all matrices are small; BLAS threads would only compete with the control loop
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# what users import, and the modules that are loaded when they do
+_DOOR = {
+    "Margins": "experiments.studies.margins.told",
+    "Run": "experiments.kept_run",
+    "Scenario": "diagrams.scenario",
+    "load": "experiments.kept_run",
+    "margins": "experiments.api",
+    "run": "experiments.api",
+}
+
+__all__ = [*_DOOR]
+
+
+def __getattr__(name: str) -> Any:
+    """Load what is asked for, so that whoever lists scenarios does not wait for Drake."""
+    if name not in _DOOR:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_DOOR[name]), name)

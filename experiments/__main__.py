@@ -2,13 +2,7 @@
 
 import sys
 
-from reporting.processes import leave_when_interrupted
-from reporting.terminal import prepare_streams, silence_libraries
+from experiments.program import start
 
 if __name__ == "__main__":
-    leave_when_interrupted()
-    prepare_streams()
-    silence_libraries()
-    from experiments.cli import main
-
-    sys.exit(main())
+    sys.exit(start("python -m experiments"))

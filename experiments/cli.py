@@ -1,12 +1,18 @@
 """The command line: ``list``, ``run``, ``live``, ``compare``, ``sweep``, ``teach`` and others.
 
+It is called as ``python -m experiments`` from a clone's folder, or as ``pfsc`` in its environment,
+from any folder; ``pfsc --install-completion`` lets the shell complete commands, options and names.
+Wrong input is told in one line that names file and key, all that is wrong in a file together, the
+nearest word that there is, and what is allowed.
+
 Exit status: 0 the run completed, or every run of a sweep has a row that says how it ended; 2 the
 input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run, or a live session
 ended while one did, everything logged so far is kept; 4 results could not be written, one line
 says which and where they are instead; 130 interrupted, everything logged so far is kept.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Annotated
 
 import typer
 
@@ -25,34 +31,76 @@ from experiments.study_commands import (
     study_command,
     teach_command,
 )
+from reporting.provenance import version_line
 from reporting.terminal import run_app
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    help="Path and surface following experiments, from scenario files to reports.",
-)
-app.command("list")(list_command)
-app.command("run")(run_command)
-app.command("live")(live_command)
-app.command("compare")(compare_command)
-app.command("sweep")(sweep_command)
-app.command("study")(study_command)
-app.command("teach")(teach_command)
-app.command("margins")(margins_command)
-app.command("export")(export_command)
-app.command("replay")(replay_command)
-app.command("robot")(robot_command)
-app.command("drive")(drive_command)
+_COMMANDS: dict[str, Callable[..., None]] = {
+    "list": list_command,
+    "run": run_command,
+    "live": live_command,
+    "compare": compare_command,
+    "sweep": sweep_command,
+    "study": study_command,
+    "teach": teach_command,
+    "margins": margins_command,
+    "export": export_command,
+    "replay": replay_command,
+    "robot": robot_command,
+    "drive": drive_command,
+}
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def make_app(*, completion: bool = False) -> typer.Typer:
+    """Return the commands.
+
+    Args:
+        completion: Whether there are ``--install-completion`` and ``--show-completion``, which
+            take a program of one word.
+    """
+    app = typer.Typer(
+        add_completion=completion,
+        pretty_exceptions_enable=False,
+        help="Path and surface following experiments, from scenario files to reports.",
+    )
+    app.callback()(_root)
+    for name, command in _COMMANDS.items():
+        app.command(name)(command)
+    return app
+
+
+def _tell_version(asked: bool) -> None:
+    """Print one line and end the process, if that was asked."""
+    if asked:
+        typer.echo(version_line())
+        raise typer.Exit
+
+
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            is_eager=True,
+            callback=_tell_version,
+            help="Tell versions of the program, Drake and CasADi, and the git revision.",
+        ),
+    ] = False,
+) -> None:
+    """Take the options of the program itself."""
+
+
+app = make_app()
+
+
+def main(arguments: Sequence[str] | None = None, program: str = "python -m experiments") -> int:
     """Runs the command line.
 
     Args:
         arguments: Without the program's name; by default those of the process.
+        program: How it is called.
 
     Returns:
         Exit status, see the module.
     """
-    return run_app(app, "python -m experiments", arguments)
+    own = make_app(completion=True) if " " not in program else app
+    return run_app(own, program, arguments)

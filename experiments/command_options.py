@@ -1,11 +1,14 @@
 """Arguments and options that several commands take, and how their text is read."""
 
+import glob
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pfsc_drake.errors import InputError, shortened
+from experiments.scenario_file import scenario_names
+from pfsc_drake.errors import InputError, shortened, suggestion
 from pfsc_drake.yaml.schema_check import is_number
 
 if TYPE_CHECKING:
@@ -14,9 +17,31 @@ if TYPE_CHECKING:
 # studies that run by their names, as a scenario does
 IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
 
+
+def complete_scenario(incomplete: str) -> list[str]:
+    """Return the shipped scenarios, YAML files and folders whose names go on like this.
+
+    Args:
+        incomplete: What has been written.
+    """
+    head, slash, tail = incomplete.rpartition("/")
+    folder = Path(head or slash or ".").expanduser()
+    try:
+        files = sorted(folder.glob(f"{glob.escape(tail)}*"))
+    except (OSError, ValueError):
+        files = []
+    found = [name for name in scenario_names() if name.startswith(incomplete)]
+    found += [f"{head}{slash}{file.name}" for file in files if file.suffix in (".yaml", ".yml")]
+    return found + [f"{head}{slash}{file.name}/" for file in files if file.is_dir()]
+
+
 # what several commands take
 ScenarioName = Annotated[
-    str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
+    str,
+    typer.Argument(
+        help="Name of a shipped scenario, or path of a YAML file.",
+        autocompletion=complete_scenario,
+    ),
 ]
 
 Overrides = Annotated[
@@ -30,6 +55,8 @@ Duration = Annotated[
 ]
 
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")]
+
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors and the last line.")]
 
 Recording = Annotated[bool, typer.Option("--recording/--no-recording", help="Record the motion.")]
 
@@ -75,5 +102,6 @@ def open_bus(url: str) -> "DrakeLcm":
     # LCM itself would go on without a bus
     if url and url.partition("://")[0] not in _BUSES:
         allowed = ", ".join(f"{bus}://..." for bus in _BUSES)
-        raise InputError(f"--lcm {url}: no such bus; allowed: {allowed}")
+        nearest = suggestion(url.partition("://")[0], _BUSES)
+        raise InputError(f"--lcm {url}: no such bus; allowed: {allowed}{nearest}")
     return DrakeLcm(url)

@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+from experiments.compared_motions import motion_differences
 from experiments.results.run_log import RunLog
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import read_text
@@ -31,6 +32,7 @@ _COMPARED = (
     "max_external_force",
 )
 _NEEDED = ("xi", "eta", "eta_p")
+_DIFFERENT = "These runs were not asked for the same motion; compare their deviations with care: "
 # title, label and factor of what tells orientations in a log
 _ORIENTATIONS = {
     "angles": ("Angle about {}", "angle in deg", math.degrees(1.0)),
@@ -63,7 +65,8 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Report:
         for name in _COMPARED:
             if name in own:
                 metrics.add(f"{folder.name}: {name}", own[name].value, own[name].unit)
-    scenarios = [read_text(folder / "scenario.yaml") for folder in folders]
+    scenarios = {folder.name: read_text(folder / "scenario.yaml") for folder in folders}
+    differences = motion_differences(scenarios)
     inputs = [folder / name for folder in folders for name in ("log.h5", "metrics.json")]
     with open_results(out, "comparison", inputs) as results:
         figures = [_deviations(logs)]
@@ -75,10 +78,13 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Report:
         if all("wrench_ext" in log for log in logs.values()):
             figures.append(_forces(logs))
         first = next(iter(logs.values()))
+        motion = "Different motions" if differences else "The same motion"
         page = report_page(
             title=" against ".join(logs),
-            description="The same motion, side by side.",
-            scenario_yaml_text="\n---\n".join(scenarios),
+            kind="Comparison",
+            description=f"{motion}, side by side.",
+            warnings=[_DIFFERENT + "; ".join(differences) + "."] if differences else [],
+            scenario_yaml_text="\n---\n".join(scenarios.values()),
             metrics=metrics,
             figures=figures,
             log_attributes={k: v for k, v in first.attributes.items() if k != "scenario"},

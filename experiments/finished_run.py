@@ -11,7 +11,9 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
+from diagrams.drawing.mounting_look import mounting_stages
 from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import posture_text
 from experiments.figures.all import render_figures
@@ -149,6 +151,14 @@ def write_outcome(
     drawn = figures and not interrupted()
     if drawn:
         progress(measured.end, "drawing")
+    results.tell(
+        {
+            "fault": measured.fault,
+            "missed": measured.broken,
+            "warnings": measured.warnings,
+            "interrupted": interrupted(),
+        }
+    )
     report = _report(run, measured, results, page, drawn, interrupted())
     progress(measured.end, "done")
     return RunOutcome(
@@ -298,7 +308,9 @@ def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:
     """Return the recording as a page of its own."""
     meshcat, settings = Meshcat(MeshcatParams(host="localhost")), prepared.settings
     diagram = build_station_replay(settings, prepared.station, prepared.drawing, motion, meshcat)
-    return record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
+    page = record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
+    mounting = prepared.station.mounting
+    return page if mounting is None else explained(page, mounting_stages(mounting, motion.phases))
 
 
 def _link(recording: Path | None, out: Path) -> str | None:

@@ -17,6 +17,7 @@ from experiments.command_options import (
     Figures,
     Lcm,
     Overrides,
+    Quiet,
     Recording,
     ScenarioName,
     open_bus,
@@ -136,6 +137,7 @@ def drive_command(
     duration: Duration = None,
     figures: Figures = True,
     recording: Recording = True,
+    quiet: Quiet = False,
 ) -> None:
     """Drive a robot by a scenario: Ctrl-C brings it to rest. This is no safety function."""
     from experiments.hardware.driven_run import check_scenario, drive_scenario, real_time_priority
@@ -151,7 +153,7 @@ def drive_command(
         # the thread of LCM that hears goes first, too
         with real_time_priority():
             end = ControllerEnd(open_bus(lcm), dialect(driver))
-        console = Console()
+        console = Console(quiet=quiet)
         if move and not check:
             raise InputError(f"--move {move:g}: without --check; allowed: together with it")
         if check:
@@ -198,7 +200,7 @@ def _print_check(console: Console, found: "StaticCheck") -> None:
     for i, values in enumerate(np.column_stack(columns)):
         table.add_row(str(i + 1), f"{values[0]:.2f}", *(f"{value:.3f}" for value in values[1:]))
     console.print(table)
-    console.print(found.verdict, soft_wrap=True, highlight=False, markup=False)
+    Console().print(found.verdict, soft_wrap=True, highlight=False, markup=False)
 
 
 def _print_first(console: Console, first: "FirstCommand") -> None:

@@ -22,13 +22,18 @@ if TYPE_CHECKING:
 
 
 def print_run(console: Console, outcome: "RunOutcome") -> None:
-    """What came out of a run, as far as it is no reason for concern."""
+    """What came out of a run, as far as it is no reason for concern; quietly its last line."""
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
     if outcome.margins is not None:
         console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
-    print_page(console, "\nOpen the report", outcome.report)
+    _print_report(console, outcome.report)
+
+
+def _print_report(console: Console, report: Path | None) -> None:
+    """The last line, behind an empty one if others are shown."""
+    print_page(Console(), f"{'' if console.quiet else chr(10)}Open the report", report)
 
 
 def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
@@ -88,14 +93,14 @@ def judge_live(outcome: "LiveOutcome") -> int:
 
 
 def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
-    """What came out of a sweep."""
+    """What came out of a sweep; quietly its last line."""
     key_metrics = {name: outcome.metrics[name] for name in outcome.key_metrics}
     console.print(_metrics_table(key_metrics))
     for warning in outcome.warnings:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
     for strikes, command in outcome.commands.items():
         console.print(f"\n{escape(strikes)}\n  {escape(command)}", soft_wrap=True, highlight=False)
-    print_page(console, "\nOpen the report", outcome.report)
+    _print_report(console, outcome.report)
 
 
 def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:

@@ -14,7 +14,7 @@ from diagrams.station import Station
 from experiments.integration import choose_integration
 from experiments.results.promises import check_targets
 from experiments.scenario_file import ScenarioFile
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, nearest_file, shortened
 from pfsc_drake.yaml.reading import resolve_files
 from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.progress import ProgressListener
@@ -139,7 +139,10 @@ def naming(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: {error}") from None
     except OSError as error:  # of a file that the scenario names
         name = shortened(str(error.filename), 100)
-        raise InputError(f"{path}: cannot read {name}: {error.strerror}") from None
+        nearest = (
+            nearest_file(Path(str(error.filename))) if isinstance(error, FileNotFoundError) else ""
+        )
+        raise InputError(f"{path}: cannot read {name}: {error.strerror}{nearest}") from None
 
 
 def check_length(settings: Scenario, station: Station) -> None:

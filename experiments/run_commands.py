@@ -20,6 +20,7 @@ from experiments.command_options import (
     Figures,
     Lcm,
     Overrides,
+    Quiet,
     Recording,
     ScenarioName,
     open_bus,
@@ -89,20 +90,21 @@ def run_command(
     margins: Annotated[
         bool, typer.Option("--margins", help="Tell what the loop bears at the start.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
-    from experiments.run import run_scenario
     from experiments.scenario_file import read_scenario
+    from experiments.simulated_run import run_scenario
 
     if scenario in (IDENTIFICATION, TEACH_IN):
-        study_command(scenario, out or Path("out") / scenario)
+        study_command(scenario, out or Path("out") / scenario, quiet)
     seconds = None if duration is None else read_duration(duration)
     further = _read_after_fault(after_fault)
     with interruptible():
-        loaded = read_scenario(scenario, overrides or [])
+        loaded = read_scenario(scenario, overrides or [], (IDENTIFICATION, TEACH_IN))
         folder = expand_home(out) if out is not None else Path("out") / loaded.name
         logging.getLogger("drake").setLevel(logging.CRITICAL)
-        console = Console()
+        console = Console(quiet=quiet)
         with ProgressDisplay(console, loaded.name, seconds) as progress:
             outcome = run_scenario(
                 loaded,
@@ -229,6 +231,7 @@ def sweep_command(
     metric: Annotated[
         str | None, typer.Option(help="What to draw. Default: max_path_deviation")
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Run a scenario many times, on all cores: grids, ranges, distributions over its keys."""
     from experiments.sweep.sweep import define_sweep, run_sweep
@@ -245,7 +248,7 @@ def sweep_command(
         )
         name = sweep.scenario.name
         folder = expand_home(out) if out is not None else Path("out") / f"{name}_sweep"
-        console = Console()
+        console = Console(quiet=quiet)
         outcome = run_sweep(
             sweep, folder, console, scheduler=scheduler, workers=workers, metric=metric
         )

@@ -3,17 +3,16 @@
 Nothing here imports Drake, so that a list is there at once.
 """
 
-import difflib
 import hashlib
 import json
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, did_you_mean, nearest_file, shortened
 from pfsc_drake.yaml.reading import MAX_DEPTH, find_status, parse_yaml, read_yaml
 
 SCENARIO_DIRECTORY = Path(__file__).resolve().parent / "scenarios"
@@ -40,12 +39,15 @@ def scenario_names(directory: Path = SCENARIO_DIRECTORY) -> list[str]:
     return sorted(path.stem for path in directory.glob("*.yaml"))
 
 
-def find_scenario(name_or_path: str, directory: Path = SCENARIO_DIRECTORY) -> Path:
+def find_scenario(
+    name_or_path: str, directory: Path = SCENARIO_DIRECTORY, others: Sequence[str] = ()
+) -> Path:
     """File of a scenario.
 
     Args:
         name_or_path: A shipped name, or the path of a YAML file (with a folder or a suffix).
         directory: Folder of the shipped scenarios.
+        others: What else could be meant, for the message.
 
     Returns:
         Path of an existing file.
@@ -62,10 +64,9 @@ def find_scenario(name_or_path: str, directory: Path = SCENARIO_DIRECTORY) -> Pa
     if status is not None and not is_folder:
         return path  # reading says what is wrong with a pipe or a device
     if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
-        reason = "is a folder" if is_folder else "no such file"
+        reason = "is a folder" if is_folder else f"no such file{nearest_file(path)}"
         raise InputError(f"scenario file {shortened(name_or_path, 200)}: {reason}")
-    nearest = difflib.get_close_matches(name_or_path, names, n=1, cutoff=0.5)
-    hint = f"did you mean {nearest[0]!r}? " if nearest else ""
+    hint = did_you_mean(name_or_path, [*names, *others], cutoff=0.5)
     wanted = shortened(repr(name_or_path))
     raise InputError(
         f"unknown scenario {wanted}: {hint}available: {', '.join(names) or 'none'},"
@@ -138,9 +139,11 @@ class ScenarioFile:
         return [self.path, *(folder / text for text in _texts(self.data))]
 
 
-def read_scenario(name_or_path: str, overrides: list[str]) -> ScenarioFile:
+def read_scenario(
+    name_or_path: str, overrides: list[str], others: Sequence[str] = ()
+) -> ScenarioFile:
     """Finds and reads a scenario; see :func:`find_scenario` and :func:`load_scenario_data`."""
-    path = find_scenario(name_or_path)
+    path = find_scenario(name_or_path, others=others)
     return ScenarioFile(path, load_scenario_data(path, overrides))
 
 
@@ -192,12 +195,60 @@ def apply_override(data: dict[str, Any], override: str, option: str = "--set") -
     """
     source = f"{option} {shortened(override, 100)}"
     path, separator, text = override.partition("=")
+    keys = _keys(path if separator else "", source)
+    _set(data, keys, parse_yaml(text, source), source)
+
+
+def apply_change(data: dict[str, Any], key: str, value: Any) -> None:
+    """Set one key in place to a value of Python.
+
+    Args:
+        data: Data of a scenario.
+        key: ``key.path``, as in an override.
+        value: Text, which is read as YAML as in an override, so that it may have a tag; or numbers,
+            truth values, None, and lists, arrays and mappings of these, taken as they are.
+
+    Raises:
+        InputError: If the key is malformed or goes through what is no mapping or list, or the value
+            is nothing that YAML could say.
+    """
+    source = f"change {shortened(f'{key} = {value!r}', 100)}"
+    keys = _keys(key, source)
+    _set(data, keys, _plain(value, source, len(keys)), source)
+
+
+def _plain(value: Any, source: str, depth: int) -> Any:
+    """A value of Python as YAML would give it."""
+    if isinstance(value, str):
+        return parse_yaml(value, source)
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):  # an array or a number of numpy
+        value = value.tolist()
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    if depth < MAX_DEPTH and isinstance(value, (list, tuple)):
+        return [_plain(item, source, depth + 1) for item in value]
+    if depth < MAX_DEPTH and isinstance(value, dict):
+        return {str(key): _plain(item, source, depth + 1) for key, item in value.items()}
+    raise InputError(
+        f"{source}: of type {type(value).__name__}; allowed: text, numbers, true or false, None, "
+        f"and lists and mappings of these, up to {MAX_DEPTH} levels"
+    )
+
+
+def _keys(path: str, source: str) -> list[str]:
+    """The keys of an override, from the root on."""
     keys = path.strip().split(".")
-    if not separator or not all(keys):
+    if not all(keys):
         raise InputError(f"{source}: malformed; allowed: key.path=value")
     if len(keys) > MAX_DEPTH:
         raise InputError(f"{source}: {len(keys)} levels; allowed: up to {MAX_DEPTH}")
-    value = parse_yaml(text, source)
+    return keys
+
+
+def _set(data: dict[str, Any], keys: list[str], value: Any, source: str) -> None:
+    """Put a value at its place, making mappings that are missing on the way."""
     target: Any = data
     for depth, key in enumerate(keys):
         here = ".".join(keys[:depth]) or "the scenario"

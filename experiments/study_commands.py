@@ -14,7 +14,7 @@ from experiments.outcomes import (
     print_export,
 )
 from experiments.scenario_file import expand_home
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shortened, suggestion
 from reporting.progress import ProgressDisplay
 from reporting.terminal import FAULT, interruptible, show_page
 
@@ -25,29 +25,48 @@ from experiments.command_options import (
     IDENTIFICATION,
     TEACH_IN,
     Overrides,
+    Quiet,
     ScenarioName,
     read_duration,
 )
+
+# what the command says of itself, by the studies' names
+_STUDIES = {
+    "stiffness": "which law when, all laws on joints of rising stiffness",
+    "robustness": "all laws on robots that are not their models",
+    "tracking": "path following against trajectory tracking",
+    "joint_sides": "elastic joints of which both sides, torques, or motors alone are measured",
+    "fixture_rules": "printed rules of forbidden regions against the program at an acute edge",
+    "peers": "path following beside impedance control and Toppra",
+    IDENTIFICATION: "from robots to their models and back",
+    TEACH_IN: "a path taught by hand, and followed",
+}
+
+
+def _complete_study(incomplete: str) -> list[tuple[str, str]]:
+    """Return the studies whose names go on like this, with what they are."""
+    return [(name, said) for name, said in _STUDIES.items() if name.startswith(incomplete)]
 
 
 def study_command(
     name: Annotated[
         str,
         typer.Argument(
-            help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
-            "all laws on robots that are not their models; tracking: path following against "
-            "trajectory tracking; joint_sides: elastic joints of which both sides, torques, or "
-            "motors alone are measured; fixture_rules: printed rules of forbidden regions against "
-            "the program at an acute edge; identify_comau: from robots to their models and back; "
-            "teach_in: a path taught by hand, and followed."
+            help="; ".join(f"{name}: {said}" for name, said in _STUDIES.items()) + ".",
+            autocompletion=_complete_study,
         ),
     ] = "stiffness",
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
+    quiet: Quiet = False,
 ) -> None:
     """Many runs on one page, on all cores: one minute (stiffness) to ten."""
+    if name not in _STUDIES:
+        allowed = ", ".join(_STUDIES)
+        raise InputError(f"study {shortened(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
     from experiments.studies.fixture_rules import write_fixture_rules
     from experiments.studies.identify import write_identification
     from experiments.studies.joint_sides import write_joint_sides
+    from experiments.studies.peers.study import write_peers
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
     from experiments.studies.tracking import write_tracking
@@ -59,14 +78,13 @@ def study_command(
         "tracking": write_tracking,
         "joint_sides": write_joint_sides,
         "fixture_rules": write_fixture_rules,
+        "peers": write_peers,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,
     }
-    if name not in studies:
-        raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")
     with interruptible():
         logging.getLogger("drake").setLevel(logging.CRITICAL)
-        console = Console()
+        console = Console(quiet=quiet)
         report = studies[name](
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
         )

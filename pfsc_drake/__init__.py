@@ -49,6 +49,7 @@ _DOOR = {
     "add_surface_following": "pfsc_drake.following.surface_following",
     "export": "pfsc_drake.codegen.export",
     "fuse": "pfsc_drake.systems.fuse",
+    "models_directory": "pfsc_drake.robot.models.files",
     "path_from_waypoints": "pfsc_drake.geometry",
     "rest_to_rest": "pfsc_drake.control.law.reference",
     "straight_lines": "pfsc_drake.control.law.reference",

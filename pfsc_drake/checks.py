@@ -7,6 +7,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.errors import require as require
+from pfsc_drake.errors import require_one_of as require_one_of
 from pfsc_drake.errors import require_positive as require_positive
 
 LARGEST_ANGLE = 3600.0  # deg; ten turns

@@ -1,8 +1,17 @@
 """The one error raised for input that cannot be used."""
 
+import difflib
 import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from itertools import islice
+from pathlib import Path
 
 MAX_MESSAGE = 1000  # characters
+_SHORTEST_SHARE = 150  # characters of one problem among others
+_MOST_FILES = 10_000  # of a folder that is looked through for a name
 
 
 class InputError(ValueError):
@@ -29,6 +38,93 @@ def shortened(text: str, length: int = 60) -> str:
     return f"{text[: length - 3 - tail]}...{text[len(text) - tail :]}"
 
 
+def did_you_mean(word: object, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """Return ``did you mean 'elastic'? ``, or nothing if no word is near.
+
+    Args:
+        word: What was written.
+        known: Words that are known.
+        cutoff: How near a word must be, from 0 to 1.
+    """
+    text, words = str(word), list(known)
+    if len(text) > max(map(len, words), default=0) + 20:  # near to none, and long to compare
+        return ""
+    nearest = difflib.get_close_matches(text, words, n=1, cutoff=cutoff)
+    if not nearest:  # capitals are no other word
+        small = {name.lower(): name for name in words}
+        found = difflib.get_close_matches(text.lower(), small, n=1, cutoff=cutoff)
+        nearest = [small[name] for name in found]
+    return f"did you mean {nearest[0]!r}? " if nearest else ""
+
+
+def suggestion(word: object, known: Iterable[str]) -> str:
+    """Return the same for the end of a message, ``; did you mean 'elastic'?``, or nothing."""
+    hint = did_you_mean(word, known)
+    return f"; {hint.rstrip()}" if hint else ""
+
+
+def nearest_file(path: Path) -> str:
+    """Return ``; did you mean 'points.csv'?`` for a file that is not there, or nothing.
+
+    Args:
+        path: The file, of whose folder the other names are looked at.
+    """
+    try:
+        names = [file.name for file in islice(path.parent.iterdir(), _MOST_FILES)]
+    except (OSError, ValueError):  # there is no such folder, or it is closed
+        return ""
+    return suggestion(path.name, (name for name in names if name.isprintable()))
+
+
+def in_one_line(problems: Sequence[str]) -> str:
+    """Return what is wrong, numbered if it is several things, within MAX_MESSAGE characters.
+
+    Args:
+        problems: One or more.
+    """
+    if len(problems) == 1:
+        return problems[0]
+    told: list[str] = []
+    room = MAX_MESSAGE - 150  # for the file's name in front, and for what is left out
+    for number, problem in enumerate(problems, start=1):
+        share = max(_SHORTEST_SHARE, room // (len(problems) - len(told)) - 7)
+        if room < share:
+            break
+        if len(problem) > share:  # the nearest word tells more than all of them
+            problem = re.sub(r"(did you mean .*\?) allowed: .*", r"\1", problem)
+        told.append(f"({number}) {shortened(problem, share)}")
+        room -= len(told[-1]) + 2
+    left = len(problems) - len(told)
+    more = f"; and {left} more" if left else ""
+    return f"{len(problems)} things are wrong: {'; '.join(told)}{more}"
+
+
+# by key what was refused, while somebody wants to know all of it
+_gathered: ContextVar[dict[str, InputError] | None] = ContextVar("gathered", default=None)
+
+
+@contextmanager
+def gathered_refusals() -> Iterator[list[str]]:
+    """Let :func:`require` go on, and give a list that holds all refusals afterwards.
+
+    Of each key the first counts. What is calculated with refused values may fail in any way, so
+    that exceptions tell nothing once there is a refusal.
+    """
+    refusals: dict[str, InputError] = {}
+    messages: list[str] = []
+    token = _gathered.set(refusals)
+    try:
+        yield messages
+    except Exception as error:
+        if isinstance(error, InputError):
+            refusals = refusals or {"": error}
+        elif not refusals:
+            raise
+    finally:
+        _gathered.reset(token)
+        messages[:0] = [str(error) for error in refusals.values()]
+
+
 def require(condition: bool, key: str, value: object, allowed: str) -> None:
     """Refuse a value.
 
@@ -39,10 +135,33 @@ def require(condition: bool, key: str, value: object, allowed: str) -> None:
         allowed: What is allowed, for people.
 
     Raises:
-        InputError: If it is not.
+        InputError: If it is not; within :func:`gathered_refusals` not at once.
     """
     if not condition:
-        raise InputError(f"{key} = {value}; allowed: {allowed}")
+        _refuse(key, f"{key} = {value}; allowed: {allowed}")
+
+
+def require_one_of(key: str, value: object, allowed: Iterable[str]) -> None:
+    """Refuse a word that is none of those allowed, and name the nearest.
+
+    Args:
+        key: Its key.
+        value: The word.
+        allowed: Words that are allowed.
+
+    Raises:
+        InputError: As :func:`require`.
+    """
+    words = list(allowed)
+    if value not in words:
+        _refuse(key, f"{key} = {value}; allowed: {', '.join(words)}{suggestion(value, words)}")
+
+
+def _refuse(key: str, message: str) -> None:
+    refusals = _gathered.get()
+    if refusals is None:
+        raise InputError(message)
+    refusals.setdefault(key, InputError(message))
 
 
 def require_positive(key: str, value: float) -> None:

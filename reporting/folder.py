@@ -4,9 +4,10 @@ import errno
 import fcntl
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from pfsc_drake.errors import InputError
 from reporting.provenance import (
@@ -45,6 +46,7 @@ class ResultsFolder:
         self._elsewhere: Path | None = None
         self._reasons: dict[str, str] = {}  # why a file could not be written here
         self._lost: list[str] = []  # what could not be written elsewhere either
+        self._outcome: Mapping[str, Any] | None = None
         self._write_manifest()
 
     def write(self, name: str, content: str | bytes) -> Path | None:
@@ -76,6 +78,16 @@ class ResultsFolder:
             self._lost.append(name)
             return None
 
+    def tell(self, outcome: Mapping[str, Any]) -> None:
+        """Note how it ended, so that it is known to whoever reads the results.
+
+        Args:
+            outcome: Of numbers, texts and lists of these, by name.
+        """
+        self._outcome = outcome
+        with suppress(OSError):  # the files themselves say what could not be written
+            self._write_manifest()
+
     def explain_problems(self) -> str | None:
         """Return what could not be written, why, and where it is instead; None if all was."""
         if not self._reasons:
@@ -98,7 +110,7 @@ class ResultsFolder:
         return _write_whole(self.path, name, content)
 
     def _write_manifest(self) -> None:
-        text = manifest_text(self._kind, self._files)
+        text = manifest_text(self._kind, self._files, self._outcome)
         _write_whole(self.path, MANIFEST, text.encode("utf-8"))
 
 

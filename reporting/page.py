@@ -172,8 +172,10 @@ def _table(metrics: Metrics) -> str:
     rows = "\n".join(
         f"<tr{_meaning(name)}><td>{escape(_spoken(name, metric.unit))}<br>"
         f"<code>{escape(name)}</code></td>"
-        f'<td class="number">{_value(metric)}</td><td class="target">{_target(metric)}</td>'
-        f"<td>{_mark(metric)}</td><td>{escape(metric.source or '')}</td></tr>"
+        f'<td class="number">{_value(metric)}</td>'
+        f'<td class="target" data-head="Target">{_target(metric)}</td>'
+        f"<td>{_mark(metric)}</td>"
+        f'<td data-head="Source">{escape(metric.source or "")}</td></tr>'
         for name, metric in metrics.items()
     )
     head = (
@@ -181,7 +183,8 @@ def _table(metrics: Metrics) -> str:
         "<th>Source</th></tr>"
     )
     table = (
-        f'<div class="scroll"><table><thead>{head}</thead><tbody>\n{rows}\n</tbody></table></div>'
+        f'<div class="scroll"><table class="metrics"><thead>{head}</thead><tbody>\n{rows}\n'
+        "</tbody></table></div>"
     )
     return _section("All metrics", table if metrics else "")
 
@@ -257,12 +260,18 @@ def _data_table(table: Table) -> str:
             return f"<td>{escape(value)}</td>"
         return f'<td class="number">{value:.4g}</td>'
 
-    head = "".join(f"<th>{escape(name)}</th>" for name in table.head)
+    def heading(name: str, below: Sequence[str | float]) -> str:
+        is_number = bool(below) and not any(isinstance(value, str) for value in below)
+        kind = ' class="number"' if is_number else ""
+        return f"<th{kind}>{escape(name)}</th>"
+
+    columns = list(zip(*table.rows, strict=True)) or [()] * len(table.head)
+    head = "".join(map(heading, table.head, columns))
     rows = "\n".join(f"<tr>{''.join(map(cell, row))}</tr>" for row in table.rows)
     return (
-        f'<figure><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n{rows}\n'
-        f"</tbody></table></div><figcaption><strong>{escape(table.title)}.</strong> "
-        f"{escape(table.caption)}</figcaption></figure>"
+        f'<figure><div class="scroll" tabindex="0"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>\n{rows}\n</tbody></table></div><figcaption><strong>{escape(table.title)}.</strong>"
+        f" {escape(table.caption)}</figcaption></figure>"
     )
 
 

@@ -4,10 +4,12 @@ import json
 import os
 import re
 import subprocess
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
+from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import find_status
 
 PROJECT_ROOT = Path(__file__).resolve().parents[1]
@@ -28,6 +30,13 @@ def standard_attributes(scenario_name: str) -> dict[str, str]:
         for library in ("pfsc_drake", "drake", "casadi", "numpy")
     }
     return {"scenario": scenario_name, "git_revision": git_revision(), **versions}
+
+
+def version_line() -> str:
+    """Return versions and revision in one line, as ``--version`` tells them."""
+    known = standard_attributes("")
+    libraries = f"Drake {known['drake_version']}, CasADi {known['casadi_version']}"
+    return f"{_PROGRAM} {known['pfsc_drake_version']}, {libraries}, git {known['git_revision']}"
 
 
 def git_revision(root: Path = PROJECT_ROOT) -> str:
@@ -93,14 +102,17 @@ _FIGURE = re.compile(rf"{FIGURES}/\w+\.png")
 _PROGRAM = "pfsc_drake"
 
 
-def manifest_text(kind: str, files: Iterable[str]) -> str:
+def manifest_text(kind: str, files: Iterable[str], outcome: Mapping[str, Any] | None = None) -> str:
     """Return the content of a manifest.
 
     Args:
         kind: Kind of results, e.g. ``run``.
         files: Their names in the folder.
+        outcome: How it ended, if that is told.
     """
-    content = {"program": _PROGRAM, "results": kind, "files": list(files)}
+    content: dict[str, Any] = {"program": _PROGRAM, "results": kind, "files": list(files)}
+    if outcome is not None:
+        content["outcome"] = dict(outcome)
     return json.dumps(content, indent=2) + "\n"
 
 
@@ -112,6 +124,24 @@ def listed_results(folder: Path) -> list[str]:
     """
     manifest = _read_manifest(folder)
     return [] if manifest is None else manifest[1]
+
+
+def read_outcome(folder: Path, kind: str) -> dict[str, Any]:
+    """Return how what left its results in a folder ended; empty where nobody told.
+
+    Args:
+        folder: The folder.
+        kind: Kind of results, e.g. ``run``.
+
+    Raises:
+        InputError: If the folder holds no results of this kind.
+    """
+    manifest = _read_manifest(folder)
+    if manifest is None or manifest[0] != kind:
+        there = "no results" if manifest is None else f"the results of a {manifest[0]}"
+        raise InputError(f"{folder}: holds {there}; allowed: the folder of a {kind}")
+    outcome = json.loads((folder / MANIFEST).read_text(encoding="utf-8")).get("outcome")
+    return outcome if isinstance(outcome, dict) else {}
 
 
 def find_obstacle(folder: Path, kind: str, inputs: Sequence[Path]) -> str | None:

@@ -1,7 +1,7 @@
 """The signals, metrics and figures that a run may have, told once, in ``registry.toml``.
 
 From here come units and labels of a log, units and sources of metrics, what a target may name, when
-a figure is drawn, ``list --signals`` and the page ``docs/signals.md``, which this module prints.
+a figure is drawn, ``list --signals``, and ``docs/reference/signals.md``, which this module prints.
 """
 
 import re

@@ -1,11 +1,10 @@
 """How the project's figures look: colours, sizes, grid, panels, and the picture of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from io import BytesIO
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
@@ -15,8 +14,6 @@ from matplotlib.textpath import TextPath
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
-
-matplotlib.use("Agg")
 
 # Okabe and Ito's palette: told apart with any colour vision, and in this order by lightness.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195")
@@ -79,7 +76,11 @@ class Figure:
     name: str
     title: str
     caption: str
-    png: bytes
+    png: bytes = field(repr=False)
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """Return the picture for a notebook, and how wide it is shown [pixels]."""
+        return self.png, {"width": round(WIDTH * DPI / 2)}
 
 
 @dataclass

@@ -1,6 +1,18 @@
 """Messages stay readable whatever is in them."""
 
-from pfsc_drake.errors import MAX_MESSAGE, InputError, shortened
+import pytest
+
+from pfsc_drake.errors import (
+    MAX_MESSAGE,
+    InputError,
+    did_you_mean,
+    gathered_refusals,
+    nearest_file,
+    require,
+    require_one_of,
+    shortened,
+    suggestion,
+)
 
 
 def test_a_message_with_a_huge_value_keeps_what_stands_around_it():
@@ -14,3 +26,48 @@ def test_short_texts_stay_as_they_are():
     assert shortened("a" * 60) == "a" * 60
     assert shortened("a" * 40 + "b" * 21) == "a" * 38 + "..." + "b" * 19
     assert str(InputError("x" * MAX_MESSAGE)) == "x" * MAX_MESSAGE
+
+
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("elatic", "did you mean 'elastic'? "),
+        ("ELASTIC", "did you mean 'elastic'? "),
+        ("magic", ""),
+        ("", ""),
+        (3, ""),
+        ("e" * 100_000, ""),
+    ],
+)
+def test_the_nearest_word(word, hint):
+    assert did_you_mean(word, ["elastic", "rigid"]) == hint
+    assert suggestion(word, ["elastic", "rigid"]) == (f"; {hint.rstrip()}" if hint else "")
+    assert did_you_mean(word, []) == ""
+
+
+def test_the_nearest_file(tmp_path):
+    (tmp_path / "points.csv").touch()
+    (tmp_path / "a\nb.csv").touch()
+    assert nearest_file(tmp_path / "point.csv") == "; did you mean 'points.csv'?"
+    assert nearest_file(tmp_path / "else.yaml") == ""
+    assert nearest_file(tmp_path / "a_b.csv") == ""
+    assert nearest_file(tmp_path / "nowhere" / "points.csv") == ""
+    assert nearest_file(tmp_path / "a\0b" / "points.csv") == ""
+
+
+def test_refusals_are_gathered_and_raised_afterwards_again():
+    with gathered_refusals() as found:
+        require_one_of("law", "rigit", ["rigid"])
+        require(False, "law", "rigit", "of one key the first counts")
+        require(True, "gain", 1, "anything")
+        require(False, "gain", -1, "positive")
+        raise InputError("a consequence")
+    assert found == [
+        "law = rigit; allowed: rigid; did you mean 'rigid'?",
+        "gain = -1; allowed: positive",
+    ]
+    with gathered_refusals() as found:
+        raise InputError("on its own")
+    assert found == ["on its own"]
+    with pytest.raises(InputError):
+        require(False, "gain", -1, "positive")

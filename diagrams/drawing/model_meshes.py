@@ -21,7 +21,7 @@ from pydrake.multibody.tree import (
     RigidBody,
 )
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, nearest_file
 from pfsc_drake.geometry.files.mesh_files import read_stl
 from pfsc_drake.robot.models.model_text import (
     Edit,
@@ -62,7 +62,7 @@ def check_mesh_file(file: FilePath) -> None:
         InputError: If it is missing, of another kind or not what its name says.
     """
     if not file.is_file():
-        raise InputError(f"{file}: no such file")
+        raise InputError(f"{file}: no such file{nearest_file(file)}")
     checks = {".obj": _is_obj, ".gltf": _is_gltf, ".dae": _is_collada, ".stl": _is_stl}
     check = checks.get(file.suffix.lower())
     if check is None:

@@ -1,6 +1,6 @@
 """A logged run in Meshcat: robot, path, moving frame and trail of the tool; a DELTA robot hangs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -77,6 +77,7 @@ class RecordedMotion:
         trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
         region_clock: Region clock of regions that move [s], shape (frames,).
         plates: ``[p, R by rows]`` of K plates, shape (frames, 12 K).
+        phases: When which phase of their mounting begins [s].
     """
 
     times: np.ndarray
@@ -90,6 +91,7 @@ class RecordedMotion:
     trail: np.ndarray | None = None
     region_clock: np.ndarray | None = None
     plates: np.ndarray | None = None
+    phases: Sequence[tuple[float, str]] = ()
 
 
 def build_replay(
@@ -305,12 +307,7 @@ def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarra
 
 
 def body_origins(plant: MultibodyPlant, q: np.ndarray) -> np.ndarray:
-    """Return the origins of all bodies but the world [m], shape (bodies, 3).
-
-    Args:
-        plant: The plant.
-        q: Its positions.
-    """
+    """Return the origins of all bodies but the world at a plant's positions [m], (bodies, 3)."""
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, q)
     bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]

@@ -33,6 +33,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.joint_friction import HoldingBrakes, JointFriction
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess, VelocityServo
+from pfsc_drake.yaml.typed import spread
 
 # integration schemes of fixed step that the bristles of friction are made for
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
@@ -343,7 +344,7 @@ def _given_coefficients(
         return known.coulomb[:n], known.viscous[:n]
     values = []
     for key in ("f_c", "f_v"):
-        given = getattr(parameters, key) or [0.0] * n
+        given = spread(getattr(parameters, key), n) or [0.0] * n
         if len(given) != n:
             raise InputError(f"{block}.{key}: {len(given)} values; the robot has {n} joints")
         values.append(np.array(given, dtype=float))

@@ -13,7 +13,7 @@ from pydrake.multibody.tree import (
 from diagrams.scenario import (
     RobotParameters,
 )
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
 from pfsc_drake.robot.models.files import resolve_model
@@ -101,6 +101,7 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
         raise InputError(
             f"robot.tool_frame: the model {parameters.model} has no frame "
             f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"
+            f"{suggestion(parameters.tool_frame, names)}"
         )
     return frame
 

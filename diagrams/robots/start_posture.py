@@ -7,6 +7,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget, middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.yaml.typed import spread
 
 # from where on a posture that was found is another one than the posture given
 _FAR_DEG = 60.0
@@ -87,6 +88,7 @@ def posture_warnings(
     """
     if not posture_deg:
         return []
+    posture_deg = spread(posture_deg, chain.dimension)
     is_angle = np.array([link.is_revolute for link in chain.links])
     unit = np.where(is_angle, np.deg2rad(_FAR_DEG), _FAR_SLIDE)
     distance = np.abs(q_J - posture_near(posture_deg, chain)) / unit
@@ -137,6 +139,7 @@ def posture_near(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
     """
     if not posture_deg:
         return middle_posture(chain)
+    posture_deg = spread(posture_deg, chain.dimension)
     if len(posture_deg) != chain.dimension:
         raise InputError(
             f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"

@@ -9,6 +9,7 @@ from pfsc_drake.checks import require as require
 from pfsc_drake.checks import require_between as require_between
 from pfsc_drake.checks import require_not_negative as require_not_negative
 from pfsc_drake.checks import require_numbers as require_numbers
+from pfsc_drake.checks import require_one_of as require_one_of
 from pfsc_drake.checks import require_positive as require_positive
 from pfsc_drake.checks import require_whole_fraction as require_whole_fraction
 from pfsc_drake.checks import require_whole_ticks as require_whole_ticks

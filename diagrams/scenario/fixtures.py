@@ -12,6 +12,7 @@ from diagrams.scenario.checks import (
     require_length,
     require_not_negative,
     require_numbers,
+    require_one_of,
     require_place,
     require_positive,
 )
@@ -27,6 +28,7 @@ from diagrams.scenario.surface_shapes import (
     Turned,
 )
 from pfsc_drake.following.options.follower import FixtureOptions
+from pfsc_drake.yaml.typed import equal
 
 _SIDES, _FACES = ("inside", "outside"), ("above", "below")
 _STIFFNESS = (1.0, 1e6)  # N/m
@@ -39,10 +41,10 @@ class Box(Placed):
     """A box, as an obstacle; its origin is its middle.
 
     Attributes:
-        size: Along its three axes [m].
+        size: Along its three axes [m]; one number for a cube.
     """
 
-    size: list[float] = dc.field(default_factory=lambda: [0.1, 0.1, 0.1])
+    size: list[float] = dc.field(default_factory=lambda: [0.1, 0.1, 0.1], metadata=equal(3))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -257,8 +259,7 @@ class FixtureParameters(FixtureOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known = self.start_inside in _START
-        require(known, "start_inside", self.start_inside, ", ".join(_START))
+        require_one_of("start_inside", self.start_inside, _START)
         kind = self.orientation.kind
         require(kind != "normal", "orientation.kind", kind, "none, given")
         require(self.servo_lag < 0.1, "servo_lag", self.servo_lag, "below 0.1 s")

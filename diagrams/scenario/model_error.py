@@ -8,7 +8,7 @@ import numpy as np
 from diagrams.scenario.checks import require, require_between, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.model_error import ModelError
-from pfsc_drake.yaml.typed import ONE_OR_MANY
+from pfsc_drake.yaml.typed import ONE_OR_MANY, equal
 
 _FACTORS = ("mass", "inertia", "rotor_inertia", "stiffness", "friction", "link_length")
 _LEAST, _MOST = 1e-3, 1e3
@@ -100,7 +100,7 @@ class ModelErrorParameters:
     link_length: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
     joint_offset_deg: list[float] = dc.field(default_factory=lambda: [0.0], metadata=ONE_OR_MANY)
     tool_mass: float = 0.0
-    tool_center: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    tool_center: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
     random: RandomModelError = dc.field(default_factory=RandomModelError)
 
     def __post_init__(self) -> None:

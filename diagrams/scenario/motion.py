@@ -9,8 +9,10 @@ from diagrams.scenario.checks import (
     require,
     require_between,
     require_numbers,
+    require_one_of,
 )
 from pfsc_drake.control.law.swing import Swing
+from pfsc_drake.yaml.typed import NUMBERS_OR_END, ONE_FOR_ALL, equal
 
 # beyond, durations have no digits left, or none at all
 _VELOCITIES = (1e-6, 1e3)  # m/s
@@ -45,7 +47,9 @@ class ReferenceParameters:
     """Motion along the path, or along a surface, resting at every point.
 
     Attributes:
-        points: Arc lengths to visit [m], at most 1e6; the first is the start.
+        points: Arc lengths to visit [m], at most 1e6; the first is the start. Of a path ``end``
+            stands for its length, so that ``[0, end]`` is all of it, and ``[0, end, 0]`` there and
+            back; a closed one ends where it began.
         places: Places of a surface, instead: pairs of tangential coordinates to visit [m], along
             straight lines of these coordinates.
         second: Second of a surface, with points for its first coordinate: the motion of the second.
@@ -59,7 +63,9 @@ class ReferenceParameters:
             reference leaves, from 0 to below 1.
     """
 
-    points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1])
+    points: list[float | str] = dc.field(
+        default_factory=lambda: [0.0, 0.1], metadata=NUMBERS_OR_END
+    )
     velocity: float = 0.1
     acceleration: float = 1.0
     dwell: float = 0.3
@@ -81,14 +87,29 @@ class ReferenceParameters:
         good = self.dwell == 0.0 or _SHORTEST_REST <= self.dwell <= _LONGEST_REST
         allowed = f"zero or a positive number, {_SHORTEST_REST:g} to {_LONGEST_REST:g} s"
         require(good, "dwell", self.dwell, allowed)
-        require(self.limits in _LIMITS, "limits", self.limits, ", ".join(_LIMITS))
+        require_one_of("limits", self.limits, _LIMITS)
         require(0.0 <= self.reserve < 1.0, "reserve", self.reserve, "from 0 to below 1")
+
+    def arc_lengths(self, length: float | None) -> list[float]:
+        """Return the points [m].
+
+        Args:
+            length: What ``end`` stands for [m]; None for a surface, which has no end.
+
+        Raises:
+            InputError: If there is an ``end`` and no length.
+        """
+        words = [point for point in self.points if isinstance(point, str)]
+        allowed = "numbers; a surface has no end"
+        require(not words or length is not None, "reference.points", self.points, allowed)
+        return [length or 0.0 if isinstance(point, str) else point for point in self.points]
 
 
 def _check_motion(motion: SecondReference | ReferenceParameters) -> None:
-    enough = len(motion.points) >= 2 and bool(np.isfinite(motion.points).all())
+    points = [point for point in motion.points if not isinstance(point, str)]
+    enough = len(motion.points) >= 2 and bool(np.isfinite(points).all())
     require(enough, "points", motion.points, "two or more finite numbers")
-    near = max(map(abs, motion.points)) <= _FARTHEST
+    near = all(abs(point) <= _FARTHEST for point in points)
     require(near, "points", motion.points, f"numbers of at most {_FARTHEST:g} m")
     require_between("velocity", motion.velocity, *_VELOCITIES, "m/s, a positive number")
     require_between(
@@ -101,23 +122,23 @@ class StartParameters:
     """Where the tool is at the start, at rest.
 
     Attributes:
-        offset: Transversal coordinates [m] beside the first point of the reference; of a surface
-            the first is the distance along its normal.
+        offset: Transversal coordinates [m] beside the first point of the reference, one number for
+            equal ones; of a surface the first is the distance along its normal.
         theta: Parameters of a surface: its parameters where the tool starts; empty for its middle.
         position: Position of a surface, instead: the tool point [m].
         rotation_deg: ZYX angles [deg] away from the path's orientation.
-        posture_deg: Joint angles [deg] near the start pose (m for prismatic joints); they
-            choose the branch of the inverse kinematics.
+        posture_deg: Joint angles [deg] near the start pose (m for prismatic joints), one number
+            for all that are equal; they choose the branch of the inverse kinematics.
         transition: Time in which the reference goes over from where the tool is to the path, so
             that a start beside the path asks for no jump of the drives, 0 or 1e-3 to 1e3 [s];
             0 for a reference that is on the path from the start.
     """
 
-    offset: list[float] = dc.field(default_factory=lambda: [0.0, 0.0])
+    offset: list[float] = dc.field(default_factory=lambda: [0.0, 0.0], metadata=equal(2))
     theta: list[float] = dc.field(default_factory=list)
     position: list[float] = dc.field(default_factory=list)
-    rotation_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    posture_deg: list[float] = dc.field(default_factory=list)
+    rotation_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    posture_deg: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     transition: float = 0.0
 
     def __post_init__(self) -> None:

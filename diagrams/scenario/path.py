@@ -10,11 +10,13 @@ from diagrams.scenario.checks import (
     require_direction,
     require_length,
     require_numbers,
+    require_one_of,
     require_place,
 )
 from diagrams.scenario.surface import SurfaceShape, require_jacobian
 from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.yaml.reading import FILE
+from pfsc_drake.yaml.typed import equal
 
 _SHORTEST_TOLERANCE = 1e-7  # m
 TASKS = ("full", "tool_axis", "yaw", "none")
@@ -98,13 +100,7 @@ class Waypoints:
     corner_distance: float = 0.0
 
     def __post_init__(self) -> None:
-        allowed = ("chord", "centripetal")
-        require(
-            self.parametrization in allowed,
-            "parametrization",
-            self.parametrization,
-            ", ".join(allowed),
-        )
+        require_one_of("parametrization", self.parametrization, ("chord", "centripetal"))
         require(0 <= self.smoothness <= 6, "smoothness", self.smoothness, "0 to 6")
         # a blend shorter than any path is no motion, and takes long to be tabulated
         for key, least in {"tolerance": _SHORTEST_TOLERANCE, "corner_distance": SHORTEST}.items():
@@ -188,7 +184,7 @@ class Keyframe:
     """
 
     theta: float = 0.0
-    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
 
 
 @dc.dataclass
@@ -219,8 +215,8 @@ class OrientationParameters:
     jacobian: str = "geometric"
 
     def __post_init__(self) -> None:
-        require(self.convention in ("zyx", "zyz"), "convention", self.convention, "zyx, zyz")
-        require(self.task in TASKS, "task", self.task, ", ".join(TASKS))
+        require_one_of("convention", self.convention, ("zyx", "zyz"))
+        require_one_of("task", self.task, TASKS)
         require_jacobian(self.jacobian, "task", self.task)
         require_direction("tool_axis", self.tool_axis)
         require_direction("yaw_axis", self.yaw_axis)

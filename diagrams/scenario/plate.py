@@ -9,12 +9,14 @@ from diagrams.scenario.checks import (
     require_between,
     require_not_negative,
     require_numbers,
+    require_one_of,
     require_positive,
 )
 from diagrams.scenario.workpiece import require_contact_step, require_up_to
 from pfsc_drake.geometry.workpieces import FEWEST_WEDGES
 from pfsc_drake.physics.mounting_hand import MountingHandParameters
 from pfsc_drake.physics.suction import SuctionParameters
+from pfsc_drake.yaml.typed import equal
 
 STARTS = ("magazine", "held", "frame")
 _SMALLEST, _LARGEST = 1e-4, 2.0  # m
@@ -93,8 +95,8 @@ class CarrierParameters:
     """
 
     at: float = 0.0
-    shift: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    turn: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    shift: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    turn: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
     random: RandomMisplacement = dc.field(default_factory=RandomMisplacement)
 
     def __post_init__(self) -> None:
@@ -116,7 +118,7 @@ class FrameParameters(CarrierParameters):
     """The frame with the bores.
 
     Attributes:
-        size: Length and width of the frame [m].
+        size: Length and width of the frame [m]; one number for a square.
         clearance: Diameter of the bores less that of the pins [m].
         ring: Radius around the axis of a bore within which there is material for a pin to touch
             [m].
@@ -124,7 +126,7 @@ class FrameParameters(CarrierParameters):
         wedges: Number of convex pieces that a bore is made of, see :func:`bore_wedges`.
     """
 
-    size: list[float] = dc.field(default_factory=lambda: [0.30, 0.20])
+    size: list[float] = dc.field(default_factory=lambda: [0.30, 0.20], metadata=equal(2))
     clearance: float = 3e-4
     ring: float = 0.016
     depth: float = 0.015
@@ -208,7 +210,7 @@ class PlateParameters:
         require(good, "size", self.size, f"3 numbers of {_SMALLEST:g} to {_LARGEST:g} m")
         require_between("mass", self.mass, _LIGHTEST, _HEAVIEST, "kg")
         require_between("believed_mass", self.believed_mass, 0.0, _HEAVIEST, "kg")
-        require(self.start in STARTS, "start", self.start, ", ".join(STARTS))
+        require_one_of("start", self.start, STARTS)
         require(self.release > 0.0, "release", self.release, "a positive number of seconds")
         require(len(self.rests) >= 3, "rests", self.rests, "three [x, y] or more")
         for i, rest in enumerate(self.rests):

@@ -11,6 +11,7 @@ from diagrams.scenario.checks import (
     require,
     require_not_negative,
     require_numbers,
+    require_one_of,
     require_positive,
     require_whole_ticks,
 )
@@ -21,7 +22,7 @@ from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters
 from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.reading import ModelOptions
 from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE
-from pfsc_drake.yaml.typed import ONE_OR_MANY
+from pfsc_drake.yaml.typed import ONE_FOR_ALL, ONE_OR_MANY, equal
 
 # what moves a DELTA robot
 MULTIBODY, ANALYTIC = "multibody", "analytic"
@@ -39,8 +40,8 @@ class PoseParameters:
             ``R = Rz(a) Ry(b) Rx(c)``. Upside down is ``[0, 0, 180]``.
     """
 
-    position: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    zyx_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    position: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    zyx_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
 
     def __post_init__(self) -> None:
         require_numbers("position", self.position, 3)
@@ -100,8 +101,8 @@ class RobotParameters:
         packages: Folders of packages that the model refers to (``package://name/``). Packages
             above the model's folder and in ROS_PACKAGE_PATH are found without.
         elastic: Elastic joints and rotors in a model without.
-        joint_damping: ``K_d`` of its elastic joints, base first [Nm s/rad or N s/m]; empty for
-            the model's.
+        joint_damping: ``K_d`` of its elastic joints, base first, or one number for all
+            [Nm s/rad or N s/m]; empty for the model's.
         rotor_coupling: Name of a shipped robot, or YAML file with robot parameters, that says
             where the rotors of its drives sit. The robot then obeys the full elastic model
             (2.64), with the inertia coupling of spinning rotors and moving links that the
@@ -120,13 +121,12 @@ class RobotParameters:
     fixed_joints: dict[str, float] = dc.field(default_factory=dict)
     packages: dict[str, str] = dc.field(default_factory=dict, metadata=FILE)
     elastic: ElasticParameters = dc.field(default_factory=ElasticParameters)
-    joint_damping: list[float] = dc.field(default_factory=list)
+    joint_damping: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     rotor_coupling: str = dc.field(default="", metadata=NAME_OR_FILE)
     plant: str = MULTIBODY
 
     def __post_init__(self) -> None:
-        plants = (MULTIBODY, ANALYTIC)
-        require(self.plant in plants, "plant", self.plant, ", ".join(plants))
+        require_one_of("plant", self.plant, (MULTIBODY, ANALYTIC))
         require_numbers("gravity", self.gravity, 3)
         bearable = all(abs(component) <= _STRONGEST for component in self.gravity)
         require(bearable, "gravity", self.gravity, f"up to {_STRONGEST:g} m/s^2")
@@ -250,7 +250,8 @@ class DriverParameters:
 class SensorParameters(ForceTorqueParameters, ToolCompensationParameters):
     """The force/torque sensor and how its signal is used; only built with compliance.
 
-    In arrays of six, the first three entries are forces [N], the others torques [Nm]. A sensor that
+    In arrays of six, the first three entries are forces [N], the others torques [Nm]; two numbers
+    stand for equal forces and equal torques, one for six equal entries. A sensor that
     has noise and repeats itself to the last bit is lost; its bandwidth is that of the tool's
     compensation, too.
 
@@ -271,8 +272,7 @@ class SensorParameters(ForceTorqueParameters, ToolCompensationParameters):
 
     def __post_init__(self) -> None:
         # accelerations are known to no component of the station
-        known = self.inertia in ("differentiated", "none")
-        require(known, "inertia", self.inertia, "differentiated, none")
+        require_one_of("inertia", self.inertia, ("differentiated", "none"))
         require_not_negative("unknown_mass", self.unknown_mass)
         ForceTorqueParameters.__post_init__(self)
         ToolCompensationParameters.__post_init__(self)

@@ -9,6 +9,7 @@ from copy import deepcopy
 from diagrams.scenario.checks import (
     require,
     require_not_negative,
+    require_one_of,
     require_positive,
 )
 from diagrams.scenario.fixtures import FixtureParameters
@@ -139,7 +140,7 @@ class Scenario:
             require_not_negative(key, getattr(self, key))
         require_positive("settling_tolerance", self.settling_tolerance)
         for law in self.targets:
-            require(law in RELATIVE_DEGREE, "targets", law, ", ".join(RELATIVE_DEGREE))
+            require_one_of("targets", law, RELATIVE_DEGREE)
 
     @property
     def switched_regions(self) -> list[str]:

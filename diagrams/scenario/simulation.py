@@ -5,7 +5,7 @@ import dataclasses as dc
 import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes
 
-from diagrams.scenario.checks import require, require_between, require_positive
+from diagrams.scenario.checks import require, require_between, require_one_of, require_positive
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.physics.force_torque_sensor import KINDS
 from pfsc_drake.physics.operator_hand import LiveHandParameters
@@ -36,7 +36,7 @@ class SensorFailureParameters:
     whole_joint: bool = False
 
     def __post_init__(self) -> None:
-        require(self.kind in KINDS, "kind", self.kind, ", ".join(KINDS))
+        require_one_of("kind", self.kind, KINDS)
         require(bool(np.isfinite(self.size)), "size", self.size, "a finite number")
 
 
@@ -70,7 +70,7 @@ class SimulationParameters:
 
     def __post_init__(self) -> None:
         schemes = [AUTO, *GetIntegrationSchemes()]
-        require(self.integrator in schemes, "integrator", self.integrator, ", ".join(schemes))
+        require_one_of("integrator", self.integrator, schemes)
         require(1e-6 <= self.max_step <= 0.1, "max_step", self.max_step, "1e-6 to 0.1 s")
         require_between("frame_period", self.frame_period, 1e-3, 1e3, "s, a positive number")
         good = self.accuracy == 0.0 or 1e-10 <= self.accuracy <= 0.1

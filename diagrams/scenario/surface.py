@@ -9,6 +9,7 @@ from diagrams.scenario.checks import (
     require_direction,
     require_length,
     require_numbers,
+    require_one_of,
     require_place,
 )
 from diagrams.scenario.surface_shapes import (
@@ -23,6 +24,7 @@ from diagrams.scenario.surface_shapes import (
 )
 from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.yaml.reading import FILE
+from pfsc_drake.yaml.typed import equal
 
 _UNITS = ("m", "cm", "mm", "inch")
 _BASES = ("auto", "plane", "cylinder")
@@ -83,7 +85,7 @@ class Fitted(Placed):
     def __post_init__(self) -> None:
         super().__post_init__()
         for key, values in {"unit": _UNITS, "base": _BASES}.items():
-            require(getattr(self, key) in values, key, getattr(self, key), ", ".join(values))
+            require_one_of(key, getattr(self, key), values)
         _require_smoothness(self.smoothness)
         for key in ("tolerance", "largest_hole"):
             _require_length_or_zero(key, getattr(self, key))
@@ -187,7 +189,7 @@ def require_jacobian(jacobian: str, key: str, value: str) -> None:
         key: What says how much of the orientation matters.
         value: Its value; ``full`` for all of it.
     """
-    require(jacobian in _JACOBIANS, "jacobian", jacobian, ", ".join(_JACOBIANS))
+    require_one_of("jacobian", jacobian, _JACOBIANS)
     good = jacobian == "geometric" or value == "full"
     require(good, "jacobian", jacobian, f"geometric with {key}: {value}")
 
@@ -210,7 +212,7 @@ class SurfaceOrientationParameters:
 
     kind: str = "none"
     convention: str = "zyx"
-    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
     task: str = "full"
     tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
     yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
@@ -218,7 +220,7 @@ class SurfaceOrientationParameters:
 
     def __post_init__(self) -> None:
         for key, values in {"kind": _KINDS, "convention": _CONVENTIONS, "task": _TASKS}.items():
-            require(getattr(self, key) in values, key, getattr(self, key), ", ".join(values))
+            require_one_of(key, getattr(self, key), values)
         require_jacobian(self.jacobian, "task", self.task)
         require_jacobian(self.jacobian, "kind", "full" if self.kind != "none" else self.kind)
         require_numbers("angles_deg", self.angles_deg, 3)

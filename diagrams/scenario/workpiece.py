@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from diagrams.scenario.checks import require, require_between, require_numbers
+from pfsc_drake.yaml.typed import equal
 
 SMALLEST, LARGEST = 1e-4, 10.0  # m, of workpiece and ball
 _MODULUS = 1e3, 1e12  # Pa: softer than any foam, harder than any stone
@@ -120,7 +121,7 @@ class NotchParameters:
     """
 
     ball: BallParameters = dc.field(default_factory=BallParameters)
-    displacement: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    displacement: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
     radius: float = 0.022
     depth: float = 0.025
     width: float = 0.07
@@ -162,8 +163,8 @@ class WorkpieceParameters:
     """
 
     ball: SoftBall = dc.field(default_factory=SoftBall)
-    shift: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    turn_zyx_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    shift: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    turn_zyx_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
     spacing: float = 4e-3
     time_step: float = 5e-4
 

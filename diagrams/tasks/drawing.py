@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -24,6 +25,7 @@ from pfsc_drake.systems.drawing.manifold_visualizer import (
     SurfaceVisualizer,
     draw_surface,
 )
+from pfsc_drake.systems.drawing.numbers import SceneNumber
 from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer
 
 _POINTS = 600
@@ -119,7 +121,7 @@ def skin_and_lines(surface: Surface) -> tuple[np.ndarray, list[np.ndarray]]:
 
 @dataclass(frozen=True)
 class SpaceDrawing:
-    """The surfaces of regions, drawn where they are at rest.
+    """The surfaces of regions, drawn where they are at rest; with numbers if they are several.
 
     Attributes:
         fixtures: The regions.
@@ -137,17 +139,53 @@ class SpaceDrawing:
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
         """Add what draws it."""
         shapes: list[tuple[np.ndarray, list[np.ndarray]]] = []
-        placements = {}
+        placements, firsts = {}, []
         for fixture in self.fixtures:
+            firsts.append(len(shapes))
             for surface in fixture.surfaces:
                 if isinstance(fixture.region, MovingRegion):
                     placements[len(shapes)] = partial(_placement, fixture.region)
                 shapes.append(skin_and_lines(surface))
+        numbers = region_numbers([skin for skin, _ in shapes], firsts)
+        size = self.manifold.layout.size
         drawing = builder.AddNamedSystem(
             "region_visualizer",
-            RegionVisualizer(shapes, placements, self.manifold.layout.size, meshcat, period),
+            RegionVisualizer(shapes, placements, size, meshcat, period, numbers),
         )
         return drawing.GetInputPort("manifold_point")
+
+
+# to who looks at the regions from their side with the robot to the left, and that one's right
+_TO_VIEWER, _ACROSS = np.array([0.53, -0.79, 0.31]), np.array([0.83, 0.56, 0.0])
+_NUMBER, _OWN = 0.06, 0.4  # height of a number against the size of all regions, and of its own
+
+
+def region_numbers(skins: Sequence[np.ndarray], firsts: Sequence[int]) -> dict[int, SceneNumber]:
+    """Return the number of each region, by its first surface; none for a single region.
+
+    It stands where the region is next to who looks, before it.
+
+    Args:
+        skins: Points of all surfaces [m], each (rows, columns, 3).
+        firsts: Index of each region's first surface.
+    """
+    if len(firsts) < 2:
+        return {}
+    clouds = [skin.reshape(-1, 3) for skin in skins]
+    everything = np.concatenate(clouds)
+    size = float(np.linalg.norm(np.ptp(everything, axis=0)))
+    middle = everything.mean(axis=0)
+    azimuth = np.arctan2(middle[1], middle[0])
+    turn = RotationMatrix.MakeZRotation(azimuth).matrix()
+    view, across = (turn @ v / np.linalg.norm(v) for v in (_TO_VIEWER, _ACROSS))
+    numbers = {}
+    for k, (first, end) in enumerate(pairwise([*firsts, len(clouds)])):
+        points = np.concatenate(clouds[first:end])
+        height = min(_NUMBER * size, _OWN * float(np.linalg.norm(np.ptp(points, axis=0))))
+        middle = points[np.argmax(points @ view)] + height / 2.0 * view
+        foot = middle - height / 2.0 * np.eye(3)[2]
+        numbers[first] = SceneNumber(k + 1, foot, across, height)
+    return numbers
 
 
 def _placement(region: MovingRegion, clock: float) -> RigidTransform:

@@ -26,6 +26,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.robot_model import largest_speeds
+from pfsc_drake.yaml.typed import spread
 
 # s, between the samples of a course: at a glance, while it is checked, and while it is slowed
 _GLANCED, _CHECKED, _SLOWED, _FINEST = 16e-3, 4e-3, 1e-3, 2.5e-4
@@ -93,7 +94,7 @@ class _Planner:
         self._run_duration, self._task, self._law, self._start = duration, task, law, start
         self.robot, reserve = law.robot, reference.reserve
         f_c, f_v = friction or (np.zeros(self.robot.dimension),) * 2
-        damping = controller.boundary_layer_damping
+        damping = spread(controller.boundary_layer_damping, self.robot.dimension)
         self.demand = DriveDemand(
             self.robot, controller.law, f_v, np.array(damping) if damping else None
         )

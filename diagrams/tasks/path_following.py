@@ -72,7 +72,7 @@ class PathTask(Task):
         folder: FilePath,
         progress: Progress | None = None,
     ) -> None:
-        self._start_parameters, self._points, law = start, reference.points, controller.law
+        self._start_parameters, law = start, controller.law
         self._max_alpha = controller.max_alpha
         surface = surface_of_path(parameters, surface)
         self._is_on_surface, self._orientation_task = (
@@ -96,9 +96,10 @@ class PathTask(Task):
         self.place = PathManifold(self.relative_degree, **followed)
         self.manifold = self._law_manifold(self.relative_degree, **followed)
         self.warnings += self._euler_warnings("path" if surface is None else "surface")
-        self._check_points(reference.points)
+        self._points = reference.arc_lengths(self.path.length)
+        self._check_points(self._points)
         self.motion = rest_to_rest(
-            reference.points,
+            self._points,
             velocity=reference.velocity,
             acceleration=reference.acceleration,
             dwell=reference.dwell,

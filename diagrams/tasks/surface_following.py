@@ -229,7 +229,7 @@ def _motion(reference: ReferenceParameters) -> PiecewisePolynomialCurve:
             "[[eta_1, eta_2], ..] (m), or reference.second: {points, velocity, acceleration}"
         )
     return together(
-        (reference.points, *limits),
+        (reference.arc_lengths(None), *limits),
         (
             reference.second.points,
             reference.second.velocity,

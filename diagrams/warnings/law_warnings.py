@@ -24,6 +24,7 @@ from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.robot_model import RobotModel, joint_resonances
+from pfsc_drake.yaml.typed import spread
 
 # relative, of masses and of stiffnesses, which gains should bear
 _BORNE_ERROR = 0.05
@@ -107,7 +108,7 @@ def _fragile_gains(
 def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[str]:
     if parameters.law != "singular_perturbation":
         return []
-    damping = np.array(parameters.boundary_layer_damping)
+    damping = np.array(spread(parameters.boundary_layer_damping, robot.dimension))
     # rigid joints among elastic ones have nothing to damp
     stiffness = np.where(robot.elastic_joints, robot.K_s, 0.0)
     rate = float(np.max(stiffness * damping * parameters.sampling_time / robot.D_M))
@@ -138,7 +139,7 @@ def _soft_joints(
         what = "acts on the motors, and bending joints let the tool leave the path"
     else:
         posture = None if law.posture is None else law.posture.stabilization.proportional
-        damping = np.array(parameters.boundary_layer_damping)
+        damping = np.array(spread(parameters.boundary_layer_damping, robot.dimension))
         softness = composite_law_error(joints, damping, _transversal_gains(law), posture)
         what = "takes the joints for stiff, and lets the tool leave the path"
     resonance = joint_resonances(robot, q_J)[0] / (2.0 * np.pi)

@@ -18,7 +18,7 @@ from experiments.results.path import shape_metrics
 from experiments.results.posture import is_redundant
 from experiments.results.run_log import FloatArray, RunLog
 from experiments.results.run_signals import expected_signals
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, did_you_mean
 from reporting.metrics import Metric, Metrics, format_quantity
 from reporting.registry import possible_metrics
 
@@ -66,7 +66,8 @@ def check_targets(settings: Scenario, station: Station) -> None:
         for name in targets:
             if name not in allowed:
                 raise InputError(
-                    f"targets.{law}.{name}: no such metric; allowed: {', '.join(allowed)}"
+                    f"targets.{law}.{name}: no such metric; {did_you_mean(name, allowed)}"
+                    f"allowed: {', '.join(allowed)}"
                 )
 
 

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, nearest_file, suggestion
 from pfsc_drake.yaml.reading import find_status
 from reporting.registry import SIGNALS, KnownSignal
 
@@ -77,6 +77,7 @@ class RunLog:
         except KeyError:
             raise KeyError(
                 f"log has no signal {name!r}; it has: {', '.join(self.signals)}"
+                f"{suggestion(name, self.signals)}"
             ) from None
 
     def __contains__(self, name: object) -> bool:
@@ -157,7 +158,8 @@ class RunLog:
         """
         status = find_status(path)
         if status is None or not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{path}: no such file; allowed: the log of a run (HDF5)")
+            hint = nearest_file(path) or nearest_file(path.parent)
+            raise InputError(f"{path}: no such file; allowed: the log of a run (HDF5){hint}")
         try:
             with h5py.File(path, "r") as file:
                 signals = {

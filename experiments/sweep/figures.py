@@ -10,12 +10,12 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
-from scipy.stats import spearmanr
 
+from experiments.sweep.influence import find_influence
 from experiments.sweep.summary import Columns, Spread
 from experiments.sweep.worker import COMPLETED
 from reporting.metrics import format_quantity
-from reporting.style import ALERT, COLOURS, INK, STYLE, WIDTH, Drawing, Figure, render
+from reporting.style import ALERT, COLOURS, INK, REFERENCE, STYLE, WIDTH, Drawing, Figure, render
 
 MAX_PANELS = 12
 
@@ -51,12 +51,12 @@ def _over_parameters(
     scale, label = _axis(spread)
     values = np.array([np.nan if v is None else v for v in columns[spread.name]], dtype=float)
     values[[status != COMPLETED for status in columns["status"]]] = np.nan
-    influence = {name: _influence(columns[name], values) for name in varied}
+    influence = {name: find_influence(columns[name], values) for name in varied}
     kind = next((name for name in varied if _is_kind(columns[name])), None)
     groups = _kinds(columns[kind]) if kind else []
     colours = [COLOURS[groups.index(str(v))] for v in columns[kind]] if kind else []
     colours = colours or [COLOURS[0]] * len(values)
-    chosen = sorted(varied, key=lambda name: -abs(influence[name]))[:MAX_PANELS]
+    chosen = sorted(varied, key=lambda name: -influence[name].strength)[:MAX_PANELS]
     across = min(len(chosen), _COLUMNS)
     down = -(-len(chosen) // across)
     with plt.rc_context(STYLE):
@@ -73,8 +73,9 @@ def _over_parameters(
                 markerfacecolor="none",
                 markeredgecolor=ALERT,
             )
-            rank = influence[name]
-            panel.set_title(f"rank correlation {rank:+.2f}" if np.isfinite(rank) and rank else "")
+            panel.set_title(str(influence[name]))
+            if (bend := influence[name].bend) is not None:
+                panel.axvline(bend, color=REFERENCE, linestyle="--", linewidth=1.0, zorder=0)
         for panel in panels.flat[len(chosen) :]:
             panel.set_visible(False)
         for row in panels:
@@ -84,6 +85,10 @@ def _over_parameters(
         caption = (
             f"{_spoken(spread)} of every run over what was varied; what shows most comes first."
         )
+        if bends := [
+            f"{influence[n]} of {_short(n)}" for n in chosen if influence[n].bend is not None
+        ]:
+            caption += f" It turns (dashed): {'; '.join(bends)}."
         if groups:
             marks = [Line2D([], [], color=colour, marker="o", linestyle="") for colour in COLOURS]
             labels = [_short(group) for group in groups]
@@ -165,17 +170,6 @@ def _histogram(spread: Spread, ended_otherwise: int) -> Figure:
         if ended_otherwise:
             caption += f" {ended_otherwise} did not, and are not in the quantiles."
         return render(Drawing("histogram", f"{_spoken(spread)}, histogram", caption, canvas))
-
-
-def _influence(parameter: list[Any], values: NDArray[Any]) -> float:
-    """Spearman's rank correlation of a parameter with the metric; 0 where there is none."""
-    there = np.isfinite(values)
-    if not _is_numeric(parameter) or there.sum() < 3:
-        return 0.0
-    numbers = np.array(parameter, dtype=float)[there]
-    if np.ptp(numbers) == 0.0 or np.ptp(values[there]) == 0.0:
-        return 0.0
-    return float(spearmanr(numbers, values[there]).statistic)
 
 
 def _positions(parameter: list[Any]) -> NDArray[Any]:

@@ -31,7 +31,7 @@ from experiments.sweep.summary import (
     units_of,
 )
 from experiments.sweep.worker import COMPLETED, REFUSED, RunRow, RunTask, program_revision
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import ResultsFolder, check_folder, open_results
@@ -220,7 +220,8 @@ def _conclude(
         figures = draw_sweep(spreads[chosen], columns, list(varied))
     warnings = _warnings(rows)
     if wanted not in (None, chosen) and chosen is not None:
-        warnings.append(f"--metric {wanted}: no run has it; there are {', '.join(spreads)}")
+        there = f"{', '.join(spreads)}{suggestion(wanted, spreads)}"
+        warnings.append(f"--metric {wanted}: no run has it; there are {there}")
     page = report_page(
         kind="Sweep",
         title=sweep.scenario.name,

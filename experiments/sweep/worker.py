@@ -167,7 +167,7 @@ def run_task(task: RunTask) -> RunRow:
 def _run(task: RunTask, clock: _Clock) -> RunRow:
     logging.getLogger("drake").setLevel(logging.CRITICAL)
     try:
-        from experiments.run import run_scenario  # Drake takes seconds to import
+        from experiments.simulated_run import run_scenario  # Drake takes seconds to import
 
         with TemporaryDirectory(prefix="pfsc_drake_sweep_") as folder:
             outcome = run_scenario(
@@ -197,4 +197,4 @@ def dask_setup(worker: Any) -> None:
     """Prepares a process on this machine before it takes runs; called by Dask."""
     processes.dask_setup(worker)
     silence_libraries()
-    import experiments.run  # noqa: F401  # before the first run rather than in it
+    import experiments.simulated_run  # noqa: F401  # before the first run rather than in it

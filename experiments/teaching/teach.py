@@ -6,8 +6,8 @@ from pathlib import Path
 
 from experiments.finished_run import RunOutcome
 from experiments.results.run_log import RunLog
-from experiments.run import run_scenario
 from experiments.scenario_file import read_scenario
+from experiments.simulated_run import run_scenario
 from experiments.teaching.comparison import (
     FollowedShape,
     compare_fit,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.measurement.record import REQUIRED_SIGNALS, SIGNALS, MeasuredRobot, Record
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, in_one_line, shortened, suggestion
 
 _TURN = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "rev": 2.0 * np.pi}
 _LENGTH = {"m": 1.0, "mm": 1e-3}
@@ -160,6 +160,7 @@ class _Table:
         self._robot, self._reading, self._source = robot, reading, source
         self._columns: dict[tuple[str, int], np.ndarray] = {}
         self._without_unit: list[tuple[str, int]] = []
+        self._problems: list[str] = []  # as they go on behind the file's name
         self._unused = {
             option: set(getattr(reading, option)) for option in ("names", "units", "scale")
         }
@@ -172,11 +173,14 @@ class _Table:
         if parsed is None:
             if self._reading.names and raw.name not in self._reading.names:
                 return
-            raise InputError(
-                f"{self._source}: '{shortened(name)}' is unknown; allowed: t, "
+            joints = range(len(self._robot.joint_names))
+            known = [self._label(signal, i) for signal in SIGNALS for i in joints]
+            self._problems.append(
+                f": '{shortened(name)}' is unknown; allowed: t, "
                 f"{', '.join(f'{signal}_1' for signal in SIGNALS)} and so on, or names that are "
-                "said to mean these"
+                f"said to mean these{suggestion(name, known)}"
             )
+            return
         signal, joint = parsed
         columns = raw.values[:, None] if raw.values.ndim == 1 else raw.values
         for i, column in enumerate(columns.T):
@@ -184,9 +188,14 @@ class _Table:
             key = (signal, index)
             label = self._label(signal, index)
             if key in self._columns:
-                raise InputError(f"{self._source}: {label} twice; once is allowed")
+                self._problems.append(f": {label} twice; once is allowed")
+                continue
             unit = raw.units[min(i, len(raw.units) - 1)] if raw.units else ""
-            self._columns[key] = column * self._factor(signal, index, unit)
+            self._columns[key] = column
+            try:
+                self._columns[key] = column * self._factor(signal, index, unit)
+            except InputError as error:
+                self._problems.append(f", {error}")
 
     def _joint(self, raw: RawSignal, name: str, joint: str, column: int, width: int) -> int:
         """Return whose column it is, from 0."""
@@ -226,20 +235,27 @@ class _Table:
         return None
 
     def _factor(self, signal: str, index: int, stated: str) -> float:
-        where = f"{self._source}, {self._label(signal, index)}"
-        given = self._option("units", signal, index)
+        label, given = self._label(signal, index), self._option("units", signal, index)
         if stated and given and stated != given:
-            raise InputError(f"{where}: the file says [{stated}]; a unit of [{given}] was given")
+            raise InputError(f"{label}: the file says [{stated}]; a unit of [{given}] was given")
         unit = str(given or stated)
         scale = self._option("scale", signal, index)
         if not unit and scale is None:
             self._without_unit.append((signal, index))
             return 1.0
         joint_unit = self._robot.joint_units[index]
-        return to_si(signal, joint_unit, unit, None if scale is None else float(scale), where)
+        return to_si(signal, joint_unit, unit, None if scale is None else float(scale), label)
 
-    def _refuse_without_unit(self) -> None:
-        """Refuse columns whose unit is known to nobody, all of them in one line."""
+    def _refuse(self, problems: Sequence[str]) -> None:
+        """Refuse all that is wrong in one line, if anything is."""
+        if len(problems) == 1:
+            raise InputError(f"{self._source}{problems[0]}")
+        if problems:
+            told = [problem.lstrip(":, ") for problem in problems]
+            raise InputError(f"{self._source}: {in_one_line(told)}")
+
+    def _unstated(self) -> list[str]:
+        """Return what to say of columns whose unit is known to nobody, all of them together."""
         if self._without_unit:
             labels = ", ".join(self._label(*column) for column in self._without_unit)
             alike = len(set(self._robot.joint_units)) == 1
@@ -250,18 +266,17 @@ class _Table:
                 for signal, index in self._without_unit
             }
             options = " ".join(f"--unit {name}={unit}" for name, unit in units.items())
-            raise InputError(
-                f"{self._source}: {labels}: no unit is stated; each must be, as in 'tau_1 [Nm]', "
+            return [
+                f": {labels}: no unit is stated; each must be, as in 'tau_1 [Nm]', "
                 f"or by options like {options}"
-            )
+            ]
+        return []
 
     def record(self, period: float | None) -> Record:
         """Return the record."""
-        self._refuse_unused()
-        self._refuse_without_unit()
+        self._refuse([*self._problems, *self._unused_options(), *self._unstated()])
         names = tuple(self._robot.joint_names)
-        if (TIME, 0) not in self._columns:
-            raise InputError(f"{self._source}: no time; 't [s]' is required")
+        lacking = [] if (TIME, 0) in self._columns else [": no time; 't [s]' is required"]
         values: dict[str, np.ndarray] = {}
         for signal in SIGNALS:
             there = [j for j in range(len(names)) if (signal, j) in self._columns]
@@ -270,11 +285,13 @@ class _Table:
             missing = [j for j in range(len(names)) if j not in there]
             if missing:
                 labels = ", ".join(f"{signal}_{j + 1} ({names[j]})" for j in missing)
-                raise InputError(
-                    f"{self._source}: no {labels}; {signal} of all {len(names)} joints of "
+                lacking.append(
+                    f": no {labels}; {signal} of all {len(names)} joints of "
                     f"{self._robot.name} is required"
                 )
+                continue
             values[signal] = np.column_stack([self._columns[signal, j] for j in there])
+        self._refuse(lacking)
         return Record(
             self._columns[TIME, 0],
             values["q"],
@@ -287,10 +304,10 @@ class _Table:
             self._source,
         )
 
-    def _refuse_unused(self) -> None:
-        for option, keys in self._unused.items():
-            if keys:
-                raise InputError(
-                    f"{self._source}: {option} of '{shortened(sorted(keys)[0])}' given, which the "
-                    "file does not have; must be of something in it"
-                )
+    def _unused_options(self) -> list[str]:
+        return [
+            f": {option} of '{shortened(sorted(keys)[0])}' given, which the file does not have; "
+            "must be of something in it"
+            for option, keys in self._unused.items()
+            if keys
+        ]

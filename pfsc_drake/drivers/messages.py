@@ -13,7 +13,7 @@ from drake import (
     lcmt_panda_status,
 )
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 
 
 class ControlMode(enum.IntFlag):
@@ -246,7 +246,8 @@ def dialect(name: str) -> Dialect:
         InputError: If there is none of that name.
     """
     if name not in _DIALECTS:
-        raise InputError(f"driver {name}: allowed: {', '.join(_DIALECTS)}")
+        allowed = f"{', '.join(_DIALECTS)}{suggestion(name, _DIALECTS)}"
+        raise InputError(f"driver {name}: allowed: {allowed}")
     return _DIALECTS[name]()
 
 

@@ -16,7 +16,7 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
-from pfsc_drake.errors import InputError, require
+from pfsc_drake.errors import InputError, require, require_one_of
 from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller, add_reference
 from pfsc_drake.following.fixtures import add_fixture_guidance
@@ -98,7 +98,7 @@ class Follower(Diagram):
         options: FollowerOptions,
     ) -> None:
         super().__init__()
-        require(law in RELATIVE_DEGREE, "law", law, ", ".join(RELATIVE_DEGREE))
+        require_one_of("law", law, RELATIVE_DEGREE)
         require(
             options.measures in ("plant_state", "joint_state"),
             "measures",

@@ -35,6 +35,7 @@ from pfsc_drake.following.options.controller import ControllerParameters, GainPa
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.posture import make_posture
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.yaml.typed import spread
 
 _DIGITS = 3
 
@@ -74,7 +75,8 @@ def gains_of(
             f"{key}.free = true with the law '{law}', whose servos hold every joint; must be false"
         )
     if parameters.poles:
-        gains = gains_from_poles(parameters.poles, parameters.integral_pole)
+        poles = spread(parameters.poles, needed)
+        gains = gains_from_poles(poles, parameters.integral_pole)
     elif len(parameters.coefficients) == needed:
         gains = CoordinateGains(tuple(parameters.coefficients), parameters.integral)
     else:
@@ -127,7 +129,7 @@ def _joint_gains(by_kind: LawGains, relative_degree: int, law: str) -> Coordinat
         return gains_of(by_kind.posture, relative_degree, law, "posture")
     # an integral part would fight what the outputs keep the joints from
     if by_kind.xi.poles:
-        return gains_from_poles(by_kind.xi.poles)
+        return gains_from_poles(spread(by_kind.xi.poles, relative_degree))
     gains = CoordinateGains(tuple(by_kind.xi.coefficients))
     check_gains(gains, relative_degree, f"controller.gains.{law}.posture, by default xi's")
     return gains
@@ -297,7 +299,7 @@ def make_law(
         InputError: If the law does not suit the robot, or its gains are missing or wrong.
     """
     law = parameters.law
-    damping = parameters.boundary_layer_damping
+    damping = spread(parameters.boundary_layer_damping, robot.dimension)
     options = ActuationOptions(parameters.sampling_time, np.array(damping) if damping else None)
     linearization = linearize(robot, law, manifold, options)
     if law not in parameters.gains:

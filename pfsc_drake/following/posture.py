@@ -21,6 +21,7 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.swivel import swivel_angle, upward_direction
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
+from pfsc_drake.yaml.typed import spread
 
 _KEY = "controller.posture"
 # of the largest speed of a joint, what a posture may make of it together with the outputs
@@ -60,7 +61,8 @@ def make_posture(
 
 
 def _weight(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None:
-    n, given = robot.dimension, parameters.joint_weights
+    n = robot.dimension
+    given = spread(parameters.joint_weights, n)
     if given:
         if len(given) != n:
             raise InputError(f"{_KEY}.joint_weights: {len(given)} values; the robot has {n} joints")
@@ -136,7 +138,7 @@ def add_posture_reference(
 
 def _goal(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None:
     """Return where the posture goes, shape (N,) [rad or m], or None for where it starts."""
-    given, key = parameters.reference_deg, f"{_KEY}.reference_deg"
+    given, key = spread(parameters.reference_deg, robot.dimension), f"{_KEY}.reference_deg"
     if not given:
         return None
     if len(given) != robot.dimension:

@@ -13,6 +13,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad, predicted_load
+from pfsc_drake.yaml.typed import equal
 
 # ticks whose noise is known at once
 NOISE_TICKS = 128
@@ -22,20 +23,25 @@ NOISE_TICKS = 128
 class ForceTorqueParameters:
     """Properties of a sensor; the first three entries are forces [N], the others torques [Nm].
 
-    The defaults stand for a K6-D40 with 500 N and 20 Nm; noise and bandwidth of the
+    In YAML two numbers stand for equal forces and equal torques, one for six equal entries. The
+    defaults stand for a K6-D40 with 500 N and 20 Nm; noise and bandwidth of the
     amplifier are assumed.
 
     Attributes:
-        measurement_range: Largest magnitude that is measured, shape (6,).
-        bias: Reading without load, shape (6,).
-        noise: Standard deviation of the white noise of one sample, shape (6,).
+        measurement_range: Largest magnitude that is measured, shape (6,) [N, Nm].
+        bias: Reading without load, shape (6,) [N, Nm].
+        noise: Standard deviation of the white noise of one sample, shape (6,) [N, Nm].
         bandwidth: Bandwidth of the amplifier's first-order filter [Hz].
         seed: Seed of the noise.
     """
 
-    measurement_range: np.ndarray = field(default_factory=lambda: np.repeat([500.0, 20.0], 3))
-    bias: np.ndarray = field(default_factory=lambda: np.zeros(6))
-    noise: np.ndarray = field(default_factory=lambda: np.repeat([0.1, 0.004], 3))
+    measurement_range: np.ndarray = field(
+        default_factory=lambda: np.repeat([500.0, 20.0], 3), metadata=equal(6, parts=2)
+    )
+    bias: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=equal(6, parts=2))
+    noise: np.ndarray = field(
+        default_factory=lambda: np.repeat([0.1, 0.004], 3), metadata=equal(6, parts=2)
+    )
     bandwidth: float = 200.0
     seed: int = 0
 

@@ -7,9 +7,10 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.errors import InputError, require
+from pfsc_drake.errors import InputError, require, suggestion
 from pfsc_drake.physics.hand_way import HandWay, OrientationTarget, Place, rotation_vector
 from pfsc_drake.physics.scripted_force import FRAMES, smooth_step
+from pfsc_drake.yaml.typed import equal
 
 
 @dataclass
@@ -25,8 +26,8 @@ class Wander:
         longest: Longest time between them [s].
     """
 
-    low: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    high: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    low: np.ndarray = field(default_factory=lambda: np.zeros(3), metadata=equal(3))
+    high: np.ndarray = field(default_factory=lambda: np.zeros(3), metadata=equal(3))
     begin: float = 0.0
     end: float = 1.0
     shortest: float = 0.2
@@ -148,7 +149,8 @@ class HandParameters:
             value, allowed = getattr(self, key), f"zero or positive, at most {_LARGEST:g}"
             require(0.0 <= value <= _LARGEST, key, value, allowed)
         require(self.seed >= 0, "seed", self.seed, "zero or positive")
-        require(self.frame in FRAMES, "frame", self.frame, f"one of {', '.join(FRAMES)}")
+        allowed = f"one of {', '.join(FRAMES)}{suggestion(self.frame, FRAMES)}"
+        require(self.frame in FRAMES, "frame", self.frame, allowed)
         band = np.asarray(self.tremor_band, dtype=float)
         fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)
         require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")

@@ -9,9 +9,10 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.checks import require_between, require_not_negative
-from pfsc_drake.errors import InputError, require
+from pfsc_drake.errors import InputError, require_one_of
 from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS, noise_at
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 
 @dataclass
@@ -91,15 +92,15 @@ class EncoderOptions:
         torque: The torque sensors, if there are any.
     """
 
-    link_increments: list[float] = field(default_factory=list)
-    motor_increments: list[float] = field(default_factory=list)
+    link_increments: list[float] = field(default_factory=list, metadata=ONE_OR_MANY)
+    motor_increments: list[float] = field(default_factory=list, metadata=ONE_OR_MANY)
     difference_quotient: bool = False
     filter_time: float = 0.0
     sides: str = "both"
     torque: TorqueSensorOptions = field(default_factory=TorqueSensorOptions)
 
     def __post_init__(self) -> None:
-        require(self.sides in SIDES, "sides", self.sides, ", ".join(SIDES))
+        require_one_of("sides", self.sides, SIDES)
 
 
 class JointEncoders(Block):

@@ -12,7 +12,7 @@ from pfsc_drake.blocks.cases import all_finite, all_of, where
 from pfsc_drake.control.law.actuation import joint_jets
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.path import PathManifold, path_coordinates
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.robot_model import RobotModel
 
 FRAMES = ("world", "manifold")
@@ -90,7 +90,8 @@ class ForcePulse:
                 f"ramp = {self.ramp}: must be positive and at most {longest:g}, half the pulse"
             )
         if self.frame not in FRAMES:
-            raise InputError(f"frame = {self.frame!r}: must be one of {', '.join(FRAMES)}")
+            allowed = f"{', '.join(FRAMES)}{suggestion(self.frame, FRAMES)}"
+            raise InputError(f"frame = {self.frame!r}: must be one of {allowed}")
 
     def at(self, time: Any) -> Any:
         """Return ``[force, torque]`` in the pulse's own frame, shape (6,) [N, Nm].

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 import yaml
 
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, nearest_file, shortened
 
 MAX_BYTES = 1_000_000  # of a YAML file
 
@@ -58,7 +58,9 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {os.strerror(error.errno or 0)}") from None
+        nearest = nearest_file(path) if isinstance(error, FileNotFoundError) else ""
+        reason = f"{os.strerror(error.errno or 0)}{nearest}"
+        raise InputError(f"{path}: cannot be read: {reason}") from None
     except ValueError:  # a NUL in the name
         raise InputError(f"{str(path)!r}: cannot be read: no name of a file") from None
     if len(content) > max_bytes:

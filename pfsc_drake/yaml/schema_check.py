@@ -1,24 +1,27 @@
-"""Walks data along a dataclass schema and reports the first key that does not fit."""
+"""Walks data along a dataclass schema and reports every key that does not fit."""
 
 import collections.abc
 import dataclasses
-import difflib
 import math
 import re
 import sys
 import types
 import typing
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pfsc_drake.checks import NUMBER
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, did_you_mean, in_one_line, shortened
 from pfsc_drake.yaml.reading import TAG_KEY
 
 REQUIRED = {"required": True}  # metadata of a field whose key may not be left out
 
+Place = tuple[Any, ...]
+
+_MOST_MISFITS = 50  # of one file
 _INFINITY = re.compile(r"[-+]?inf(inity)?", re.IGNORECASE)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,19}")
 _LONG_INTEGER = re.compile(r"[-+]?[0-9]+")
@@ -34,6 +37,18 @@ _SCALAR_NAMES: dict[Any, str] = {
 }
 
 
+class Misfit(NamedTuple):
+    """What does not fit a schema.
+
+    Attributes:
+        place: Keys and indices that lead to it.
+        message: What is there and what is allowed, without the file's name.
+    """
+
+    place: Place
+    message: str
+
+
 def check_schema(schema: type, data: Any, source: str) -> None:
     """Checks data against a schema, by the rules of Drake's ``yaml_load_typed``.
 
@@ -44,118 +59,160 @@ def check_schema(schema: type, data: Any, source: str) -> None:
         source: Name of the file, for messages.
 
     Raises:
-        InputError: One line that names source, key path, value and what is allowed.
+        InputError: One line that names source, and of all that does not fit key path, value and
+            what is allowed.
     """
-    _Checker(source).check(schema, data, "")
+    misfits = find_misfits(schema, data)
+    if misfits:
+        raise InputError(f"{source}: {in_one_line([misfit.message for misfit in misfits])}")
+
+
+def find_misfits(schema: type, data: Any) -> list[Misfit]:
+    """Returns what does not fit a schema, in the order of the file; see :func:`check_schema`."""
+    checker = _Checker()
+    checker.check(schema, data, ())
+    return checker.misfits
 
 
 class _Checker:
-    """The walk; ``key`` is the path so far, e.g. ``controller.gains.eta[1]``."""
+    """The walk; ``place`` is the way so far, e.g. ``("controller", "gains", "eta", 1)``."""
 
-    def __init__(self, source: str) -> None:
-        self._source = source
+    def __init__(self) -> None:
+        self.misfits: list[Misfit] = []
 
-    def check(self, schema: Any, value: Any, key: str) -> None:
+    def check(self, schema: Any, value: Any, place: Place) -> None:
         """Checks one value against the type of its field."""
         origin, arguments = typing.get_origin(schema), typing.get_args(schema)
         if dataclasses.is_dataclass(schema):
-            self._check_dataclass(schema, value, key)
+            self._check_dataclass(schema, value, place)
         elif schema in _SCALAR_NAMES:
             if not _is_scalar(schema, value):
-                self._refuse(value, key, _expected(schema) + _range(schema, value))
+                self._refuse(value, place, _expected(schema) + _range(schema, value))
         elif schema is np.ndarray:
-            self._check_array(value, key)
+            self._check_array(value, place)
         elif origin in (typing.Union, types.UnionType):
-            self._check_union(arguments, value, key)
+            self._check_union(arguments, value, place)
         elif origin is list:
             if not isinstance(value, list):
-                self._refuse(value, key, _expected(schema))
+                self._refuse(value, place, _expected(schema))
+                return
             for index, item in enumerate(value):
-                self.check(arguments[0], item, f"{key}[{index}]")
+                self.check(arguments[0], item, (*place, index))
         elif origin in (dict, collections.abc.Mapping):
             if not isinstance(value, dict):
-                self._refuse(value, key, _expected(schema))
+                self._refuse(value, place, _expected(schema))
+                return
             for name, item in value.items():
-                if not isinstance(name, str):
-                    self._refuse(name, f"{key}.{name}", "a key that is text")
-                self.check(arguments[1], item, f"{key}.{name}")
+                if isinstance(name, str):
+                    self.check(arguments[1], item, (*place, name))
+                else:
+                    what = f"key '{spelled((*place, str(name)))}' is {_shown(name)}"
+                    self._add(place, f"{what}: expected a key that is text")
 
-    def _check_dataclass(self, schema: Any, value: Any, key: str) -> None:
+    def _check_dataclass(self, schema: Any, value: Any, place: Place) -> None:
         """Checks the keys of a mapping, then their values."""
         hints = typing.get_type_hints(schema)
         fields = {field.name: field for field in dataclasses.fields(schema)}
         if not isinstance(value, dict):
-            self._refuse(value, key, f"a mapping with the keys {', '.join(fields)}")
-        prefix = f"{key}." if key else ""
+            self._refuse(value, place, f"a mapping with the keys {', '.join(fields)}")
+            return
+        if TAG_KEY in value:
+            self._refuse(value[TAG_KEY], place, "a mapping without a tag")
+            return
         for name, item in value.items():
-            if name == TAG_KEY:
-                self._refuse(item, key, "a mapping without a tag")
+            here = (*place, name)
             if name not in fields:
-                nearest = difflib.get_close_matches(str(name), fields, n=1)
-                hint = f"did you mean {nearest[0]!r}? " if nearest else ""
                 allowed = ", ".join(fields) or "no keys"
-                raise InputError(
-                    f"{self._source}: unknown key '{prefix}{name}' = {_shown(item)}:"
-                    f" {hint}allowed: {allowed}"
-                )
-            self.check(hints[name], item, prefix + name)
+                hint = did_you_mean(name, fields)
+                what = f"unknown key '{spelled((*place, str(name)))}' = {_shown(item)}"
+                self._add(here, f"{what}: {hint}allowed: {allowed}")
+            elif "words" in fields[name].metadata and isinstance(item, list):
+                self._check_words(fields[name].metadata["words"], item, here)
+            elif _takes_a_number(fields[name]) and not isinstance(item, list):
+                word = fields[name].metadata.get("empty_word")
+                single = f"a number, {word}" if word else "a number"
+                self._refuse(item, here, f"{single} or {_expected(hints[name])}")
+            else:
+                self.check(hints[name], item, here)
         for name, field in fields.items():
             if name not in value and _is_required(field):
-                raise InputError(
-                    f"{self._source}: missing key '{prefix}{name}':"
-                    f" expected {_expected(hints[name])}"
-                )
+                here = (*place, name)
+                expected = _expected(hints[name])
+                self._add(here, f"missing key '{spelled(here)}': expected {expected}")
 
-    def _check_union(self, members: tuple[Any, ...], value: Any, key: str) -> None:
+    def _check_words(self, words: Sequence[str], values: list[Any], place: Place) -> None:
+        """Checks a list of numbers in which some words may stand."""
+        for index, item in enumerate(values):
+            if item not in words and not _is_scalar(float, item):
+                hint = did_you_mean(item, words) if isinstance(item, str) else ""
+                self._refuse(item, (*place, index), f"a number or {' or '.join(words)}", hint)
+
+    def _check_union(self, members: tuple[Any, ...], value: Any, place: Place) -> None:
         """Checks an optional value, a choice of scalars, or of dataclasses by tag."""
         choices = [member for member in members if member is not type(None)]
         _require_no_subclasses(choices)
         if value is None:
             if len(choices) == len(members):
-                self._refuse(value, key, " or ".join(_alternatives(members)))
+                self._refuse(value, place, " or ".join(_alternatives(members)))
         elif len(choices) == 1:
-            self.check(choices[0], value, key)
+            self.check(choices[0], value, place)
         elif isinstance(value, dict) and TAG_KEY in value:
             by_tag = {f"!{getattr(choice, '__name__', choice)}": choice for choice in choices}
             tag = str(value[TAG_KEY])
             if tag not in by_tag:
+                what = f"key '{spelled(place)}': unknown tag {tag}"
                 allowed = ", ".join(by_tag)
-                raise InputError(
-                    f"{self._source}: key {key!r}: unknown tag {tag}: allowed: {allowed}"
-                )
+                self._add(place, f"{what}: {did_you_mean(tag, by_tag)}allowed: {allowed}")
+                return
             content = {name: item for name, item in value.items() if name != TAG_KEY}
-            self.check(by_tag[tag], content, key)
+            self.check(by_tag[tag], content, place)
         elif isinstance(value, (dict, list)):
-            self._check_untagged(choices, value, key)
+            self._check_untagged(choices, value, place)
         elif type(value) not in choices and not _is_scalar(choices[0], value):
-            self._refuse(value, key, " or ".join(_alternatives(members)))
+            self._refuse(value, place, " or ".join(_alternatives(members)))
 
-    def _check_untagged(self, choices: list[Any], value: Any, key: str) -> None:
+    def _check_untagged(self, choices: list[Any], value: Any, place: Place) -> None:
         """Checks a mapping or list without tag, which is read as the first choice."""
-        try:
-            self.check(choices[0], value, key)
-        except InputError as error:
+        before = len(self.misfits)
+        self.check(choices[0], value, place)
+        if len(self.misfits) > before:
             others = [f"!{choice.__name__}" for choice in choices[1:] if isinstance(choice, type)]
-            hint = f" (without a tag {key!r} is !{getattr(choices[0], '__name__', choices[0])};"
-            raise InputError(f"{error}{hint} other tags: {', '.join(others)})") from None
+            first = f"!{getattr(choices[0], '__name__', choices[0])}"
+            hint = f"(without a tag '{spelled(place)}' is {first}; other tags: {', '.join(others)})"
+            told = self.misfits[before]
+            self.misfits[before] = told._replace(message=f"{told.message} {hint}")
 
-    def _check_array(self, value: Any, key: str) -> None:
+    def _check_array(self, value: Any, place: Place) -> None:
         """Checks a vector, or a matrix as a list of equally long rows."""
         if not isinstance(value, list):
-            self._refuse(value, key, _expected(np.ndarray))
+            self._refuse(value, place, _expected(np.ndarray))
+            return
         rows = [item for item in value if isinstance(item, list)]
         if rows and len({len(row) if isinstance(row, list) else -1 for row in value}) > 1:
-            self._refuse(value, key, "rows of equal length")
+            self._refuse(value, place, "rows of equal length")
+            return
         for index, item in enumerate(value):
             if isinstance(item, list):
-                self._check_array(item, f"{key}[{index}]")
+                self._check_array(item, (*place, index))
             else:
-                self.check(float, item, f"{key}[{index}]")
+                self.check(float, item, (*place, index))
 
-    def _refuse(self, value: Any, key: str, expected: str) -> NoReturn:
-        """Raises the error of a value that does not fit."""
-        where = f"key {key!r}" if key else "the root"
-        raise InputError(f"{self._source}: {where} is {_shown(value)}: expected {expected}")
+    def _refuse(self, value: Any, place: Place, expected: str, hint: str = "") -> None:
+        """Adds a value that does not fit."""
+        where = f"key '{spelled(place)}'" if place else "the root"
+        self._add(place, f"{where} is {_shown(value)}: {hint}expected {expected}")
+
+    def _add(self, place: Place, message: str) -> None:
+        if len(self.misfits) < _MOST_MISFITS:
+            self.misfits.append(Misfit(place, message))
+
+
+def spelled(place: Place) -> str:
+    """Returns a place as a path of keys, e.g. ``controller.gains.eta[1]``."""
+    text = ""
+    for step in place:
+        text += f"[{step}]" if type(step) is int and text else f".{step}" if text else f"{step}"
+    return text
 
 
 def _is_scalar(schema: Any, value: Any) -> bool:
@@ -215,6 +272,11 @@ def _is_required(field: "dataclasses.Field[Any]") -> bool:
     """Whether a key may not be left out."""
     no_default = field.default is field.default_factory is dataclasses.MISSING
     return no_default or bool(field.metadata.get("required"))
+
+
+def _takes_a_number(field: "dataclasses.Field[Any]") -> bool:
+    """Whether a number may stand for a list; see :mod:`pfsc_drake.yaml.broadcast`."""
+    return any(key in field.metadata for key in ("one_or_many", "one_for_all", "equal"))
 
 
 def _expected(schema: Any) -> str:

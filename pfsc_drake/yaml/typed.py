@@ -9,19 +9,38 @@ after.
 import dataclasses
 import types
 import typing
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, gathered_refusals, in_one_line
+from pfsc_drake.yaml.broadcast import (
+    AUTO_OR_MANY,
+    NUMBERS_OR_END,
+    ONE_FOR_ALL,
+    ONE_OR_MANY,
+    OneForAll,
+    as_lists,
+    equal,
+    mark_singles,
+    spread,
+)
 from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml, read_yaml
-from pfsc_drake.yaml.schema_check import REQUIRED, check_schema
+from pfsc_drake.yaml.schema_check import REQUIRED, Misfit, Place, find_misfits, spelled
 
-__all__ = ["AUTO_OR_MANY", "ONE_OR_MANY", "REQUIRED", "load_file", "load_typed"]
-
-ONE_OR_MANY = {"one_or_many": True}  # metadata of a list whose only item may be given without list
-AUTO_OR_MANY = {"empty_word": "auto"}  # metadata of a list for which ``auto`` says that it is empty
+__all__ = [
+    "AUTO_OR_MANY",
+    "NUMBERS_OR_END",
+    "ONE_FOR_ALL",
+    "ONE_OR_MANY",
+    "REQUIRED",
+    "equal",
+    "load_file",
+    "load_typed",
+    "spread",
+]
 
 Schema = TypeVar("Schema")
 
@@ -57,62 +76,90 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
         An instance of ``schema_class``.
 
     Raises:
-        InputError: One line that names source, key path, value and what is allowed.
+        InputError: One line that names source, and of everything that is wrong key path, value and
+            what is allowed. Where something does not fit the schema, the rest is checked without
+            it, but for what contains it.
     """
+    singles: list[Place] = []
+    data = as_lists(schema_class, data, (), singles)
+    misfits = find_misfits(schema_class, data)
+    if misfits:
+        messages = [misfit.message for misfit in misfits]
+        messages += _further_refusals(schema_class, data, misfits)
+        raise InputError(f"{source}: {in_one_line(messages)}")
+    result = _load(schema_class, data, source)
+    mark_singles(result, singles)
+    refusals = _refusals(result, (), [])
+    if refusals:
+        raise InputError(f"{source}: {in_one_line(refusals)}")
+    return result
+
+
+def _load(schema_class: type[Schema], data: dict[str, Any], source: str) -> Schema:
+    """Returns what Drake makes of data that fit."""
     from pydrake.common.yaml import yaml_load_typed
 
-    data = _listed(schema_class, data)
-    check_schema(schema_class, data, source)
     try:
-        result = yaml_load_typed(schema=schema_class, data=dump_yaml(data))
+        return yaml_load_typed(schema=schema_class, data=dump_yaml(data))
     except NotImplementedError:  # a schema that Drake cannot load is a fault of the program
         raise
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{source}: {' '.join(str(error).split())}") from None
-    _validate(result, source, "")
-    return result
 
 
-def _listed(schema: Any, data: Any) -> Any:
-    """Returns data with lists wherever the schema allows a single item or a word for a list."""
-    if not isinstance(data, dict):
+def _further_refusals(
+    schema_class: type, data: dict[str, Any], misfits: Sequence[Misfit]
+) -> list[str]:
+    """Returns what is wrong beside what does not fit the schema."""
+    if not all(misfit.place for misfit in misfits):
+        return []
+    rest = data
+    for misfit in misfits:
+        rest = _without(rest, misfit.place)
+    try:
+        result: Any = _load(schema_class, rest, "")
+    except (InputError, TypeError):  # e.g. there is no default for a key that is missing
+        return []
+    return _refusals(result, (), [misfit.place[:-1] for misfit in misfits])
+
+
+def _without(data: dict[str, Any], place: Place) -> dict[str, Any]:
+    """Returns data without one key, or of a list in it without the key that the list is under."""
+    key, *way = place
+    if key not in data:
         return data
-    if typing.get_origin(schema) is dict:
-        kind = typing.get_args(schema)[1]
-        return {key: _listed(kind, item) for key, item in data.items()}
-    if not dataclasses.is_dataclass(schema):
-        return data
-    hints, listed = typing.get_type_hints(schema), dict(data)
-    for field in dataclasses.fields(schema):
-        if field.name in data:
-            item = data[field.name]
-            if item == field.metadata.get("empty_word", ...):
-                listed[field.name] = []
-                continue
-            single = field.metadata.get("one_or_many") and isinstance(item, (int, float, str))
-            listed[field.name] = [item] if single else _listed(hints[field.name], item)
-    return listed
+    item, rest = data[key], {name: value for name, value in data.items() if name != key}
+    return {**rest, key: _without(item, tuple(way))} if way and isinstance(item, dict) else rest
 
 
-def _validate(value: Any, source: str, key: str) -> None:
-    """Runs ``__post_init__`` of every dataclass in the loaded object, innermost first."""
-    if isinstance(value, dict):
-        for name, item in value.items():
-            _validate(item, source, f"{key}.{name}")
-    elif isinstance(value, list):
-        for index, item in enumerate(value):
-            _validate(item, source, f"{key}[{index}]")
+def _refusals(value: Any, place: Place, spoiled: Sequence[Place]) -> list[str]:
+    """Runs ``__post_init__`` of every dataclass in the loaded object, innermost first.
+
+    Args:
+        value: The loaded object, or a part of it.
+        place: Where it is.
+        spoiled: Places of what is not whole; what contains these, or something that is refused, is
+            not judged.
+
+    Returns:
+        What is refused, one message each.
+    """
+    found: list[str] = []
+    if isinstance(value, (dict, list)):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        for name, item in items:
+            found += _refusals(item, (*place, name), spoiled)
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
-            prefix = f"{key}." if key else ""
-            _validate(getattr(value, field.name), source, prefix + field.name)
+            found += _refusals(getattr(value, field.name), (*place, field.name), spoiled)
         post_init = getattr(value, "__post_init__", None)
-        if post_init is not None:
-            try:
+        whole = not any(other[: len(place)] == place for other in spoiled)
+        if post_init is not None and whole and not found:
+            where = f"key '{spelled(place)}': " if place else ""
+            with gathered_refusals() as refusals:
                 post_init()
-            except InputError as error:
-                where = f"key {key!r}: " if key else ""
-                raise InputError(f"{source}: {where}{' '.join(str(error).split())}") from None
+            found = [f"{where}{' '.join(refusal.split())}" for refusal in refusals]
+    return found
 
 
 def dump_typed(value: Any) -> str:
@@ -144,6 +191,8 @@ def _plain(value: Any, schema: Any) -> Any:
     origin, arguments = typing.get_origin(schema), typing.get_args(schema)
     if origin in (typing.Union, types.UnionType):
         return _member(value, arguments)
+    if isinstance(value, OneForAll):
+        return value[0]
     if origin is list:
         return [_plain(item, arguments[0]) for item in value]
     if origin is dict:
@@ -164,6 +213,8 @@ def _member(value: Any, members: tuple[Any, ...]) -> Any:
     choices = [member for member in members if member is not type(None)]
     if len(choices) == 1:
         return _plain(value, choices[0])
+    if type(value) is int and float in choices and int not in choices:
+        return float(value)
     if type(value) not in choices:
         raise TypeError(f"{type(value).__name__} is none of {members}")
     plain = _plain(value, type(value))

@@ -11,7 +11,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+# but what tutorials wrote when they were executed
+PAGES = [
+    file
+    for file in sorted((ROOT / "docs").rglob("*.md"))
+    if "out" not in file.relative_to(ROOT).parts
+]
+DOCUMENTS = [ROOT / "README.md", *PAGES]
 ONE_OF = "# one of\n"
 
 _FENCED = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -31,7 +31,7 @@ class Outcome:
 
 
 class FakeRun:
-    """Stands in for ``experiments.run``: remembers the call, does what it is told."""
+    """Stands in for ``experiments.simulated_run``: remembers the call, does what it is told."""
 
     def __init__(self) -> None:
         self.outcome = Outcome()
@@ -52,9 +52,9 @@ class FakeRun:
 @pytest.fixture
 def fake_run(monkeypatch):
     fake = FakeRun()
-    module = types.ModuleType("experiments.run")
+    module = types.ModuleType("experiments.simulated_run")
     module.run_scenario = fake.run_scenario
-    monkeypatch.setitem(sys.modules, "experiments.run", module)
+    monkeypatch.setitem(sys.modules, "experiments.simulated_run", module)
     return fake
 
 
@@ -189,6 +189,10 @@ def test_other_exceptions_are_not_hidden(fake_run, scenario):
         (["run", "FILE", "--out", "~nobody_has_this_name/x"], "no home folder is known for ~nob"),
         (["run", "~nobody_has_this_name/x.yaml"], "no home folder is known for ~nobody"),
         (["run", "none.yaml"], "scenario file none.yaml: no such file"),
+        (["run", "identify_coma"], "did you mean 'identify_comau'?"),
+        (["study", "stifness"], "study stifness: allowed: stiffness, robustness"),
+        (["study", "stifness"], "did you mean 'stiffness'?"),
+        (["rnu", "FILE"], "Did you mean 'run'?"),
         (["run", "zzz"], "unknown scenario 'zzz'"),
     ],
 )
@@ -199,6 +203,63 @@ def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, argume
     assert line.startswith("error: ")
     assert message in line
     assert fake_run.calls == []
+
+
+def test_a_file_with_nearly_that_name(scenario, capsys):
+    assert main(["run", str(scenario.with_name("my_rum.yaml"))]) == 2
+    assert error_line(capsys).endswith("my_rum.yaml: no such file; did you mean 'my_run.yaml'?\n")
+
+
+def test_quietly_only_the_last_line(fake_run, scenario, capsys):
+    fake_run.outcome.metrics.add("max_path_deviation", 4.3e-5, "m", "< 0.05e-3")
+    fake_run.outcome.warnings = ["the joints resonate too fast"]
+    assert main(["run", str(scenario), "--quiet"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == "Open the report: somewhere/report.html\n"
+    assert captured.err == ""
+
+
+def test_quietly_errors_too(fake_run, scenario, capsys):
+    fake_run.outcome.fault = "singular"
+    assert main(["run", str(scenario), "--quiet"]) == 3
+    captured = capsys.readouterr()
+    assert captured.out == "Open the report: somewhere/report.html\n"
+    assert captured.err.startswith("fault: singular; stopped at t = ")
+    assert main(["run", "none.yaml", "--quiet"]) == 2
+    assert error_line(capsys).startswith("error: scenario file none.yaml: no such file")
+
+
+def test_a_quiet_sweep(monkeypatch, capsys):
+    from experiments.sweep import sweep
+
+    def run_sweep(_, out, console, **__):
+        console.print("half of it")
+        return sweep.SweepOutcome(
+            out / "report.html",
+            {},
+            0,
+            {"strange": "run x"},
+            Metrics(),
+            [],
+            ["w"],
+            False,
+            None,
+            None,
+        )
+
+    made = types.SimpleNamespace(scenario=types.SimpleNamespace(name="many"))
+    monkeypatch.setattr(sweep, "define_sweep", lambda *_, **__: made)
+    monkeypatch.setattr(sweep, "run_sweep", run_sweep)
+    assert main(["sweep", "many", "--quiet"]) == 0
+    assert capsys.readouterr().out == "Open the report: out/many_sweep/report.html\n"
+    assert main(["sweep", "many"]) == 0
+    assert {"half of it", "warning: w"} < {*capsys.readouterr().out.splitlines()}
+
+
+@pytest.mark.parametrize("command", ["run", "sweep", "study", "drive"])
+def test_commands_that_can_be_quiet(command, capsys):
+    assert main([command, "--help"]) == 0
+    assert "--quiet" in capsys.readouterr().out
 
 
 def test_list(monkeypatch, scenario, capsys):
@@ -274,3 +335,7 @@ def test_the_identification_runs_by_its_name(monkeypatch, tmp_path, capsys):
     assert main(["run", "identify_comau", "--out", str(tmp_path / "found")]) == 0
     assert seen == [tmp_path / "found"]
     assert "one line" in capsys.readouterr().out
+    arguments = ["identify_comau", "--out", str(tmp_path / "found"), "--quiet"]
+    for command in ("run", "study"):
+        assert main([command, *arguments]) == 0
+        assert capsys.readouterr().out == f"Open the study: {tmp_path}/found/report.html\n"

@@ -52,6 +52,21 @@ def test_both_runs_are_on_the_page(make_run, tmp_path, capsys):
     }
 
 
+def test_the_page_says_whether_the_motions_are_the_same(make_run, tmp_path):
+    folders = [make_run("slow", 0.01), make_run("fast", 0.02)]
+    arguments = ["compare", *map(str, folders), "--out", str(tmp_path / "page")]
+    page = tmp_path / "page" / "report.html"
+    assert main(arguments) == 0
+    assert "The same motion, side by side." in page.read_text(encoding="utf-8")
+    for folder, velocity in zip(folders, (0.2, 1.0), strict=True):
+        text = f"name: x\nreference: {{velocity: {velocity}}}\n"
+        (folder / "scenario.yaml").write_text(text, encoding="utf-8")
+    assert main(arguments) == 0
+    said = page.read_text(encoding="utf-8")
+    assert "Different motions, side by side." in said
+    assert "reference.velocity is 0.2 in slow, 1 in fast." in said
+
+
 def test_without_orientation_there_is_no_picture_of_it(make_run, tmp_path):
     folders = [make_run("slow", 0.01), make_run("fast", 0.02, oriented=False)]
     assert main(["compare", *map(str, folders), "--out", str(tmp_path / "page")]) == 0

@@ -3,11 +3,13 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from experiments.scenario_file import (
     CatalogEntry,
     ScenarioFile,
+    apply_change,
     find_scenario,
     list_scenarios,
     load_scenario_data,
@@ -194,3 +196,41 @@ def test_home(folder, monkeypatch):
     assert find_scenario("~/a_demo.yaml", folder / "none") == folder / "a_demo.yaml"
     with pytest.raises(InputError, match="no home folder is known for ~nobody_is_called_so"):
         find_scenario("~nobody_is_called_so/x.yaml", folder)
+
+
+@pytest.mark.parametrize(
+    ("value", "read"),
+    [
+        ("!Circle {radius: 1}", {"_tag": "!Circle", "radius": 1}),
+        ("elastic", "elastic"),
+        (np.array([[1.0, 2.0]]), [[1.0, 2.0]]),
+        (np.float64(0.5), 0.5),
+        ((1, True, None), [1, True, None]),
+        ({"a": Path("b.csv")}, {"a": "b.csv"}),
+    ],
+)
+def test_changes_are_values_of_python(scenario, value, read):
+    data = load_scenario_data(scenario, [])
+    apply_change(data, "controller.second.b", value)
+    assert data["controller"] == {
+        "law": "elastic",
+        "first": {"a": 1, "b": [1.0, 2.0]},
+        "second": {"a": 1, "b": read},
+    }
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("a..b", 1, "change a..b = 1: malformed; allowed: key.path=value"),
+        ("controller.law.x", 1, "controller.law is 'elastic' and has no key 'x'"),
+        ("controller.law", {1}, "of type set; allowed: text, numbers, true or false, None"),
+        ("points", [object()], "of type object; allowed"),
+        ("duration", "[1", "invalid YAML in line 1"),
+    ],
+)
+def test_wrong_changes(scenario, key, value, message):
+    with pytest.raises(InputError) as caught:
+        apply_change(load_scenario_data(scenario, []), key, value)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,6 +1,7 @@
 """The folder of results: taken by one process, nothing of a user's is ever lost in it."""
 
 import errno
+import json
 import os
 import resource
 import shutil
@@ -12,7 +13,7 @@ import pytest
 
 from pfsc_drake import InputError
 from reporting.folder import check_folder, open_results
-from reporting.provenance import MANIFEST, PROJECT_ROOT, RESULTS
+from reporting.provenance import MANIFEST, PROJECT_ROOT, RESULTS, read_outcome
 
 
 @pytest.fixture(name="out")
@@ -271,3 +272,16 @@ def test_a_file_that_is_written_again_is_there_at_every_moment(tmp_path):
                 # as if the process ended in the middle of the next one
                 (out / ".unfinished").write_text("half of i")
                 check_folder(out, "sweep")
+
+
+def test_how_it_ended_is_told_in_the_manifest(out):
+    assert read_outcome(out, "run") == {}
+    with open_results(out, "run") as results:
+        results.tell({"fault": None, "warnings": ["slow"]})
+        results.write("report.html", "later")
+    assert read_outcome(out, "run") == {"fault": None, "warnings": ["slow"]}
+    assert json.loads((out / MANIFEST).read_text())["files"] == ["report.html"]
+    with pytest.raises(InputError, match=r"holds the results of a run; allowed: the folder of a"):
+        read_outcome(out, "sweep")
+    with pytest.raises(InputError, match=r"holds no results"):
+        read_outcome(out.parent, "run")

@@ -63,7 +63,7 @@ def test_other_threads_have_no_signals():
     assert seen == [False]
 
 
-@pytest.mark.parametrize("library", ["numpy", "pydrake.all", "experiments.run"])
+@pytest.mark.parametrize("library", ["numpy", "pydrake.all", "experiments.simulated_run"])
 def test_imports_end_with_one_line(library):
     """Whatever a library would make of the exception while it is being imported."""
     code = (

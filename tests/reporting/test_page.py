@@ -176,3 +176,18 @@ def test_tables_have_their_words_and_numbers(run):
         assert words in text
     assert '<td class="number">1.235</td>' in html
     assert '<td class="number">-2e-07</td>' in html
+
+
+def test_columns_of_numbers_have_their_heads_above_them(run):
+    table = Table("Base", "What.", ["name", "mean", "note"], [["m", 1.0, "x"], ["n", 2.0, "y"]])
+    html = report_page(**run, tables=[table])
+    assert '<tr><th>name</th><th class="number">mean</th><th>note</th></tr>' in html
+    html = report_page(**run, tables=[Table("Base", "What.", ["name", "mean"], [])])
+    assert "<tr><th>name</th><th>mean</th></tr>" in html
+
+
+def test_a_metric_keeps_its_heads_where_the_table_is_stacked(run):
+    page, html = read(report_page(**run))
+    heads = page.values("td", "data-head")
+    assert heads == ["Target", "Source"] * 3
+    assert "content: attr(data-head)" in html

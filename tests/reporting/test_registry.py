@@ -29,7 +29,7 @@ PROPERTIES = {
 
 def test_the_documentation_is_up_to_date():
     """Write it anew with ``make signals``."""
-    page = PROJECT_ROOT / "docs" / "signals.md"
+    page = PROJECT_ROOT / "docs" / "reference" / "signals.md"
     assert page.read_text(encoding="utf-8") == as_markdown()
 
 

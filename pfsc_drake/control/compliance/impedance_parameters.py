@@ -129,8 +129,8 @@ class SlowEnds:
     Attributes:
         least: ``d_min``, in the middle of a long path [N s/m].
         most: ``d_max``, at its end [N s/m], not less.
-        start_rate: 40 1/m as printed.
-        end_rate: 80 1/m as printed.
+        start_rate: Next to the start [1/m]; 40 as printed.
+        end_rate: Next to the end [1/m]; 80 as printed.
         length: ``eta_max`` [m]; 0 for the length of the path.
     """
 

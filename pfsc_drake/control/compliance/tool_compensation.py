@@ -23,6 +23,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad, dead_band, predicted_load
+from pfsc_drake.yaml.typed import equal
 
 _INERTIA = ("none", "differentiated", "given")
 
@@ -50,11 +51,15 @@ class ToolCompensationParameters:
     inertia: str = "differentiated"
     bandwidth: float = 200.0
     taring_time: float = 0.05
-    taring_spread: np.ndarray = field(default_factory=lambda: np.repeat([1.0, 0.05], 3))
-    taring_bias: np.ndarray = field(default_factory=lambda: np.repeat([50.0, 2.0], 3))
+    taring_spread: np.ndarray = field(
+        default_factory=lambda: np.repeat([1.0, 0.05], 3), metadata=equal(6, parts=2)
+    )
+    taring_bias: np.ndarray = field(
+        default_factory=lambda: np.repeat([50.0, 2.0], 3), metadata=equal(6, parts=2)
+    )
     force_dead_band: float = 0.0
     torque_dead_band: float = 0.0
-    noise: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    noise: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=equal(6, parts=2))
 
     def __post_init__(self) -> None:
         if self.inertia not in _INERTIA:

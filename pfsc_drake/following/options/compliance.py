@@ -4,7 +4,13 @@ import dataclasses as dc
 
 import numpy as np
 
-from pfsc_drake.checks import require, require_between, require_not_negative, require_positive
+from pfsc_drake.checks import (
+    require,
+    require_between,
+    require_not_negative,
+    require_one_of,
+    require_positive,
+)
 from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
     ImpedanceParameters,
@@ -71,7 +77,7 @@ class ComplianceParameters:
     limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
 
     def __post_init__(self) -> None:
-        require(self.source in SOURCES, "source", self.source, ", ".join(SOURCES))
+        require_one_of("source", self.source, SOURCES)
         for kind, bounds in _BOUNDS.items():
             _require_bearable(kind, getattr(self, kind), *bounds)
         stiffness = self.transversal.stiffness

@@ -8,13 +8,14 @@ from pfsc_drake.checks import (
     LARGEST_ANGLE,
     require,
     require_not_negative,
+    require_one_of,
     require_positive,
 )
 from pfsc_drake.control.estimation.link_deviation import StateUncertainty
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.yaml.reading import NAME_OR_FILE
-from pfsc_drake.yaml.typed import AUTO_OR_MANY
+from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_FOR_ALL
 
 POSTURE_TASKS = ("reference", "limits", "conditioning", "elbow")
 _WEIGHTS = ("identity", "inertia", "range")
@@ -35,10 +36,12 @@ class PostureParameters:
         task: ``reference``: towards ``reference_deg``; ``limits``: away from the joints' limits;
             ``conditioning``: to where the outputs are easy to move; ``elbow``: as
             ``reference``, and the elbow's swivel angle stays that of the reference exactly.
-        reference_deg: Where the posture goes [deg], m for slides; empty for where it starts.
+        reference_deg: Where the posture goes, one number per joint or one for all [deg], m for
+            slides; empty for where it starts.
         weight: By what deviations of the joints are judged: ``identity``, all alike; ``inertia``,
             the robot's; ``range``, in proportion to what the limits allow.
-        joint_weights: The same as one positive number per joint; empty for ``weight``.
+        joint_weights: The same as one positive number per joint, or one for all; empty for
+            ``weight``.
         elbow_joints: Numbers of the joints whose origins are shoulder, elbow and wrist, the first
             joint being 1.
         inertia: Inertia of the posture in the null space, every joint [kg m^2 or kg].
@@ -52,9 +55,9 @@ class PostureParameters:
     """
 
     task: str = "reference"
-    reference_deg: list[float] = dc.field(default_factory=list)
+    reference_deg: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     weight: str = "identity"
-    joint_weights: list[float] = dc.field(default_factory=list)
+    joint_weights: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     elbow_joints: list[int] = dc.field(default_factory=lambda: list(_ELBOW_JOINTS))
     inertia: float = 1.0
     damping: float = 20.0
@@ -64,10 +67,9 @@ class PostureParameters:
     observer_rate: float = 60.0
 
     def __post_init__(self) -> None:
-        require(self.task in POSTURE_TASKS, "task", self.task, ", ".join(POSTURE_TASKS))
-        require(self.weight in _WEIGHTS, "weight", self.weight, ", ".join(_WEIGHTS))
-        known = self.yields in _YIELD_SOURCES
-        require(known, "yields", self.yields, ", ".join(_YIELD_SOURCES))
+        require_one_of("task", self.task, POSTURE_TASKS)
+        require_one_of("weight", self.weight, _WEIGHTS)
+        require_one_of("yields", self.yields, _YIELD_SOURCES)
         good = all(abs(angle) <= LARGEST_ANGLE for angle in self.reference_deg)
         allowed = f"numbers of at most {LARGEST_ANGLE:g} deg"
         require(good, "reference_deg", self.reference_deg, allowed)
@@ -98,9 +100,9 @@ class GainParameters:
     """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
 
     Attributes:
-        poles: Real poles [1/s], r of them; ``auto`` to have them chosen for a bandwidth: two slow
-            ones for the convergence, faster ones for the robustness. A run's resolved scenario
-            names what was chosen.
+        poles: Real poles [1/s], r of them, or one number for r equal ones; ``auto`` to have them
+            chosen for a bandwidth: two slow ones for the convergence, faster ones for the
+            robustness. A run's resolved scenario names what was chosen.
         bandwidth: Magnitude of the slow poles [1/s] that ``auto`` chooses.
         bears: Relative error of masses and joint stiffnesses that poles chosen by ``auto`` bear.
         free: Whether only its velocity is held, so that a hand leads it wherever it likes; then
@@ -204,8 +206,7 @@ class ExternalTorqueParameters:
     bandwidth: float = 0.0
 
     def __post_init__(self) -> None:
-        known = self.source in _TORQUE_SOURCES
-        require(known, "source", self.source, ", ".join(_TORQUE_SOURCES))
+        require_one_of("source", self.source, _TORQUE_SOURCES)
         good = self.bandwidth == 0.0 or _SLOWEST <= self.bandwidth <= _FASTEST
         allowed = f"0, or {_SLOWEST:g} to {_FASTEST:g} rad/s"
         require(good, "bandwidth", self.bandwidth, allowed)
@@ -224,7 +225,8 @@ class ControllerParameters:
         law: Actuation model that the law is made for.
         gains: Gains by law.
         sampling_time: Sampling time ``T_s`` [s].
-        boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], for ``singular_perturbation``.
+        boundary_layer_damping: Diagonal of ``epsilon D_b``, or one number for all joints [s], for
+            ``singular_perturbation``.
         min_rcond: Smallest reciprocal condition number of the decoupling matrix.
         damped_below: Reciprocal condition number below which the joints' motion is damped, so
             that a robot goes through singular postures off its path rather than stops; 0 for
@@ -253,7 +255,7 @@ class ControllerParameters:
     law: str = "elastic"
     gains: dict[str, LawGains] = dc.field(default_factory=dict)
     sampling_time: float = 1e-3
-    boundary_layer_damping: list[float] = dc.field(default_factory=list)
+    boundary_layer_damping: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     min_rcond: float = 1e-3
     damped_below: float = 0.0
     max_alpha: float = 0.95
@@ -272,13 +274,13 @@ class ControllerParameters:
     delay: float | None = None
 
     def __post_init__(self) -> None:
-        require(self.state in STATES, "state", self.state, ", ".join(STATES))
+        require_one_of("state", self.state, STATES)
         require_positive("state_bandwidth", self.state_bandwidth)
         require_not_negative("delay", self.delay or 0.0)
-        require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
-        require(self.manifold in MANIFOLDS, "manifold", self.manifold, ", ".join(MANIFOLDS))
+        require_one_of("law", self.law, RELATIVE_DEGREE)
+        require_one_of("manifold", self.manifold, MANIFOLDS)
         for law in self.gains:
-            require(law in RELATIVE_DEGREE, "gains", law, ", ".join(RELATIVE_DEGREE))
+            require_one_of("gains", law, RELATIVE_DEGREE)
         in_range = 1e-5 <= self.sampling_time <= 0.1
         require(
             in_range, "sampling_time", self.sampling_time, "a positive number from 1e-5 to 0.1 s"

@@ -4,9 +4,10 @@ import dataclasses as dc
 
 import numpy as np
 
-from pfsc_drake.checks import require, require_not_negative, require_positive
+from pfsc_drake.checks import require, require_not_negative, require_one_of, require_positive
 from pfsc_drake.physics.friction import FrictionDrift
 from pfsc_drake.yaml.reading import NAME_OR_FILE
+from pfsc_drake.yaml.typed import ONE_FOR_ALL, ONE_OR_MANY
 
 _SOURCES = ("none", "model", "observer")
 _OBSERVERS = ("disturbance", "kalman")
@@ -21,15 +22,15 @@ class JointFrictionParameters:
     """Coulomb and viscous friction of the joints; empty for none.
 
     Attributes:
-        f_c: Coulomb friction of every joint [Nm or N].
-        f_v: Viscous friction of every joint [Nm s/rad or N s/m].
+        f_c: Coulomb friction of every joint, or one number for all [Nm or N].
+        f_v: Viscous friction of every joint, or one number for all [Nm s/rad or N s/m].
         file: Instead, name of a shipped robot or YAML file with robot parameters, whose
             friction of the first joints is taken.
         drift: How it changes during the run; null for not at all.
     """
 
-    f_c: list[float] = dc.field(default_factory=list)
-    f_v: list[float] = dc.field(default_factory=list)
+    f_c: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
+    f_v: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     file: str = dc.field(default="", metadata=NAME_OR_FILE)
     drift: FrictionDrift | None = None
 
@@ -69,16 +70,15 @@ class KalmanParameters:
 
     intervals: str = "mean"
     start: float = 1.0
-    momentum_noise: list[float] = dc.field(default_factory=lambda: [1e-6])
-    coulomb_noise: list[float] = dc.field(default_factory=list)
-    viscous_noise: list[float] = dc.field(default_factory=list)
-    measurement_noise: list[float] = dc.field(default_factory=lambda: [1e-3])
+    momentum_noise: list[float] = dc.field(default_factory=lambda: [1e-6], metadata=ONE_OR_MANY)
+    coulomb_noise: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    viscous_noise: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    measurement_noise: list[float] = dc.field(default_factory=lambda: [1e-3], metadata=ONE_OR_MANY)
     initial_variance: float = 1e3
     resting_velocity: float = 0.01
 
     def __post_init__(self) -> None:
-        known = self.intervals in ("mean", "begin")
-        require(known, "intervals", self.intervals, "mean, begin")
+        require_one_of("intervals", self.intervals, ("mean", "begin"))
         for key in ("start", "initial_variance", "resting_velocity"):
             require_not_negative(key, getattr(self, key))
         for key in ("momentum_noise", "coulomb_noise", "viscous_noise"):
@@ -122,9 +122,9 @@ class FrictionCompensationParameters:
     believed: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
 
     def __post_init__(self) -> None:
-        require(self.source in _SOURCES, "source", self.source, ", ".join(_SOURCES))
-        require(self.velocity in _VELOCITIES, "velocity", self.velocity, ", ".join(_VELOCITIES))
-        require(self.observer in _OBSERVERS, "observer", self.observer, ", ".join(_OBSERVERS))
+        require_one_of("source", self.source, _SOURCES)
+        require_one_of("velocity", self.velocity, _VELOCITIES)
+        require_one_of("observer", self.observer, _OBSERVERS)
         require_positive("smoothing", self.smoothing)
         require_positive("rate", self.rate)
         told = self.velocity == "measured" or self.source == "none" or self.has_coefficients

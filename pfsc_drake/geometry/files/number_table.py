@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pfsc_drake.checks import NUMBER
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, in_one_line, nearest_file, shortened, suggestion
 from pfsc_drake.geometry.progress import Progress
 
 _MAX_BYTES = 1 << 28
@@ -41,7 +41,10 @@ def read_regular_file(name: str | FilePath, kind: str) -> bytes:
         return FilePath(name).read_bytes()
     # ValueError: a name that no file can have.
     except (OSError, ValueError) as error:
-        raise unreadable(name, kind, getattr(error, "strerror", None)) from error
+        reason = getattr(error, "strerror", None)
+        if isinstance(error, FileNotFoundError):
+            reason = f"{reason}{nearest_file(FilePath(name))}"
+        raise unreadable(name, kind, reason) from error
 
 
 def unreadable(name: str | FilePath, kind: str, reason: str | None = None) -> InputError:
@@ -147,19 +150,28 @@ def check_columns(place: str, header: list[str], known: list[str], required: lis
     Raises:
         InputError: If a column is unknown, there twice, or missing.
     """
-    for label in header:
+    problems = []
+    for label in dict.fromkeys(header):
         if label not in known:
-            hint = "; separate columns by commas" if re.search("[;\t]", label) else ""
+            hint = suggestion(label, known)
+            if re.search("[;\t]", label):
+                hint = "; separate columns by commas"
             if NUMBER.fullmatch(label):
                 hint = "; the first line names the columns"
-            raise InputError(
-                f"{place}: column '{quote(label)}' is unknown; allowed: {', '.join(known)}{hint}"
-            )
-        if header.count(label) > 1:
-            raise InputError(f"{place}: column '{label}' twice; once is allowed")
-    for label in required:
-        if label not in header:
-            raise InputError(f"{place}: column '{label}' is missing; it is required")
+            allowed = f"{', '.join(known)}{hint}"
+            problems.append(f"column '{quote(label)}' is unknown; allowed: {allowed}")
+            if NUMBER.fullmatch(label):  # nor are the others names
+                break
+        elif header.count(label) > 1:
+            problems.append(f"column '{label}' twice; once is allowed")
+    # one that is written wrongly is not missing besides
+    if not problems:
+        missing = [f"'{label}'" for label in required if label not in header]
+        verb = "is missing; it is required" if len(missing) == 1 else "are missing; required"
+        if missing:
+            problems.append(f"column{'s' * (len(missing) > 1)} {', '.join(missing)} {verb}")
+    if problems:
+        raise InputError(f"{place}: {in_one_line(problems)}")
 
 
 def quote(text: str, longest: int = 40) -> str:

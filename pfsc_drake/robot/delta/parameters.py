@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.parameters import FrictionParameters
 from pfsc_drake.robot.parameter_checks import check_vector, require
@@ -206,7 +206,7 @@ def load_delta_parameters(robot: str | Path = "festo_expt_45") -> DeltaParameter
     path = Path(robot)
     if not path.suffix:
         if str(robot) not in SHIPPED_ROBOTS:
-            known = ", ".join(SHIPPED_ROBOTS)
+            known = f"{', '.join(SHIPPED_ROBOTS)}{suggestion(robot, SHIPPED_ROBOTS)}"
             raise InputError(f"DELTA robot {str(robot)!r}: must be a file or one of {known}")
         path = models_directory() / path / "parameters.yaml"
     return load_file(DeltaParameters, path)

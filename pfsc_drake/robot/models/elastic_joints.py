@@ -21,6 +21,7 @@ from pfsc_drake.robot.models.joint_edits import (
     take_joint,
 )
 from pfsc_drake.robot.models.model_parts import LARGEST
+from pfsc_drake.yaml.typed import spread
 
 # positive numbers below are slips of the pen
 _SMALLEST = 1e-9
@@ -159,6 +160,7 @@ def set_joint_damping(plant: MultibodyPlant, damping: list[float]) -> None:
     sprung = sprung_joints(plant)
     if not damping:
         return
+    damping = spread(damping, len(sprung))
     if len(damping) != len(sprung):
         raise InputError(
             f"joint_damping: {len(damping)} values; the model has {len(sprung)} elastic joints"

@@ -8,7 +8,7 @@ from urllib.parse import unquote
 
 from pydrake.multibody.parsing import PackageMap
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, nearest_file, suggestion
 from pfsc_drake.robot.models.model_xml import Element, ModelXml, read_model_xml
 
 PACKAGE_NAME = "pfsc_models"
@@ -60,14 +60,15 @@ def resolve_model(name_or_path: str | Path) -> Path:
     else:
         shipped = {file.stem: file for file in sorted(directory.glob("*/*.sdf"))}
         if text not in shipped:
-            raise InputError(f"robot model {text!r}: must be a file or one of {', '.join(shipped)}")
+            allowed = f"{', '.join(shipped)}{suggestion(text, shipped)}"
+            raise InputError(f"robot model {text!r}: must be a file or one of {allowed}")
         path = shipped[text]
     try:
         exists = path.exists()
     except OSError:  # a name that no file system takes
         exists = False
     if not exists:
-        raise InputError(f"robot model {text!r}: no such file")
+        raise InputError(f"robot model {text!r}: no such file{nearest_file(path)}")
     return path
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.serial.denavit_hartenberg import DenavitHartenberg
@@ -316,7 +316,8 @@ def load_parameters(robot: str | Path) -> ArmParameters:
         known = sorted(file.parent.name for file in files if any(file.parent.glob("*.sdf")))
         path = models_directory() / path / "parameters.yaml"
         if str(robot) not in known:
-            raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
+            allowed = f"{', '.join(known)}{suggestion(robot, known)}"
+            raise InputError(f"robot {str(robot)!r}: must be a file or one of {allowed}")
     return copy.deepcopy(_parameters(path, read_text(path)))
 
 

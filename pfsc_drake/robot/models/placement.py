@@ -13,7 +13,7 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.joint_edits import (
     bodies_of,
     frame_named,
@@ -46,7 +46,8 @@ def fix_joints(plant: MultibodyPlant, values: Mapping[str, float]) -> None:
         }
         if name not in movable:
             allowed = ", ".join(movable) or "none, nothing moves"
-            raise InputError(f"fixed_joints: '{name}'; allowed: {allowed}")
+            nearest = suggestion(name, movable)
+            raise InputError(f"fixed_joints: '{name}'; allowed: {allowed}{nearest}")
         joint = movable[name]
         lower, upper = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
         if not lower <= value <= upper:

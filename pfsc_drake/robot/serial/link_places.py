@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, JointIndex
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.joint_edits import bodies_of, frame_named
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 
@@ -77,6 +77,7 @@ def place_on_link(
         bodies = [body.name() for body in bodies_of(plant) if body.index() in carriers]
         raise InputError(
             f"'{name}' {problem}; allowed: {', '.join(bodies)}, and the frames that are on these"
+            f"{suggestion(name, bodies)}"
         )
     k = carriers[frame.body().index()]
     X_LF = plant.CalcRelativeTransform(plant.CreateDefaultContext(), links[k], frame)

@@ -1,6 +1,7 @@
 """Paths, surfaces and regions in Meshcat; surfaces coloured by what is felt on them."""
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba
@@ -8,6 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.systems.drawing.numbers import SceneNumber, draw_number
 from pfsc_drake.systems.drawing.tool_visualizer import draw_frame
 
 _PATH_ROOT, _SURFACE_ROOT, _REGION_ROOT = "path_following", "surface_following", "fixtures"
@@ -147,6 +149,7 @@ class RegionVisualizer(LeafSystem):
         size: Size of the manifold's point.
         meshcat: Where to draw.
         period: Time between frames [s].
+        numbers: What stands beside surfaces, by their index, and moves with them.
     """
 
     def __init__(
@@ -156,9 +159,11 @@ class RegionVisualizer(LeafSystem):
         size: int,
         meshcat: Meshcat,
         period: float,
+        numbers: Mapping[int, SceneNumber] = MappingProxyType({}),
     ) -> None:
         super().__init__()
         self._surfaces, self._moving, self._meshcat = surfaces, moving, meshcat
+        self._numbers = numbers
         self._point = self.DeclareVectorInputPort("manifold_point", size)
         self._clock = self.DeclareVectorInputPort("region_clock", 1)
         self.DeclareInitializationPublishEvent(self._draw_surfaces)
@@ -167,6 +172,8 @@ class RegionVisualizer(LeafSystem):
     def _draw_surfaces(self, context: Context) -> EventStatus:
         for i, (skin, lines) in enumerate(self._surfaces):
             draw_surface(self._meshcat, f"{_REGION_ROOT}/{i}", skin, lines)
+        for i, shown in self._numbers.items():
+            draw_number(self._meshcat, f"{_REGION_ROOT}/{i}/number", shown)
         draw_frame(self._meshcat, f"{_REGION_ROOT}/frame")
         return EventStatus.Succeeded()
 

@@ -14,6 +14,7 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.jets import Jet
+from pfsc_drake.yaml.broadcast import OneForAll
 from tests.control.conftest import BENT_7
 from tests.scenarios import LONG
 
@@ -59,6 +60,13 @@ def test_weights(load_arm):
     assert np.array_equal(given, own)
     with pytest.raises(InputError, match=r"joint_weights: 2 values; the robot has 7 joints"):
         law_of(load_arm, PostureParameters(joint_weights=[1.0, 2.0]))
+
+
+def test_one_number_for_all_joints_and_poles(load_arm):
+    given = law_of(load_arm, PostureParameters(joint_weights=OneForAll([2.0]))).posture.weight
+    assert np.array_equal(given, [2.0] * 7)
+    own = law_of(load_arm, gains=GainParameters(poles=OneForAll([-9.0]))).posture.stabilization
+    assert np.allclose(own.proportional.T, [proportional([-9.0, -9.0])] * 7)
 
 
 def test_a_square_robot_has_no_posture(load_arm):

@@ -103,6 +103,50 @@ def test_scenario_that_says_something_wrong(refused, mine, change, parts):
     refused(mine(), *parts, changes=[change])
 
 
+def test_all_that_is_wrong_is_told(refused, mine):
+    changes = [
+        "controler.law=rigid",
+        "duration=long",
+        "reference.points=[0, ende]",
+        "simulation.integrator=runge_kuta3",
+        "start={offset: [0.01], rotation_deg: [1, 2]}",
+    ]
+    parts = (
+        "6 things are wrong: (1) ",
+        "unknown key 'controler'",
+        "did you mean 'controller'?",
+        "key 'duration' is 'long'",
+        "key 'reference.points[1]' is 'ende': did you mean 'end'?",
+        "key 'start': offset = [0.01]; allowed: 2 finite numbers",
+        "key 'start': rotation_deg = [1.0, 2.0]; allowed: 3 finite numbers",
+        "key 'simulation': integrator = runge_kuta3",
+        "did you mean 'runge_kutta3'?",
+    )
+    refused(mine(), *parts, changes=changes)
+
+
+@pytest.mark.parametrize(
+    ("change", "nearest"),
+    [
+        ("controller.law=elatic", "elastic"),
+        ("path.shape=!Waypoint {}", "!Waypoints"),
+        ("path.shape=!circle {}", "!Circle"),
+        ("robot.model=comau_racer_14", "comau_racer_1_4"),
+        ("robot.tool_frame=toolpoint", "tool_point"),
+        ("targets.elastic.max_path_deviaton={bound: '< 1'}", "max_path_deviation"),
+    ],
+)
+def test_the_nearest_word_is_told(refused, mine, change, nearest):
+    refused(mine(), f"did you mean '{nearest}'?", changes=[change])
+
+
+@pytest.mark.parametrize("key", ["path.shape=!Waypoints {file: X}", "friction={file: X}"])
+def test_the_nearest_file_is_told(refused, mine, tmp_path, key):
+    (tmp_path / "points.csv").touch()
+    parts = ("No such file or directory; did you mean 'points.csv'?",)
+    refused(mine(), *parts, changes=[key.replace("X", "point.csv")])
+
+
 @pytest.mark.parametrize("damping", ["[]", "[0.04]", "[0.04, 0.04, -0.02]"])
 def test_boundary_layer_damping(refused, mine, damping):
     changes = [

@@ -8,7 +8,7 @@ from pfsc_drake.drivers.driver_rules import DriverOptions
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode
 from tests.experiments.hardware.test_drive import Loop, changed, elastic, panda
 
-# of a driver that waits no longer than a controller bridges, and damps well; see docs/robot.md
+# of a driver that waits no longer than a controller bridges, and damps well: docs/howto/robot.md
 QUICK = {"expiry": 0.02, "damping": 20.0}
 BEGIN, STOPPED = 0.9, 3.0
 

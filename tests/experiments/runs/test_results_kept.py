@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from experiments.cli import main
-from experiments.run import run_scenario
 from experiments.scenario_file import read_scenario
+from experiments.simulated_run import run_scenario
 
 BARE = ("--no-figures", "--no-recording")
 

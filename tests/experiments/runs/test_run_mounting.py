@@ -1,6 +1,7 @@
 """The last moments before a plate is mounted, through the command line."""
 
 import json
+import re
 
 import h5py
 import numpy as np
@@ -25,7 +26,7 @@ DURATION, WEIGHT = 3.6, 0.83 * 9.81  # s, N
 @pytest.fixture(name="out", scope="module")
 def fixture_out(tmp_path_factory):
     out = tmp_path_factory.mktemp("mounting")
-    arguments = ["--no-figures", "--no-recording", "--duration", str(DURATION)]
+    arguments = ["--no-figures", "--duration", str(DURATION)]
     for change in SHORTENED:
         arguments += ["--set", change]
     assert main(["run", "plate_mounting", "--out", str(out), *arguments]) == 0
@@ -76,3 +77,14 @@ def test_the_operator_does_one_thing_after_the_other(log):
     phase = log["phase"][:, 0]
     assert np.all(np.diff(phase) >= 0)
     assert set(phase) >= {1, 2, 3, 4}  # lead, align, insert, release
+
+
+def test_the_recording_tells_what_the_operator_does(log, out):
+    page = (out / "recording.html").read_text(encoding="utf-8")
+    stages = json.loads(re.search(r"stages = (\[.*?\]), MOVE", page)[1])
+    with h5py.File(out / "log.h5") as file:
+        names = [str(name) for name in file["phase"].attrs["labels"]]
+    begins = np.flatnonzero(np.diff(log["phase"][:, 0], prepend=-1))
+    assert [stage["name"] for stage in stages] == [names[int(log["phase"][k, 0])] for k in begins]
+    assert [stage["time"] for stage in stages] == [pytest.approx(log["t"][k]) for k in begins]
+    assert "insert" in [stage["name"] for stage in stages]

@@ -60,3 +60,16 @@ def test_values_over_decades(rows):
         spread[i] = RunRow("completed", "", metrics)
     for figure in drawn(samples, spread):
         check(figure)
+
+
+def test_where_a_metric_is_least_is_told(rows):
+    """A correlation near zero hides it."""
+    samples = draw_samples(parse_variations(["mass=-2,-1,0,1,2"]), None, 0)
+    made = {}
+    for i, sample in enumerate(samples):
+        metrics = type(rows[0].metrics)()
+        metrics.add("max_path_deviation", 1e-3 + abs(sample.varied["mass"]) * 1e-3, "m")
+        made[i] = RunRow("completed", "", metrics)
+    parameters, _ = drawn(samples, made)
+    check(parameters)
+    assert "least near 0 of mass" in parameters.caption

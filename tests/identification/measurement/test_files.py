@@ -66,6 +66,38 @@ def test_wrong_columns(tmp_path, record, robot, wrong, right, message):
         read_record(file, robot)
 
 
+def test_all_wrong_columns_together(tmp_path, record, robot):
+    header = HEADER
+    for right, wrong in {
+        "q_2 [mm]": "q_2",
+        "tau_1 [Nm]": "tau_1 [A]",
+        "tau_2 [kN]": "ta_2",
+    }.items():
+        assert right in header
+        header = header.replace(right, wrong)
+    file = csv(tmp_path / "a.csv", record, header, columns(record))
+    with pytest.raises(InputError) as refused:
+        read_record(file, robot)
+    message = str(refused.value)
+    assert message.startswith(f"{file}: 3 things are wrong: (1) ")
+    for part in (
+        "tau_1: unit [A]; allowed: Nm, mNm, kNm",
+        "'ta_2' is unknown; allowed: t, q_1",
+        "did you mean 'tau_2'?",
+        "q_2: no unit is stated",
+    ):
+        assert part in message
+    assert "\n" not in message
+
+
+def test_all_missing_columns_together(tmp_path, record, robot):
+    kept = [i for i, name in enumerate(HEADER.split(", ")) if not name.startswith(("t ", "tau_2"))]
+    header = ", ".join(HEADER.split(", ")[i] for i in kept)
+    file = csv(tmp_path / "a.csv", record, header, [columns(record)[i] for i in kept])
+    with pytest.raises(InputError, match=r"2 things .* no time; .* no tau_2 \(lift\); tau of all"):
+        read_record(file, robot)
+
+
 def test_counts_with_a_scale_and_other_names(tmp_path, record, robot):
     header = "zeit [s], achse1 [counts], lift [m], i1 [A], f2 [N], unused [V]"
     q, tau = record.q, record.tau

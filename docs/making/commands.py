@@ -1,0 +1,83 @@
+"""The command line, from what it tells of itself."""
+
+import inspect
+import typing
+from pathlib import Path
+from typing import Any
+
+import typer
+
+import experiments.cli
+import identification.cli
+from docs.making.text import as_markdown, table
+
+# what is asked for exit status, and the commands
+_PROGRAMS = {
+    "experiments": (experiments.cli, experiments.cli.app),
+    "identification": (identification.cli, identification.cli.app),
+}
+_TYPES = {Path: "PATH", float: "NUMBER", int: "INTEGER"}
+_HEAD = ["Argument or option", "Default", "Meaning"]
+
+
+def command_line() -> str:
+    """Return every command of both programs, with its arguments and options, as Markdown."""
+    page = []
+    for program, (module, app) in _PROGRAMS.items():
+        group: Any = typer.main.get_command(app)
+        page += [f"## `python -m {program}`", _said(group.help)]
+        page.append(as_markdown(_status(inspect.getdoc(module) or "")))
+        rows = [_row(parameter) for parameter in group.params if parameter.name == "version"]
+        page += [table(_HEAD, rows, "options")] if rows else []
+        for name, command in group.commands.items():
+            page += _section(program, name, command)
+    return "\n\n".join(page)
+
+
+def _status(text: str) -> str:
+    """Return the paragraph of a module's docstring that tells the exit status."""
+    return next((part for part in text.split("\n\n") if part.startswith("Exit status")), "")
+
+
+def _section(program: str, name: str, command: Any) -> list[str]:
+    shown = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
+    needed = [p.name.upper() for p in shown if p.param_type_name == "argument" and p.required]
+    words = " ".join(["python -m", program, name, *needed])
+    parts = [f"({program}-{name})=", f"### `{name}`", _said(command.help), f"`{words}`"]
+    rows = [_row(parameter) for parameter in shown]
+    return [*parts, table(_HEAD, rows, "options")] if rows else parts
+
+
+def _row(parameter: Any) -> list[str]:
+    if parameter.param_type_name == "argument":
+        name = f"`{parameter.name.upper()}`{' …' if parameter.nargs == -1 else ''}"
+    else:
+        names = [*parameter.opts, *parameter.secondary_opts]
+        value = "" if parameter.is_flag else f" {_value(parameter)}"
+        name = ", ".join(f"`{option}{value}`" for option in names)
+    return [name, _default(parameter), " ".join(_said(parameter.help).split()).replace("|", r"\|")]
+
+
+def _value(parameter: Any) -> str:
+    """Return what stands for an option's value: what the option says, or its type."""
+    if parameter.metavar:
+        return str(parameter.metavar)
+    kind = parameter.type_descriptor.annotation
+    inner = [one for one in typing.get_args(kind) if one is not type(None)] or [kind]
+    return _TYPES.get(inner[0], "TEXT")
+
+
+def _default(parameter: Any) -> str:
+    if parameter.required:
+        return "*must be given*"
+    value = parameter.default
+    if value is None or value in ((), "", []) or callable(value):
+        return ""
+    if isinstance(value, bool):
+        names = [*parameter.opts[:1], *parameter.secondary_opts[:1]]
+        return f"`{names[0 if value else -1]}`" if len(names) == 2 else ""
+    return f"`{value}`"
+
+
+def _said(text: str | None) -> str:
+    return as_markdown(inspect.cleandoc(text or ""))

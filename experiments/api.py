@@ -1,0 +1,173 @@
+"""Runs and margins from scripts and notebooks, as the command line makes them."""
+
+import logging
+import math
+import shutil
+import tempfile
+import warnings
+import weakref
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from diagrams.scenario import Scenario
+from experiments.kept_run import Run, load
+from experiments.preparation import naming
+from experiments.scenario_file import ScenarioFile, apply_change, expand_home, read_scenario
+from experiments.simulated_run import run_scenario
+from experiments.studies.margins.analysis import analyse
+from experiments.studies.margins.box import ErrorBox
+from experiments.studies.margins.told import Margins
+from pfsc_drake.errors import InputError, WriteError
+from pfsc_drake.yaml.typed import load_typed, typed_data
+from reporting.notebook import NotebookProgress, in_notebook
+from reporting.progress import ProgressDisplay
+
+
+def run(
+    scenario: str | Path | Scenario,
+    changes: Mapping[str, Any] | None = None,
+    *,
+    duration: float | None = None,
+    out: str | Path | None = None,
+    figures: bool = True,
+    recording: bool = True,
+    after_fault: float = 0.0,
+    quiet: bool = False,
+) -> Run:
+    """Run a scenario, and return what it left.
+
+    A fault ends a run but is no exception: ``fault`` says which it was, and what was logged until
+    then is there.
+
+    Args:
+        scenario: Name of a shipped scenario, path of a YAML file, or a scenario as made in Python,
+            whose relative names of files start in the current folder.
+        changes: Values by ``key.path``, as of ``--set`` of the command line; text is read as YAML.
+        duration: Simulated time [s] instead of the scenario's.
+        out: Folder for the results, a new one or that of an earlier run, which are replaced; None
+            for a temporary one that is gone with what is returned, see :meth:`Run.save`.
+        figures: Whether to draw figures.
+        recording: Whether to record the motion.
+        after_fault: How long to go on after a fault [s].
+        quiet: Whether to show no progress.
+
+    Raises:
+        InputError: If the scenario or an argument is wrong; one line, and nothing has moved then.
+        WriteError: If results could not be written.
+    """
+    for name, time, least in (("duration", duration, False), ("after_fault", after_fault, True)):
+        good = time is None or (math.isfinite(time) and (time > 0.0 or (least and time == 0.0)))
+        if not good:
+            allowed = "a number of seconds, 0 or more" if least else "a positive number of seconds"
+            raise InputError(f"{name} = {time}; allowed: {allowed}")
+    loaded = _read(scenario, changes or {})
+    temporary = tempfile.mkdtemp(prefix="pfsc_drake_run_") if out is None else None
+    folder = expand_home(Path(out or "")) if temporary is None else Path(temporary)
+    try:
+        with _only_own_words(), _progress(loaded.name, duration, quiet) as progress:
+            outcome = run_scenario(
+                loaded,
+                out=folder,
+                duration=duration,
+                figures=figures,
+                recording=recording,
+                progress=progress,
+                after_fault=after_fault,
+            )
+        if outcome.problem is not None:
+            raise WriteError(outcome.problem)
+        result = load(folder)
+    except BaseException:
+        if temporary is not None:
+            shutil.rmtree(temporary, ignore_errors=True)
+        raise
+    if temporary is not None:
+        weakref.finalize(result, shutil.rmtree, temporary, ignore_errors=True)
+    return result
+
+
+def margins(
+    scenario: str | Path | Scenario,
+    changes: Mapping[str, Any] | None = None,
+    *,
+    mass: float = 0.05,
+    stiffness: float = 0.05,
+    rotor: float = 0.0,
+    tool: float = 0.1,
+    quiet: bool = False,
+) -> Margins:
+    """Tell what the sampled loop of a scenario bears, before anything moves.
+
+    Args:
+        scenario: As of :func:`run`.
+        changes: As of :func:`run`.
+        mass: Relative error of masses and inertias to be borne.
+        stiffness: Relative error of joint stiffnesses to be borne.
+        rotor: Relative error of rotor inertias to be borne.
+        tool: Error of the tool's mass to be borne [kg].
+        quiet: Whether to show no progress.
+
+    Raises:
+        InputError: If the scenario or an argument is wrong; one line.
+    """
+    loaded, box = _read(scenario, changes or {}), ErrorBox(mass, stiffness, rotor, tool)
+    with _only_own_words(), _progress(loaded.name, None, quiet, paced=False) as progress:
+        settings = load_typed(Scenario, loaded.data, str(loaded.path))
+        with naming(loaded.path):
+            return Margins(loaded.name, analyse(settings, loaded.path.parent, box, progress))
+
+
+def _read(scenario: str | Path | Scenario, changes: Mapping[str, Any]) -> ScenarioFile:
+    """Return a scenario with changes."""
+    if isinstance(scenario, Scenario):
+        path = Path.cwd() / f"{scenario.name or 'scenario'}.yaml"
+        loaded = ScenarioFile(path, typed_data(scenario))
+    else:
+        loaded = read_scenario(str(scenario), [])
+    for key, value in changes.items():
+        apply_change(loaded.data, key, value)
+    return loaded
+
+
+class _Silence:
+    """Shows nothing."""
+
+    def expect(self, duration: float) -> None:
+        """Leave it."""
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        """Leave it."""
+
+
+@contextmanager
+def _silence() -> Iterator[_Silence]:
+    yield _Silence()
+
+
+def _progress(
+    title: str, duration: float | None, quiet: bool, *, paced: bool = True
+) -> AbstractContextManager[NotebookProgress | ProgressDisplay | _Silence]:
+    """Return what shows progress here."""
+    if quiet:
+        return _silence()
+    if in_notebook():
+        return NotebookProgress(title)
+    return ProgressDisplay(Console(), title, duration, paced=paced)
+
+
+@contextmanager
+def _only_own_words() -> Iterator[None]:
+    """Let libraries be silent: what matters is in the outcome, in words of its own."""
+    drake = logging.getLogger("drake")
+    level = drake.level
+    drake.setLevel(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        drake.setLevel(level)

@@ -1,0 +1,21 @@
+"""The start of the process, before anything slow is imported."""
+
+from reporting.processes import leave_when_interrupted
+from reporting.terminal import prepare_streams, silence_libraries
+
+
+def start(name: str) -> int:
+    """Run the command line that the process was started with.
+
+    Args:
+        name: How it is called, ``python -m experiments`` or ``pfsc``.
+
+    Returns:
+        Exit status, see :mod:`experiments.cli`.
+    """
+    leave_when_interrupted()
+    prepare_streams()
+    silence_libraries()
+    from experiments.cli import main
+
+    return main(program=name)

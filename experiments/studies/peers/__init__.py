@@ -1,0 +1,1 @@
+"""Path following beside what a user would take instead."""

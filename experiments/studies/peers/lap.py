@@ -1,0 +1,85 @@
+"""The lap that every law is to make: one robot, one path, one motion along it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path as FilePath
+
+from diagrams.scenario import Scenario
+from diagrams.station_parts import make_task
+from diagrams.tasks.path_following import PathTask
+from experiments.scenario_file import SCENARIO_DIRECTORY, read_scenario
+from experiments.studies.peers.laws import MovingPose, moving_pose
+from pfsc_drake.yaml.typed import load_typed
+
+SCENARIO = "pfc_panda_7r"
+# a lap that begins on the path, from rest to rest
+COMMON = (
+    "reference.points=[0.0, 1.0]",
+    "start.offset=[0, 0]",
+    "start.rotation_deg=[0, 0, 0]",
+    "simulation.integrator=runge_kutta3",
+    "targets={}",
+)
+FOLDER: FilePath = SCENARIO_DIRECTORY
+
+
+@dataclass(frozen=True)
+class Lap:
+    """A lap of the circle of ``SCENARIO``.
+
+    Attributes:
+        duration: Simulated time [s].
+    """
+
+    duration: float
+
+    def settings(self, overrides: tuple[str, ...] = ()) -> Scenario:
+        """Return the scenario.
+
+        Args:
+            overrides: What else is changed in it.
+        """
+        found = read_scenario(SCENARIO, [*COMMON, *overrides])
+        return load_typed(Scenario, found.data, str(found.path))
+
+    @cached_property
+    def plain(self) -> Scenario:
+        """The scenario with nothing to disturb it."""
+        return self.settings()
+
+    @cached_property
+    def task(self) -> PathTask:
+        """The path, and the motion along it."""
+        task = make_task(self.plain, FOLDER)
+        assert isinstance(task, PathTask)
+        return task
+
+    @cached_property
+    def target(self) -> MovingPose:
+        """Pose that moves along the path as the reference does."""
+        return moving_pose(self.task.path, self.task.motion, self.ticks, self.period)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Arc lengths where it begins and ends [m]."""
+        return self.plain.reference.points[0], self.plain.reference.points[-1]
+
+    @property
+    def begin(self) -> float:
+        """When the motion begins [s]."""
+        return self.plain.reference.dwell
+
+    @property
+    def moving(self) -> float:
+        """How long the reference moves [s]."""
+        return float(self.task.motion.domain[1]) - 2.0 * self.begin
+
+    @property
+    def period(self) -> float:
+        """Sampling time [s]."""
+        return self.plain.controller.sampling_time
+
+    @property
+    def ticks(self) -> int:
+        """Number of ticks."""
+        return round(self.duration / self.period)

@@ -1,0 +1,161 @@
+"""What a notebook shows of results: short tables, recordings in frames, how far a run is."""
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+from urllib.parse import quote
+
+from reporting.metrics import NOT_A_NUMBER, Metric, format_quantity
+from reporting.registry import known_metric
+
+_SHOWN = 8  # metrics of a short table
+_PARTS = 200  # of a whole, between two looks at its progress
+_CELL = 'style="text-align: left; padding: 0.1em 1.5em 0.1em 0"'
+_MARKS = {True: "✓ met", False: "✗ missed", None: ""}
+
+
+def in_notebook() -> bool:
+    """Return whether a kernel of Jupyter runs this, which shows more than text."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return type(shell).__name__ == "ZMQInteractiveShell"
+
+
+def show_html(content: str) -> None:
+    """Show HTML beneath the cell that runs.
+
+    Args:
+        content: The HTML.
+    """
+    from IPython.display import display
+
+    display(_bundle(content), raw=True)
+
+
+def page_frame(page: Path, height: int, title: str) -> str:
+    """Return a frame that shows a page, as HTML.
+
+    A page beneath the current folder stays a file, which the frame loads when it comes into sight;
+    another one, which a notebook could not reach, is put into the frame.
+
+    Args:
+        page: The page, self-contained.
+        height: Height of the frame [pixels].
+        title: What it shows.
+    """
+    here, file = Path.cwd().resolve(), page.resolve()
+    if file.is_relative_to(here):
+        source = f'src="{quote(file.relative_to(here).as_posix())}"'
+    else:
+        source = f'srcdoc="{escape(file.read_text(encoding="utf-8"))}"'
+    return (
+        f'<iframe {source} title="{escape(title)}" loading="lazy" allowfullscreen '
+        f'style="width: 100%; height: {height}px; border: 0"></iframe>'
+    )
+
+
+def short_table(
+    title: str, ends: Sequence[str], warnings: Sequence[str], metrics: Mapping[str, Metric]
+) -> str:
+    """Return what to know of a run first, as HTML: how it ended, metrics, warnings.
+
+    Args:
+        title: Name of the run.
+        ends: Why it did not end well, one phrase each; none if it did.
+        warnings: What may not have gone as well as hoped, one sentence each.
+        metrics: All of them; those with a target are shown, or the first few, others are folded.
+    """
+    chosen = [name for name, metric in metrics.items() if metric.target is not None]
+    chosen = (chosen or list(metrics))[:_SHOWN]
+    rest = [name for name in metrics if name not in chosen]
+    lines = [f"<b>{escape(title)}</b>: {escape('; '.join(ends) or 'completed')}"]
+    lines += [f"⚠ {escape(warning)}" for warning in warnings]
+    summary = f"<summary>{len(rest)} more metrics</summary>"
+    folded = f"<details>{summary}{metrics_table(metrics, rest)}</details>" if rest else ""
+    told = "".join(f"<div>{line}</div>" for line in lines)
+    return told + metrics_table(metrics, chosen) + folded
+
+
+def metrics_table(metrics: Mapping[str, Metric], names: Sequence[str] | None = None) -> str:
+    """Return metrics with their targets, as HTML.
+
+    Args:
+        metrics: The metrics.
+        names: Names of those that are shown; by default all.
+    """
+    titles = ("Metric", "Value", "Target")
+    head = f"<tr>{''.join(f'<th {_CELL}>{title}</th>' for title in titles)}</tr>"
+    rows = "".join(_row(name, metrics[name]) for name in (metrics if names is None else names))
+    return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
+
+
+def _row(name: str, metric: Metric) -> str:
+    known, target = known_metric(name), escape(metric.target or "")
+    meaning = f' title="{escape(known.text)}"' if known is not None else ""
+    if metric.bound is not None:
+        comparison, number = metric.bound
+        target = escape(f"{comparison} {format_quantity(number, metric.unit)}")
+    value = escape(format_quantity(metric.value, metric.unit) or NOT_A_NUMBER)
+    mark = _MARKS[metric.passed] if math.isfinite(metric.value) else ""  # else there was nothing
+    cells = (f"<code>{escape(name)}</code>", value, f"{target} {mark}".strip())
+    return f"<tr{meaning}>{''.join(f'<td {_CELL}>{cell}</td>' for cell in cells)}</tr>"
+
+
+class NotebookProgress:
+    """Shows how far a run is, in one line beneath its cell that is gone at the end."""
+
+    def __init__(self, title: str) -> None:
+        """Begin at nothing.
+
+        Args:
+            title: Name of the run.
+        """
+        self._title = title
+        self._duration: float | None = None
+        self._shown: tuple[str, int] | None = None
+        self._line: Any = None
+
+    def __enter__(self) -> Self:
+        from IPython.display import display
+
+        self._line = display(_bundle(""), raw=True, display_id=True)
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _traceback: TracebackType | None,
+    ) -> None:
+        self._show("")
+
+    def expect(self, duration: float) -> None:
+        """Take the simulated time at the end [s], once it is known."""
+        self._duration = duration
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        """Show simulated time and phase, where that differs from what is shown.
+
+        Args:
+            simulated_time: Simulated time [s].
+            phase: What goes on.
+        """
+        share = simulated_time / self._duration if self._duration else 0.0
+        shown = phase, int(_PARTS * share)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        time = f", t = {simulated_time:.2f} s" if simulated_time else ""
+        bar = f'<progress value="{share:.3f}"></progress>' if self._duration else ""
+        self._show(f"{bar} {escape(self._title)}: {escape(phase)}{time}")
+
+    def _show(self, content: str) -> None:
+        self._line.update(_bundle(content), raw=True)
+
+
+def _bundle(content: str) -> dict[str, str]:
+    """Return HTML as the kernel sends it; as text there is nothing to see."""
+    return {"text/html": content, "text/plain": ""}

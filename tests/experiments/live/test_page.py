@@ -1,0 +1,114 @@
+"""The page of a session in a browser, without any robot: what is seen of its controls."""
+
+from itertools import pairwise
+
+import pytest
+
+from experiments.live.pages import Pages
+from experiments.live.panel import Panel
+from experiments.live.server import PageServer
+from experiments.live.status import LiveStatus
+from experiments.live.watch import WatchPanel
+from tests.experiments.live.browser import NAMES, Browser, find_browser
+from tests.experiments.live.test_live import until
+from tests.experiments.live.test_panel import TUNED
+
+pytestmark = pytest.mark.skipif(find_browser() is None, reason=f"none of {', '.join(NAMES)} here")
+
+SIZE = (900, 700)
+# an element's box, as numbers
+BOX = "(e => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; })"
+
+
+@pytest.fixture
+def show(tmp_path):
+    """Return a function that shows a status on the page, in a window of some size."""
+    opened = []
+
+    def shown(status, pages, size=SIZE):
+        content = status.content()
+        server = PageServer(0, lambda: content | {"lead": pages.leader}, pages.hear)
+        browser = Browser(find_browser(), tmp_path / "profile")
+        opened.extend([browser, server])
+        browser.open("about:blank")
+        width, height = size
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        browser.call("Emulation.setDeviceMetricsOverride", **metrics)
+        browser.call("Page.navigate", url=server.url)
+        until(lambda: browser.evaluate("document.querySelectorAll('[data-name]').length > 0"))
+        assert browser.errors == []
+        return browser
+
+    yield shown
+    for each in opened:
+        each.close()
+
+
+def guided(count):
+    """Return the status of a session with regions at its fullest, and its pages."""
+    pages, status = Pages(), LiveStatus("a_scenario_with_a_long_name")
+    panel = Panel(pages, 45.0, TUNED, [f"plane_{i + 1}" for i in range(count)])
+    status.phase, status.time, status.factor = "running", 1234.5, 0.97
+    status.mode, status.limit, status.recording = "moves freely", "axis 3 near its end", 1200.0
+    status.progress = {"x": 0.1, "y": 0.2, "z": 0.3}
+    status.deviation, status.force = {"nearest region": 0.012}, [1.0, 2.0, 3.0]
+    status.controls = panel.content()
+    return status, pages
+
+
+def boxes(browser, selector):
+    return browser.evaluate(f"Array.from(document.querySelectorAll({selector!r}), {BOX})")
+
+
+@pytest.mark.parametrize("count", [5, 50])
+def test_all_switches_and_handles_are_seen_at_once(show, count):
+    browser = show(*guided(count))
+    buttons = boxes(browser, "aside button:not(#take), #pad, #lift")
+    assert len(buttons) == count + 2 + 4 + 2
+    assert max(bottom for *_, bottom in buttons) <= SIZE[1]
+    texts = browser.evaluate(
+        "Array.from(document.querySelectorAll('#regions button'), e => e.textContent)"
+    )
+    assert texts[4] == ("5" if count == 50 else "5 plane")
+    title = browser.evaluate("document.querySelector('#regions button').title")
+    assert title == "region plane_1: on"
+
+
+def test_nothing_lies_upon_another(show):
+    """Whatever there is to say, and however little room."""
+    browser = show(*guided(50))
+    badges = [box for box in boxes(browser, "aside > .badges .badge") if box[2] > box[0]]
+    assert len(badges) == 4
+    rows = boxes(browser, "aside > .badges, aside > .charts, aside > #pulls, aside > .row, #walls")
+    for (_, _, _, bottom), (_, top, _, _) in pairwise(rows):
+        assert bottom <= top
+    assert max(bottom for *_, bottom in badges) <= rows[0][3]
+    sides = boxes(browser, "aside")[0]
+    assert all(right <= sides[2] for _, _, right, _ in badges)
+    # what comes and goes is on the scene
+    for name in ("limit", "recording"):
+        assert boxes(browser, f"#{name}")[0][0] >= sides[2]
+
+
+def test_dragging_selects_no_label(show):
+    browser = show(*guided(5))
+    browser.mouse("mousePressed", browser.middle("#pulls h2"))
+    browser.mouse("mouseMoved", browser.middle("#walls h2"))
+    browser.mouse("mouseReleased", browser.middle("#walls h2"))
+    assert browser.evaluate("String(getSelection())") == ""
+
+
+@pytest.mark.parametrize("size", [SIZE, (400, 800)])
+def test_of_a_robot_that_is_watched_only_what_is_known_is_shown(show, size):
+    pages, status = Pages(), LiveStatus("pfc_panda_7r")
+    status.override, status.phase = 0.8, "driving"
+    status.progress, status.deviation = {"eta": 0.1}, {"xi_1": 1e-3, "xi_2": 0.0}
+    status.controls = WatchPanel(pages).content(0.8)
+    browser = show(status, pages, size)
+    row = "Array.from(document.querySelectorAll('#coordinates tr'), e => e.textContent)"
+    assert browser.evaluate(row) == ["place", "eta100.0 mm", "xi_11.0 mm", "xi_20.0 mm"]
+    hidden = ("forces", "pulls", "tunes", "hand-keys", "walls", "switches")
+    assert browser.evaluate(f"{list(hidden)}.map(id => at(id).offsetHeight)") == [0] * len(hidden)
+    (chart,), (charts,) = boxes(browser, "#deviation-chart"), boxes(browser, ".charts")
+    assert chart[2] - chart[0] == charts[2] - charts[0]
+    assert browser.evaluate("document.documentElement.scrollWidth") <= size[0]
