@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path as FilePath
 
+import numpy as np
+
 from diagrams.scenario import Scenario
 from diagrams.station_parts import make_task
 from diagrams.tasks.path_following import PathTask
@@ -62,7 +64,9 @@ class Lap:
     @property
     def ends(self) -> tuple[float, float]:
         """Arc lengths where it begins and ends [m]."""
-        return self.plain.reference.points[0], self.plain.reference.points[-1]
+        motion = self.task.motion
+        begin, end = motion.derivatives(np.array(motion.domain), 0)[:, 0, 0].tolist()
+        return begin, end
 
     @property
     def begin(self) -> float:
