@@ -20,7 +20,8 @@ _LONGEST = 8192  # bytes of a message
 _MOST_READ, _HEARD_OUT = 1 << 20, 0.5  # bytes, s
 _PATIENCE = 10.0  # s, until a connection on which nothing comes is closed
 _POLL = 0.05  # s, in which it notices that it is to stop
-_PAGE = Path(__file__).with_name("page.html")
+_PAGE, _LOOK = (Path(__file__).with_name(f"page.{kind}") for kind in ("html", "css"))
+_STYLE = "<style></style>"
 # no other page may read the answers, show this page in a frame, or learn its address from it; it
 # loads nothing from anywhere but the scene
 _HEADERS = {
@@ -61,6 +62,8 @@ class PageServer:
     ) -> None:
         self._token = secrets.token_urlsafe(16)
         page = _PAGE.read_text(encoding="utf-8")
+        look = _LOOK.read_text(encoding="utf-8")
+        page = page.replace(_STYLE, f"<style>\n{look}</style>")
         documents = {
             "": lambda: ("text/html; charset=utf-8", page),
             "status": lambda: ("application/json", json.dumps(status(), allow_nan=False)),
