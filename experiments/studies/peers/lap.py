@@ -80,7 +80,8 @@ class Lap:
     @property
     def ends(self) -> tuple[float, float]:
         """Arc lengths where it begins and ends [m]."""
-        return self.plain.reference.points[0], self.plain.reference.points[-1]
+        points = self.plain.reference.arc_lengths(self.task.path.length)
+        return points[0], points[-1]
 
     @property
     def begin(self) -> float:
