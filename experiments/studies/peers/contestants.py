@@ -4,13 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from diagrams.robot_station import RobotStation
-from diagrams.robots.arm import Arm
-from experiments.studies.peers.lap import FOLDER, Lap
+from experiments.studies.peers.lap import FOLDER, Lap, start_posture
 from experiments.studies.peers.laws import CartesianImpedance, ImpedanceGains, JointServos
-from experiments.studies.peers.plan import JointPlan, fastest, joint_path
 from experiments.studies.peers.world import RobotMotion, under_law, under_own_law
 
 _BANDWIDTH = 40.0  # 1/s, of path following, tracking and servos alike
@@ -59,7 +55,7 @@ class Impedance:
 
         def make(station: RobotStation) -> CartesianImpedance:
             robot = station.part.belief.robot
-            return CartesianImpedance(robot, self.gains, lap.target, _start(station))
+            return CartesianImpedance(robot, self.gains, lap.target, start_posture(station))
 
         return under_law(lap.settings(disturbance), FOLDER, lap.duration, make)
 
@@ -80,32 +76,12 @@ class Servos:
         """Make a lap."""
 
         def make(station: RobotStation) -> JointServos:
-            plan = fastest_lap(lap, station)
-            if self.slowed:
-                plan = plan.lasting(lap.moving)
+            plan = lap.fastest.lasting(lap.moving) if self.slowed else lap.fastest
             samples = plan.sampled(lap.ticks, lap.period)
-            robot, q_0 = station.part.belief.robot, _start(station)
+            robot, q_0 = station.part.belief.robot, start_posture(station)
             return JointServos(robot, _BANDWIDTH, samples, q_0, lap.period, self.integral)
 
         return under_law(lap.settings(disturbance), FOLDER, lap.duration, make)
-
-
-def fastest_lap(lap: Lap, station: RobotStation) -> JointPlan:
-    """Return the fastest motion along the lap's path.
-
-    Args:
-        lap: The lap.
-        station: The robot.
-    """
-    assert isinstance(station.part, Arm)
-    joints = joint_path(station.part.robot, lap.task.path, *lap.ends, _start(station))
-    return fastest(station.part.model, joints, lap.begin, lap.plain.reference.reserve)
-
-
-def _start(station: RobotStation) -> np.ndarray:
-    """Return the joint coordinates at the start, shape (N,)."""
-    link_state: np.ndarray = station.part.coordinates.link_rows @ station.initial_state
-    return link_state[: station.part.robot.dimension]
 
 
 def _gains(integral: str = "") -> str:

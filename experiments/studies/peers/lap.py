@@ -6,11 +6,14 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from diagrams.robot_station import RobotStation, build_robot_station
+from diagrams.robots.arm import Arm
 from diagrams.scenario import Scenario
 from diagrams.station_parts import make_task
 from diagrams.tasks.path_following import PathTask
 from experiments.scenario_file import SCENARIO_DIRECTORY, read_scenario
 from experiments.studies.peers.laws import MovingPose, moving_pose
+from experiments.studies.peers.plan import JointPlan, fastest, joint_path
 from pfsc_drake.yaml.typed import load_typed
 
 SCENARIO = "pfc_panda_7r"
@@ -57,6 +60,19 @@ class Lap:
         return task
 
     @cached_property
+    def station(self) -> RobotStation:
+        """The robot, undisturbed, that nobody controls."""
+        return build_robot_station(self.plain, FOLDER)
+
+    @cached_property
+    def fastest(self) -> JointPlan:
+        """The fastest motion of the joints along the path, which knows the true robot."""
+        part = self.station.part
+        assert isinstance(part, Arm)
+        path = joint_path(part.robot, self.task.path, *self.ends, start_posture(self.station))
+        return fastest(part.model, path, self.begin, self.plain.reference.reserve)
+
+    @cached_property
     def target(self) -> MovingPose:
         """Pose that moves along the path as the reference does."""
         return moving_pose(self.task.path, self.task.motion, self.ticks, self.period)
@@ -64,9 +80,8 @@ class Lap:
     @property
     def ends(self) -> tuple[float, float]:
         """Arc lengths where it begins and ends [m]."""
-        motion = self.task.motion
-        begin, end = motion.derivatives(np.array(motion.domain), 0)[:, 0, 0].tolist()
-        return begin, end
+        points = self.plain.reference.arc_lengths(self.task.path.length)
+        return points[0], points[-1]
 
     @property
     def begin(self) -> float:
@@ -87,3 +102,13 @@ class Lap:
     def ticks(self) -> int:
         """Number of ticks."""
         return round(self.duration / self.period)
+
+
+def start_posture(station: RobotStation) -> np.ndarray:
+    """Return the joint coordinates of a robot at the start, shape (N,).
+
+    Args:
+        station: The robot.
+    """
+    link_state: np.ndarray = station.part.coordinates.link_rows @ station.initial_state
+    return link_state[: station.part.robot.dimension]

@@ -5,9 +5,8 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from diagrams.robot_station import build_robot_station
 from experiments.studies.peers.contestants import CONTESTANTS
-from experiments.studies.peers.lap import COMMON, FOLDER, SCENARIO, Lap
+from experiments.studies.peers.lap import COMMON, SCENARIO, Lap
 from experiments.studies.peers.picture import draw
 from experiments.studies.peers.score import Score, score
 from reporting.folder import open_results
@@ -89,7 +88,7 @@ def write_peers(
             :func:`reporting.folder.open_results`); nothing has been run then.
     """
     lap = Lap(duration)
-    robot = build_robot_station(lap.plain, FOLDER).part.robot
+    robot = lap.station.part.robot
     with open_results(out, "study") as results:
         found: dict[tuple[str, str], Score] = {}
         for disturbance, changes in disturbances.items():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from diagrams.robot_station import build_robot_station
-from experiments.studies.peers.lap import FOLDER, Lap
+from experiments.studies.peers.lap import FOLDER, Lap, start_posture
 from experiments.studies.peers.laws import (
     CartesianImpedance,
     ImpedanceGains,
@@ -26,12 +25,12 @@ def lap():
 
 @pytest.fixture(scope="module")
 def station(lap):
-    return build_robot_station(lap.plain, FOLDER)
+    return lap.station
 
 
 @pytest.fixture(scope="module")
 def q_0(station):
-    return (station.part.coordinates.link_rows @ station.initial_state)[:7]
+    return start_posture(station)
 
 
 @pytest.fixture(scope="module")

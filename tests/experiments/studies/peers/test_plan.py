@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from pydrake.multibody.tree import MultibodyForces
 
-from diagrams.robot_station import build_robot_station
-from experiments.studies.peers.contestants import fastest_lap
-from experiments.studies.peers.lap import FOLDER, Lap
+from experiments.studies.peers.lap import Lap
 from pfsc_drake.robot.robot_model import pose_function
 
 PERIOD = 1e-3
@@ -21,12 +19,12 @@ def lap():
 
 @pytest.fixture(scope="module")
 def station(lap):
-    return build_robot_station(lap.plain, FOLDER)
+    return lap.station
 
 
 @pytest.fixture(scope="module")
-def plan(lap, station):
-    return fastest_lap(lap, station)
+def plan(lap):
+    return lap.fastest
 
 
 @pytest.fixture(scope="module")

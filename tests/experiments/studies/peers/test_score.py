@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.robot_station import build_robot_station
-from experiments.studies.peers.contestants import fastest_lap
-from experiments.studies.peers.lap import FOLDER, Lap
+from experiments.studies.peers.lap import Lap
 from experiments.studies.peers.score import score
 from experiments.studies.peers.world import RobotMotion
 
@@ -17,19 +15,19 @@ def lap():
 
 @pytest.fixture(scope="module")
 def station(lap):
-    return build_robot_station(lap.plain, FOLDER)
+    return lap.station
 
 
 @pytest.fixture(scope="module")
-def motion(lap, station):
+def motion(lap):
     """The plan itself, every 10 ms."""
     time = np.arange(0.0, lap.duration, 0.01)
-    q = fastest_lap(lap, station).sampled(len(time), 0.01)[:, 0]
+    q = lap.fastest.sampled(len(time), 0.01)[:, 0]
     return RobotMotion(time, q, np.full((len(time), 7), -0.5), np.zeros((len(time), 3)))
 
 
 def test_a_motion_on_the_path(lap, station, motion):
-    plan = fastest_lap(lap, station)
+    plan = lap.fastest
     found = score(lap, station.part.robot, motion)
     assert found.largest < 2e-6
     assert found.turned < 1e-5
