@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "results.md"
 KEPT = ROOT / "out" / "results"
 BEGIN, END = "<!-- what make results writes begins -->", "<!-- and ends -->"
-# how far a tool is from where it should be: the first of them that a run has
+# how far a tool is from where it should be: the first of them that a run has a target for, or has
 DEVIATIONS = (
     "deepest_violation",
     "max_error_from_compliant_reference",
@@ -198,7 +198,10 @@ def _line(cells: Sequence[str]) -> str:
 def _cells(outcome: Outcome) -> list[str]:
     """Return what a run gave: deviation, its target, further ones, pace, status."""
     metrics = outcome.row.metrics
-    name = next((name for name in DEVIATIONS if name in metrics), None)
+    there = [name for name in DEVIATIONS if name in metrics]
+    name = next(
+        (name for name in there if metrics[name].passed is not None), next(iter(there), None)
+    )
     judged = {key: m for key, m in metrics.items() if m.passed is not None and key != name}
     others = [f"`{key}` {_value(m)} ({_bound(m)})" for key, m in judged.items()]
     pace = _rounded(outcome.pace, "s") if "real_time_factor" in metrics else ""
