@@ -16,7 +16,7 @@ SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools and $(BIN)/pfsc"
 	@echo "make demo       run the six-axis elastic path following demo into $(DEMO_OUT)"
-	@echo "make test       linters, types and the tests, but the dozen that take longest"
+	@echo "make test       linters, types and the tests, but those that take longest"
 	@echo "make test-all   the same with these; as continuous integration runs it"
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"

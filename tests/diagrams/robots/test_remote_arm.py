@@ -1,10 +1,10 @@
 """What a controller of a robot elsewhere is told, and that it is a network like any other."""
 
 import pytest
-from diagrams.scenario.driven import driven
 
 from diagrams.builder import build_station
 from diagrams.controller_part import controller_part
+from diagrams.scenario.schema import driven
 from experiments.scenario_file import find_scenario
 from tests.scenarios import shipped_scenario
 
