@@ -37,5 +37,6 @@ def test_what_a_controller_is_told(settings, told):
     settings.simulation.fused = False
     station = build_station(settings, folder, remote=True)
     part = controller_part(station)
-    assert {name: port.size for name, port in part.network.inputs.items()} == told
+    found = {name: port.size for name, port in part.network.inputs.items()}
+    assert found == told | {"override": 1}
     assert part.inputs["joint_state"].get_system() is station.part.measured
