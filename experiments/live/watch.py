@@ -1,6 +1,5 @@
 """Looking on while another process drives a robot, and asking its controller for another pace."""
 
-import math
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -184,7 +183,7 @@ class Watch:
             (Kind.ROTATIONAL, "angles"),
         ):
             names = [coordinate.name for coordinate in self._names[indices(self._names, kind)]]
-            setattr(status, kept, {name: told.get(name, math.nan) for name in names})
+            setattr(status, kept, {name: told[name] for name in names if name in told})
         status.controls = self._panel.content(status.override)
 
 
