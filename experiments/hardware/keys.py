@@ -8,7 +8,7 @@ import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
+from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Pause, Request
 
 KEYS = "space pauses and goes on, - and + change the speed, q stops the robot"
 _STEP, _LEAST = 0.1, 0.1
@@ -23,7 +23,7 @@ class DriveKeys:
     """
 
     def __init__(self) -> None:
-        self._before = 1.0
+        self._pause = Pause()
 
     def requests(self, keys: str, override: float) -> list[Request]:
         """Return what keys ask for.
@@ -37,10 +37,8 @@ class DriveKeys:
             if key == "q":
                 asked.append(Request(stop=True))
                 continue
-            if key == " " and override > 0.0:
-                self._before, override = override, 0.0
-            elif key == " ":
-                override = self._before
+            if key == " ":
+                override = self._pause.toggled(override)
             elif key in "+-":
                 step = _STEP if key == "+" else -_STEP
                 override = min(max(round(override + step, 6), _LEAST), LARGEST_OVERRIDE)

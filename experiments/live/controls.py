@@ -45,6 +45,24 @@ class Slider:
     value: float
     keys: tuple[str, str] = ("", "")
 
+    def content(self, value: float, *, rigid_top: bool = False) -> dict[str, object]:
+        """Return it for JSON.
+
+        Args:
+            value: Where it is now.
+            rigid_top: Whether its highest value stands for what is rigid.
+        """
+        return {
+            "name": self.name,
+            "group": self.group,
+            "low": self.low,
+            "high": self.high,
+            "step": self.step,
+            "keys": self.keys,
+            "rigid_top": rigid_top,
+            "value": value,
+        }
+
     def nearest(self, value: float) -> float:
         """Return the value that it can have next to one that is asked for."""
         inside = min(max(value, self.low), self.high)

@@ -123,16 +123,7 @@ class Panel:
         """
         rigid = {p.slider.name for p in self._tuned if p.top_is_rigid}
         sliders = [
-            {
-                "name": slider.name,
-                "group": slider.group,
-                "low": slider.low,
-                "high": slider.high,
-                "step": slider.step,
-                "keys": slider.keys,
-                "rigid_top": slider.name in rigid,
-                "value": self._value(slider.name),
-            }
+            slider.content(self._value(slider.name), rigid_top=slider.name in rigid)
             for slider in self._sliders.values()
         ]
         pushes = {name: key for name, (_, _, key) in self._pushes.items()}

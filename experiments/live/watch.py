@@ -23,7 +23,7 @@ from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.drivers.link import WatchingEnd
 from pfsc_drake.drivers.messages import RobotStatus
-from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
+from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Pause, Request
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.yaml.typed import load_typed
@@ -50,7 +50,7 @@ class WatchPanel:
     """
 
     def __init__(self, pages: Pages) -> None:
-        self._pages, self._before, self.has_left = pages, 1.0, False
+        self._pages, self._pause, self.has_left = pages, Pause(), False
         pages.expect([], [_OVERRIDE.name, *_KEYS])
 
     def requests(self, override: float) -> list[Request]:
@@ -65,10 +65,7 @@ class WatchPanel:
                 override = _OVERRIDE.nearest(value)
                 asked.append(Request(override))
             elif name == _PAUSE:
-                if override > 0.0:
-                    self._before, override = override, 0.0
-                else:
-                    override = self._before
+                override = self._pause.toggled(override)
                 asked.append(Request(override))
             elif name == _STOP:
                 asked.append(Request(stop=True))
@@ -82,16 +79,7 @@ class WatchPanel:
         Args:
             override: Share of the planned pace that the controller has now.
         """
-        slider = {
-            "name": _OVERRIDE.name,
-            "group": _OVERRIDE.group,
-            "low": _OVERRIDE.low,
-            "high": _OVERRIDE.high,
-            "step": _OVERRIDE.step,
-            "keys": _OVERRIDE.keys,
-            "rigid_top": False,
-            "value": override,
-        }
+        slider = _OVERRIDE.content(override)
         return {
             "sliders": [slider],
             "buttons": _KEYS,

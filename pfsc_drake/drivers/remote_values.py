@@ -72,3 +72,21 @@ class Request:
             finite = override if math.isfinite(override) else 0.0
             override = min(max(finite, 0.0), LARGEST_OVERRIDE)
         return cls(override, values.get(_STOP, 0.0) != 0.0)
+
+
+class Pause:
+    """Pauses, and goes on at the pace before."""
+
+    def __init__(self) -> None:
+        self._before = 1.0
+
+    def toggled(self, override: float) -> float:
+        """Return the share of the planned pace that is asked for next.
+
+        Args:
+            override: The share that is asked for so far.
+        """
+        if override > 0.0:
+            self._before = override
+            return 0.0
+        return self._before
