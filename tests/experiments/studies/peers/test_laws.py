@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.studies.peers.lap import FOLDER, Lap, start_posture
+from experiments.studies.peers.lap import FOLDER, start_posture
 from experiments.studies.peers.laws import (
     CartesianImpedance,
     ImpedanceGains,
@@ -16,16 +16,6 @@ from experiments.studies.peers.world import under_law
 from pfsc_drake.robot.robot_model import pose_function
 
 FORCE = np.array([5.0, -8.0, 12.0])  # N
-
-
-@pytest.fixture(scope="module")
-def lap():
-    return Lap(duration=0.1)
-
-
-@pytest.fixture(scope="module")
-def station(lap):
-    return lap.station
 
 
 @pytest.fixture(scope="module")

@@ -4,22 +4,11 @@ import numpy as np
 import pytest
 from pydrake.multibody.tree import MultibodyForces
 
-from experiments.studies.peers.lap import Lap
 from pfsc_drake.robot.robot_model import pose_function
 
 PERIOD = 1e-3
 SHARE = 0.7  # of every limit
 MARGIN = 1.03  # limits hold at Toppra's grid points, a little more comes between
-
-
-@pytest.fixture(scope="module")
-def lap():
-    return Lap(duration=0.1)
-
-
-@pytest.fixture(scope="module")
-def station(lap):
-    return lap.station
 
 
 @pytest.fixture(scope="module")
