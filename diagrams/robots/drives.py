@@ -335,8 +335,7 @@ def _given_coefficients(
     parameters: JointFrictionParameters, chain: RobotModel, folder: FilePath, block: str
 ) -> tuple[np.ndarray, np.ndarray]:
     n = chain.dimension
-    if parameters.file:
-        file = parameters.file
+    if file := parameters.file:
         known = load_parameters(folder / file if FilePath(file).suffix else file).friction
         count = known.coulomb.size
         if count < n:
