@@ -185,7 +185,8 @@ def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
         promise: Numbers that the rules were given.
 
     Returns:
-        ``audit_stationarity`` [m/s]: of ``(m + T d)(v+ - v*) = T sum phi n``;
+        ``audit_stationarity`` [m/s]: of ``(m + T d) v+ = m v + T f + T sum phi n``, d being what
+        limits the speed where it was limited;
         ``audit_allowance`` [m/s]: of ``n v+ >= u - beta``, and of equality where phi > 0;
         ``audit_energy`` [J]: gained beyond the inequality of a tick; ``audit_tank`` [J]: beside the
         tank's law; ``audit_bound`` [J]: how far the hand's work stays above its bound, negative if
@@ -204,9 +205,14 @@ def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
     if promise.damping is not None:
         d = np.full(count, promise.damping)
     limit = np.minimum(log["speed_limit"].values[:count, 0], promise.largest_speed)
-    inertia = (promise.mass + T * d)[:, None]
-    free = (promise.mass * before + T * f) / inertia
-    metrics.add("audit_stationarity", _stationarity(v, free, limit, slots, T / inertia))
+    momentum = promise.mass * before + T * f
+    # a limit of speed is damping
+    slowed = np.linalg.norm(momentum, axis=1) / np.maximum(limit, 1e-6)
+    inertia = np.maximum(promise.mass + T * d, slowed)
+    d = (inertia - promise.mass) / T
+    held = T * np.sum((slots.used * slots.phi)[..., None] * slots.n, axis=1)
+    missed = v - (momentum + held) / inertia[:, None]
+    metrics.add("audit_stationarity", float(np.max(np.linalg.norm(missed, axis=1))))
     metrics.add("audit_allowance", _allowance(v, slots))
     work = T * np.sum(f * v, axis=1)
     lost = T * d * np.sum(v * v, axis=1)
@@ -236,15 +242,6 @@ def _read(values: FloatArray) -> _Slots:
         slots[..., 0], slots[..., 1], slots[..., 2:5], *(slots[..., k] for k in range(5, 10))
     )  # fmt: skip
     return _Slots(index >= 0, index.astype(int), n, u, beta, phi, stiffness, depth)
-
-
-def _stationarity(
-    v: FloatArray, free: FloatArray, limit: FloatArray, slots: _Slots, mobility: FloatArray
-) -> float:
-    size = np.linalg.norm(free, axis=1)
-    wanted = free * np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
-    held = mobility * np.sum((slots.used * slots.phi)[..., None] * slots.n, axis=1)
-    return float(np.max(np.linalg.norm(v - wanted - held, axis=1)))
 
 
 def _allowance(v: FloatArray, slots: _Slots) -> float:

@@ -67,10 +67,11 @@ class ImpedanceTuner(Block):
     whoever holds the tool: 62 mJ for 5 kN/m at 5 mm, again and again if it is softened at
     depth and stiffened there. So every rise is paid from a tank
 
-        ``x+ = min(x_max, x + T sum d_i min(e_i'^2, last e_i'^2)) - sum max(dk_i, 0) e_i^2 / 2``
+        ``x+ = min(x_max, x + T sum d_i s_i) - sum max(dk_i, 0) e_i^2 / 2``
 
-    with ``x >= 0``, which holds what the dampers have certainly dissipated over an interval in
-    which the rate did not change its sign of growth. What the tank cannot pay, does not rise; on
+    with ``x >= 0``. ``s_i = min(e_i'^2, last e_i'^2)``, and zero where ``e_i'`` changed its sign,
+    is what the dampers have certainly dissipated in a tick in which ``e_i'`` only rose, or only
+    fell. What the tank cannot pay, does not rise; on
     the manifold, e = 0, everything rises freely. Then for every motion of the hand
 
         ``integral of tau e' dt >= (m e'^2 + k e^2) / 2 - (the same at the start) - x_0``.
@@ -174,7 +175,8 @@ class ImpedanceTuner(Block):
 
         was_soft, shall_be_soft = last_stiffness < ca.inf, requested_stiffness < ca.inf
         share = -math.expm1(-T / parameters.ramp) if parameters.ramp > 0.0 else 1.0
-        spent = last_damping * ca.fmin(rate**2, x.rate**2)
+        goes_on = rate * x.rate > 0.0
+        spent = where(goes_on, last_damping * ca.fmin(rate**2, x.rate**2), 0.0)
         filled = x.tank + T * ca.sum1(where(was_soft, spent, 0.0))
         tank = ca.fmin(filled, parameters.capacity)
 

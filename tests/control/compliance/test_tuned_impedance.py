@@ -120,6 +120,18 @@ def test_any_motion_is_passive():
                 assert bench.tank >= 0.0
 
 
+def test_what_is_credited_was_dissipated_also_where_a_hand_reverses():
+    """Within a tick the rate may go through zero, and a damper then takes less than at its ends."""
+    bench = Bench(reserve=0.0)
+    bench.tune(np.zeros((2, 3)))
+    credited = []
+    for rate in (0.1, 0.08, -0.08, -0.1, 0.1):
+        before = bench.tank
+        bench.tune([[0.0, 0.0, 0.0], [0.0, rate, 0.0]])
+        credited.append((bench.tank - before) / (PERIOD * 30.0))
+    np.testing.assert_allclose(credited, [0.0, 0.08**2, 0.0, 0.08**2, 0.0], atol=1e-12)
+
+
 def test_on_the_manifold_a_wish_is_followed_with_its_time_constant():
     bench = Bench(ramp=0.1, reserve=0.0)
     bench.request[REQUEST["across"]] = [5000.0, 150.0]

@@ -92,6 +92,19 @@ def test_what_is_kept_passes(rows):
     assert np.abs(slots[..., SLOT.index("u")]).max() > 0.01
 
 
+def test_a_limit_of_speed_gives_the_hand_no_energy():
+    """A hand leans on a floor that rises faster than the tool may move."""
+    parameters = GuidanceParameters(largest_speed=1e-3)
+    guidance = program(REGIONS, [math.inf, 2e3, math.inf], parameters=parameters)
+    record = lead(guidance, (0.03, 0, 1e-3), lambda t, y: np.array([0.0, 0.0, -45.0]), 0.5)
+    rows = np.array(record.y), np.array([s.record for s in record.steps]), guidance.layout
+    found = worst(make_log(rows), replace(PROMISE, largest_speed=1e-3))
+    assert record.y[-1][2] > record.y[0][2] + 2e-3
+    for name in ("stationarity", "energy", "tank"):
+        assert found[f"audit_{name}"] < 1e-9
+    assert found["audit_bound"] > 0.0
+
+
 def tamper_velocity(log):
     log["velocity_command"].values[500] += [0.0, 0.0, 1e-3]
 
