@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import casadi as ca
 
+from pfsc_drake.blocks.dependencies import Dependencies
 from pfsc_drake.blocks.network import TICK, Network, Node, Source
-from pfsc_drake.blocks.stage import Needs, Stage, call_named, ends_of, names_of, ordered, slices_of
+from pfsc_drake.blocks.stage import Stage, call_named, ends_of, names_of, ordered, slices_of
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 
@@ -44,15 +45,12 @@ class Program:
         sizes = dict(sorted(network.states.items(), key=lambda item: item[0] in shown))
         self.states = slices_of(sizes)
         self.size = sum(sizes.values())
-        self._maker = {name: node for node in network.nodes for name in node.results}
-        self._starter = {name: node for node in network.initials for name in node.results}
         self._x, self._t = ca.MX.sym("x", self.size), ca.MX.sym("t")
         self._u = {name: ca.MX.sym(name, port.size) for name, port in network.inputs.items()}
         values = ca.vertsplit(self._x, ends_of(sizes)) if self.size else []
         self._states = dict(zip(self.states, values, strict=True))
-        self._needs: dict[tuple[str, bool], Needs] = {}
-        order = ordered(network.nodes)
-        self.stages, self._stage_of = self._stages(self._grouped(order, like))
+        self._dependencies = Dependencies(network)
+        self.stages, self._stage_of = self._stages(self._groups())
         self._made = [
             ca.MX.sym(f"stage_{k}", stage.function.numel_out(0))
             for k, stage in enumerate(self.stages)
@@ -156,7 +154,7 @@ class Program:
             stage = self.stages[k]
             needs = {False: stage.needs, True: stage.needs_at_start}
             fits = all(
-                self._source_needs(source, at_start=begin) <= needs[begin]
+                self._dependencies.of_source(source, at_start=begin) <= needs[begin]
                 for begin in needs
                 for node in nodes
                 for source in node.sources
@@ -165,48 +163,13 @@ class Program:
                 return k
         return None
 
-    def _grouped(self, order: list[Node], like: "Program | None") -> list[list[Node]]:
-        """Return nodes by what they need, those that need less before."""
-        if like is not None:
-            numbers = range(len(like.stages))
-            return [[n for n in order if like._stage_of[n.results[0]] == k] for k in numbers]
-        places = self._places(order)
-        groups: dict[tuple[Needs, Needs], list[Node]] = {}
-        for node in order:
-            groups.setdefault(places[node.results[0]], []).append(node)
-        # what a node takes from another needs no more than itself
-        return [groups[key] for key in sorted(groups, key=lambda key: (len(key[0]), len(key[1])))]
-
-    def _places(self, order: list[Node]) -> dict[str, tuple[Needs, Needs]]:
-        """Return what each node's stage needs, now and at the start, by the node's first result.
-
-        What is put out at the border waits for nothing that it does not need. Everything else is
-        evaluated as late as those that take it, so that there are few stages.
-        """
-        shown = self.network.shown
-        border = {wire for port, wire in self.network.outputs.items() if port not in shown}
-        takers: dict[str, list[tuple[Needs, Needs]]] = {}
-        places: dict[str, tuple[Needs, Needs]] = {}
-        last: list[tuple[Needs, Needs]] = []
-        for node in reversed(order):
-            own = self._needs_of(node, at_start=False), self._needs_of(node, at_start=True)
-            later = [place for name in node.results for place in takers.get(name, ())]
-            if border.intersection(node.results):
-                place = own
-                last.append(own)
-            elif later:
-                place = (
-                    frozenset.intersection(*(needs for needs, _ in later)),
-                    frozenset.intersection(*(at_start for _, at_start in later)),
-                )
-            else:  # only what is remembered depends on it
-                above = [p for p in last if own[0] <= p[0] and own[1] <= p[1]]
-                place = max(above, key=lambda p: (len(p[0]), len(p[1])), default=own)
-            places[node.results[0]] = place
-            for source in node.sources:
-                if source.kind == "wire":
-                    takers.setdefault(source.name, []).append(place)
-        return places
+    def _groups(self) -> list[list[Node]]:
+        """Return the nodes of each stage."""
+        order = ordered(self.network.nodes)
+        if self._like is None:
+            return self._dependencies.groups(order)
+        stage_of, numbers = self._like._stage_of, range(len(self._like.stages))
+        return [[node for node in order if stage_of[node.results[0]] == k] for k in numbers]
 
     def _stages(self, groups: list[list[Node]]) -> tuple[list[Stage], dict[str, int]]:
         """Return the stages of groups of nodes, and the stage of each wire."""
@@ -236,7 +199,7 @@ class Program:
                 ["result"],
             )
             needs, at_start = (
-                frozenset().union(*(self._needs_of(node, at_start=begin) for node in nodes))
+                frozenset().union(*(self._dependencies.of(node, at_start=begin) for node in nodes))
                 for begin in (False, True)
             )
             parts = slices_of({name: self.network.wires[name] for name in inside})
@@ -255,34 +218,6 @@ class Program:
         if source.kind == "parameter":  # which has no value in a simulation
             return ca.MX.nan(len(source.name.split()))
         return self._t if source == TICK else wires[source.name]
-
-    def _needs_of(self, node: Node, *, at_start: bool) -> Needs:
-        """Return the inputs that a node depends on, by way of wires and, at start, of states."""
-        key = node.results[0], at_start
-        if key not in self._needs:
-            needs = (self._source_needs(source, at_start=at_start) for source in node.sources)
-            self._needs[key] = frozenset().union(*needs)
-        return self._needs[key]
-
-    def _source_needs(self, source: Source, *, at_start: bool) -> Needs:
-        if source.kind == "wire":
-            return self._needs_of(self._maker[source.name], at_start=at_start)
-        if source.kind == "parameter":
-            return frozenset()
-        if source.kind != "state":
-            return frozenset({source})
-        if at_start and source.name in self._starter:
-            return self._needs_at_start(self._starter[source.name])
-        return frozenset()
-
-    def _needs_at_start(self, node: Node) -> Needs:
-        needs: set[Source] = set()
-        for source in node.sources:
-            if source.kind == "wire":
-                needs |= self._needs_of(self._maker[source.name], at_start=True)
-            elif source.kind != "parameter":
-                needs.add(source)
-        return frozenset(needs)
 
     def _make_update(self) -> None:
         nodes = self.network.updates
@@ -339,14 +274,14 @@ def _initial_function(program: Program) -> tuple[ca.Function, tuple[str, ...]]:
                     f"{name}: depends on itself at the start, through {', '.join(on_the_way)}"
                 )
             on_the_way.add(name)
-            node = program._maker[name]
+            node = program._dependencies.maker[name]
             wires.update(zip(node.results, evaluated(node), strict=True))
             on_the_way.discard(name)
         return wires[name]
 
     def start_of(name: str) -> ca.MX:
         if name not in begun:
-            node = program._starter.get(name)
+            node = program._dependencies.starter.get(name)
             size = program.network.states[name]
             if node is None:
                 found = {name: ca.MX(ca.DM.zeros(size))}
