@@ -1,7 +1,7 @@
 """The log of one run: named signals over time, kept in one HDF5 file."""
 
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -52,7 +52,8 @@ class Signal:
 class RunLog:
     """All signals of one run on one time axis.
 
-    ``log["xi"]`` is the signal ``xi``; ``"xi" in log`` tells whether the run had it.
+    ``log["xi"]`` is the signal ``xi``; ``"xi" in log`` tells whether the run had it; ``for name in
+    log`` goes through all names.
 
     Attributes:
         time: [samples] s.
@@ -82,6 +83,12 @@ class RunLog:
 
     def __contains__(self, name: object) -> bool:
         return name in self.signals
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.signals)
+
+    def __len__(self) -> int:
+        return len(self.signals)
 
     def add(
         self,

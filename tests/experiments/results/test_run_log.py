@@ -44,7 +44,8 @@ def test_round_trip(tmp_path):
     back = RunLog.read(tmp_path / "log.h5")
     np.testing.assert_array_equal(back.time, log.time)
     assert back.attributes == log.attributes
-    assert set(back.signals) == set(log.signals)
+    assert set(back) == set(log) == set(log.signals)
+    assert len(back) == len(log)
     for name, signal in log.signals.items():
         np.testing.assert_array_equal(back[name].values, signal.values)
         assert (back[name].unit, back[name].labels) == (signal.unit, signal.labels)
