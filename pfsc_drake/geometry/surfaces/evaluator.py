@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.evaluator import ManifoldEvaluator, alpha_function
 from pfsc_drake.geometry.foot import Foot, FootFinder
@@ -14,7 +15,7 @@ from pfsc_drake.geometry.nearest import ProjectionStatus, nearest_samples
 from pfsc_drake.geometry.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
 from pfsc_drake.geometry.surfaces.length import TangentialLength
-from pfsc_drake.geometry.surfaces.product import checked_product
+from pfsc_drake.geometry.surfaces.product import ProductSurface, checked_product
 from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, GlobalProjector, SurfaceProjection
 from pfsc_drake.geometry.surfaces.surface import Surface, partial_count
 
@@ -26,6 +27,12 @@ _NOT_NEARER = 1e-9
 _MOST_SAMPLES = 24
 # Of the domain: samples that are nearer to each other lead to one place.
 _VALLEY = 1.0 / 8.0
+
+
+@once_per_content()
+def _whole(surface: ProductSurface, smoothness: int) -> ExtendedSurface:
+    """Return a surface and what it goes on to beyond its ends."""
+    return ExtendedSurface(surface, smoothness)
 
 
 class SurfaceEvaluator(ManifoldEvaluator[SurfacePointLayout]):
@@ -63,7 +70,7 @@ class SurfaceEvaluator(ManifoldEvaluator[SurfacePointLayout]):
         if orientation is not None:
             self._quaternion[:4] = _checked_quaternion(orientation)
         self._global = GlobalProjector(surface)
-        whole = ExtendedSurface(checked_product(surface), order + 1)
+        whole = _whole(checked_product(surface), order + 1)
         self._table = SurfaceTable(whole)
         self._finder = FootFinder(self._terms, whole.domain, whole.closed, LONGEST_STEP)
         self._lengths = np.array([ends.length for ends in surface.domain])

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
 from pfsc_drake.geometry.surfaces.surface import Surface
@@ -30,11 +31,22 @@ def check_single_sheet(surface: Surface) -> None:
     Raises:
         InputError: It meets itself; says at which parameters.
     """
+    found = _meeting(surface)
+    if found is not None:
+        raise InputError(
+            f"surface: meets itself at theta = {_pair(found[0])} and {_pair(found[1])}; must be a "
+            "single sheet, so take a part of it"
+        )
+
+
+@once_per_content()
+def _meeting(surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the parameters at which a surface meets itself, None where it does not."""
     grid = sample_grid(surface)
     strides = [-(-len(values) // _MOST_SAMPLES) for values in (grid.theta_1, grid.theta_2)]
     one, other, steps = _suspects(grid, strides)
     if not len(one):
-        return
+        return None
     lengths = np.array([ends.length for ends in surface.domain])
     begin = np.array([ends.begin for ends in surface.domain])
     closed = np.array(surface.closed)
@@ -56,12 +68,7 @@ def check_single_sheet(surface: Surface) -> None:
     apart = np.abs(one - other) / lengths
     apart = np.where(closed, np.abs(apart - np.round(apart)), apart) / steps
     meets = np.flatnonzero((gap < _SAME * extent) & (apart.max(axis=1) > _APART))
-    if len(meets):
-        first, second = one[meets[0]], other[meets[0]]
-        raise InputError(
-            f"surface: meets itself at theta = {_pair(first)} and {_pair(second)}; must be a single"
-            " sheet, so take a part of it"
-        )
+    return (one[meets[0]], other[meets[0]]) if len(meets) else None
 
 
 def _suspects(grid: SampleGrid, strides: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
