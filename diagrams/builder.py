@@ -4,13 +4,13 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path as FilePath
 
-import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.drawing.mounting_look import mounting_look
 from diagrams.drawing.replay import RecordedMotion, build_delta_replay, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
+from diagrams.holder_station import add_holder, stop_both
 from diagrams.robots.arm import Arm
 from diagrams.robots.delta import DeltaPart
 from diagrams.robots.drives import (
@@ -20,14 +20,14 @@ from diagrams.robots.drives import (
 )
 from diagrams.robots.force_sensor import add_sensor
 from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
-from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import RemoteArm
-from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
+from diagrams.scenario.checks import require
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.station_parts import (
     add_robot,
+    check_holder,
     choose_mounting,
     following_options,
     friction_options,
@@ -37,18 +37,16 @@ from diagrams.station_parts import (
     outside,
     servo_options,
 )
+from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.forces import add_surroundings
-from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
-from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.held_frame import law_manifold
 from diagrams.warnings.law_warnings import MODES
-from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
-from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_sensors import EncoderOptions
@@ -89,6 +87,11 @@ def build_station(
         InputError: If the scenario cannot be built.
     """
     builder = DiagramBuilder()
+    if scenario.holder is not None:
+        alone = remote or parametric or with_slope
+        allowed = "null where margins are told, or a robot is driven elsewhere"
+        require(not alone, "holder", "given", allowed)
+        check_holder(scenario)
     task = make_task(scenario, folder, progress) if like is None else like.task
     workpiece, mounting = make_workpiece(scenario, task), choose_mounting(scenario, task)
     spring = make_spring(scenario, workpiece) if with_slope else None
@@ -99,15 +102,20 @@ def build_station(
         part = replace(part, belief=part.belief.with_symbols())
     task.require_joints(part.robot.dimension)
     believed = part.belief.robot
+    holder = held = carrier = None
+    if scenario.holder is not None:
+        order, built = task.manifold.layout.order, None if like is None else like.holder
+        holder, carrier = add_holder(builder, scenario, order, folder, progress, built)
+        held = holder.frame
     begin = cache(
         lambda: (
-            find_start(scenario, task, part, workpiece, mounting)
+            find_start(scenario.start, task, part, workpiece, mounting, held)
             if like is None
             else (like.start, like.initial_state)
         )
     )
-    rest = cache(lambda: find_rest(task, part, *begin()))
-    law = make_law(scenario.controller, believed, task.manifold, rest, scenario.faults)
+    rest = cache(lambda: find_rest(task, part, *begin(), held))
+    law = make_law(scenario.controller, believed, law_manifold(task, held), rest, scenario.faults)
     start, initial_state = begin()
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
     rubbing = friction_options(scenario, folder)
@@ -115,12 +123,13 @@ def build_station(
     link_state = part.coordinates.link_rows @ initial_state
     start_posture = link_state[: part.robot.dimension]
     following = Following(
-        following_options(scenario), believed, task, law, start_posture, on_motors, friction
+        following_options(scenario), believed, task, law, start_posture, on_motors, friction, held
     )
-    begun = CourseStart(rest().q_J, start.place)
-    keep_drive_limits(
-        scenario.reference, scenario.controller, scenario.duration, task, law, begun, friction
-    )
+    if held is None:
+        begun = CourseStart(rest().q_J, start.place)
+        keep_drive_limits(
+            scenario.reference, scenario.controller, scenario.duration, task, law, begun, friction
+        )
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation
@@ -190,6 +199,9 @@ def build_station(
     signals |= add_friction(builder, part, true_state, rubbing, faults)
     known = joint_state if remote else true_state
     signals |= states_to_log(known, place.signals["joint_state"])
+    if holder is not None and carrier is not None:
+        stop_both(builder, controller, carrier)
+        signals |= holder.signals
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)
@@ -205,6 +217,7 @@ def build_station(
             + planned
             + part.start_warnings(scenario.start, start_posture, start.target)
             + controller_warnings(scenario, task, part, law, link_state, rest())
+            + ([] if holder is None else holder.warnings)
         )
 
     diagram = builder.Build()
@@ -228,69 +241,8 @@ def build_station(
         MODES if "mode" in signals else (),
         mounting,
         0 if remote else scenario.driver.ticks(period),
+        holder,
     )
-
-
-def find_start(
-    scenario: Scenario,
-    task: Task,
-    part: RobotPart,
-    workpiece: Workpiece | None,
-    mounting: Mounting | None,
-) -> tuple[StartPoint, np.ndarray]:
-    """Return where the tool starts, and the state of the plant there, at rest.
-
-    Args:
-        scenario: The scenario.
-        task: What the tool is to do.
-        part: The robot.
-        workpiece: What the tool touches, if anything.
-        mounting: Where plates come from and go, if there are any.
-
-    Raises:
-        InputError: If the start or the way from there is known to be out of reach.
-    """
-    shift = np.zeros(3)
-    if workpiece is not None:
-        shift = workpiece.start_shift(part.gravity)
-    start = task.start(shift)
-    if workpiece is not None:
-        workpiece.check_start(start.target.y_t)
-    if mounting is not None:
-        start = mounting.start(start, task)
-    q_J = _posture(scenario, task, part, start)
-    for position, where in task.way():
-        part.check_reach(position, where)
-    return start, part.state_at_rest(q_J)
-
-
-def _posture(scenario: Scenario, task: Task, part: RobotPart, start: StartPoint) -> np.ndarray:
-    """Return the joints at the start, shape (N,); say it if only the inverted one is in reach."""
-    try:
-        return part.posture(start.target, scenario.start)
-    except InputError as error:
-        inverted = task.inverted(start)
-        if inverted is None:
-            raise
-        target, advice = inverted
-        try:
-            part.posture(target, scenario.start)
-        except InputError:
-            raise error from None
-        raise InputError(f"{error}; {advice}") from None
-
-
-def find_rest(task: Task, part: RobotPart, start: StartPoint, state: np.ndarray) -> RestPosture:
-    """Return where the robot starts, as the law sees it.
-
-    Args:
-        task: What the tool is to do.
-        part: The robot.
-        start: Where the tool starts.
-        state: State of the robot's model there.
-    """
-    q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
-    return RestPosture(q_J, task.point(start))
 
 
 def draw_station(settings: Scenario, folder: FilePath, station: Station) -> RobotDrawing | None:

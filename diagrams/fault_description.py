@@ -28,6 +28,19 @@ _NEARLY = 0.1
 
 
 @dataclass(frozen=True)
+class FoundFault:
+    """Why a station stopped.
+
+    Attributes:
+        sentence: What, and where.
+        time: Since when [s].
+    """
+
+    sentence: str
+    time: float
+
+
+@dataclass(frozen=True)
 class FaultInstant:
     """What a station's log knows of one instant.
 

@@ -8,7 +8,6 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
-from diagrams.builder import find_rest, find_start
 from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.force_sensor import add_force_sensor
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor
@@ -25,6 +24,7 @@ from diagrams.station_parts import (
     outside,
     servo_options,
 )
+from diagrams.station_start import find_rest, find_start
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.tasks.following import Following, add_place
 from pfsc_drake.drivers.messages import ControlMode
@@ -150,7 +150,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     part = add_robot(builder, scenario, folder, workpiece)
     n = part.robot.dimension
     task.require_joints(n)
-    start, initial_state = find_start(scenario, task, part, workpiece, None)
+    start, initial_state = find_start(scenario.start, task, part, workpiece)
     law = make_law(
         scenario.controller,
         part.belief.robot,

@@ -27,6 +27,16 @@ class SignalLog:
     rows: dict[str, slice]
     delay: float = 0.0
 
+    def of(self, prefix: str) -> "SignalLog":
+        """Return the signals whose names begin with a prefix, by what follows it.
+
+        Args:
+            prefix: The prefix.
+        """
+        chosen = [name for name in self.rows if name.startswith(prefix)]
+        rows = {name.removeprefix(prefix): self.rows[name] for name in chosen}
+        return SignalLog(self.sink, rows, self.delay)
+
     def read(self, root: Context) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Return the times [s], shape (samples,), and the signals, each (samples, size).
 

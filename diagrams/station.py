@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
-from diagrams.fault_description import FaultScene, describe, first_instant
+from diagrams.fault_description import FaultScene, FoundFault, describe, first_instant
+from diagrams.holder_station import Holder
 from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import FurtherLength, Workpiece
 from diagrams.signal_log import SignalLog
@@ -22,19 +23,6 @@ from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import BlockAccess
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess
-
-
-@dataclass(frozen=True)
-class FoundFault:
-    """Why a station stopped.
-
-    Attributes:
-        sentence: What, and where.
-        time: Since when [s].
-    """
-
-    sentence: str
-    time: float
 
 
 @dataclass
@@ -65,6 +53,7 @@ class Station:
         mode_labels: What the values of a logged signal ``mode`` are called, if there is one.
         mounting: Where plates come from and go, if there are any.
         ticks_late: After how many ticks torques act that are told.
+        holder: The robot that holds the workpiece which the path is on, if one does.
     """
 
     diagram: Diagram
@@ -85,6 +74,7 @@ class Station:
     mode_labels: Sequence[str] = ()
     mounting: Mounting | None = None
     ticks_late: int = 0
+    holder: Holder | None = None
 
     @property
     def robot(self) -> RobotModel:
@@ -136,6 +126,8 @@ class Station:
         if late or self.part.drives.step is not None:
             weight = gravity_function(self.part.robot)(self.start_posture).full().ravel()
             self.blocks.set_state(root, "hold.held", np.tile(weight, 1 + late))
+        if self.holder is not None:
+            self.holder.set_start(self.blocks, root)
         self.set_place(root, self.initial_place)
 
     def set_place(self, root: Context, place: np.ndarray) -> None:
@@ -176,6 +168,8 @@ class Station:
             root: Context of the diagram.
         """
         fault = self.controller.fault(self.blocks, root)
+        if fault is Fault.STOP_REQUESTED and self.holder is not None:
+            return self.holder.found_fault(self.log, self.blocks, root)
         if fault is not Fault.NONE:
             suspects = self.controller.suspects(self.blocks, root)
             return self._describe(fault, root, "law", self.law.layout.status.start, suspects)

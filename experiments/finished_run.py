@@ -27,6 +27,7 @@ from experiments.results.drives import (
 )
 from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
+from experiments.results.holder import holder_metrics
 from experiments.results.mounting import mounting_metrics
 from experiments.results.path import path_following_metrics, press_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
@@ -222,6 +223,7 @@ def _measure(
     metrics.update(limit_metrics(log))
     metrics.update(_guidance_audit(log, settings))
     metrics.update(mounting_metrics(log))
+    metrics.update(holder_metrics(log, settings.reference.dwell))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)

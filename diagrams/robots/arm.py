@@ -285,7 +285,7 @@ def add_arm(
         return _add_coupled_arm(builder, source, workpiece)
     if workpiece is not None:
         return _add_touching_arm(builder, source, workpiece)
-    true = read_arm(source.robot, source.folder)
+    true = read_arm(source.robot, source.folder, before_finalizing=source.carried)
     builder.AddNamedSystem("plant", true.plant)
     return MultibodyArm(true, *believe_arm(true, source))
 
@@ -296,7 +296,7 @@ def _add_coupled_arm(
     coupled, folder = source.robot.rotor_coupling, source.folder
     allowed = "empty where the robot touches a workpiece; the full model has no contact"
     require(workpiece is None, "robot.rotor_coupling", coupled, allowed)
-    true = read_arm(source.robot, folder)
+    true = read_arm(source.robot, folder, before_finalizing=source.carried)
     try:
         robot = load_parameters(folder / coupled if FilePath(coupled).suffix else coupled)
         plant = FullElasticPlant(true.chain, mounts_from_parameters(true.chain, robot))

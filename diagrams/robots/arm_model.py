@@ -149,7 +149,8 @@ def _model(true: ArmModel, source: BeliefSource) -> ArmModel:
         if FilePath(model).suffix in (".yaml", ".yml"):
             found = _from_parameters(source.folder / model, true, source)
         else:
-            found = read_arm(replace(source.robot, model=model), source.folder)
+            robot = replace(source.robot, model=model)
+            found = read_arm(robot, source.folder, before_finalizing=source.carried)
     except InputError as error:
         message = str(error).removeprefix("robot.model: ")
         raise InputError(f"{key}: {message}") from None
@@ -182,4 +183,5 @@ def _from_parameters(file: FilePath, true: ArmModel, source: BeliefSource) -> Ar
     with tempfile.TemporaryDirectory() as scratch:
         model = FilePath(scratch) / f"{variant.name}.sdf"
         model.write_text(write_sdf(robot, variant), encoding="utf-8")
-        return read_arm(replace(source.robot, model=str(model)), source.folder)
+        written = replace(source.robot, model=str(model))
+        return read_arm(written, source.folder, before_finalizing=source.carried)

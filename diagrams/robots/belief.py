@@ -1,11 +1,12 @@
 """What a controller believes of a robot, and of how well its motion is measured."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
 
 from diagrams.scenario import RobotParameters
 from diagrams.scenario.model_error import ModelErrorParameters
@@ -27,12 +28,15 @@ class BeliefSource:
         model: Another model that is believed; empty for the plant's own.
         error: By how much that is believed wrongly.
         folder: Where relative file names start.
+        carried: Adds to the plant what the robot carries, with the tool frame, if it carries
+            anything.
     """
 
     robot: RobotParameters
     model: str
     error: ModelErrorParameters
     folder: Path
+    carried: Callable[[MultibodyPlant], None] | None = None
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """What a scenario file says: its schema, one file per block."""
 
+from diagrams.scenario.holder import HeldWorkpieceParameters, HolderParameters, SolidParameters
 from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.path import (
@@ -53,7 +54,9 @@ __all__ = [
     "GainParameters",
     "HandParameters",
     "HandWaypoint",
+    "HeldWorkpieceParameters",
     "HoldBackParameters",
+    "HolderParameters",
     "Intersection",
     "JointFrictionParameters",
     "Keyframe",
@@ -73,6 +76,7 @@ __all__ = [
     "SensorParameters",
     "ServoParameters",
     "SimulationParameters",
+    "SolidParameters",
     "StartParameters",
     "SurfaceParameters",
     "Target",

@@ -13,6 +13,7 @@ from diagrams.scenario.checks import (
     require_positive,
 )
 from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.holder import HolderParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.path import PathParameters
@@ -91,6 +92,7 @@ class Scenario:
             starts in the middle of the notch, ``start.offset`` beside. None without the block.
         workpiece: Workpiece under the surface, and a ball on the tool that presses on it. None
             without the block.
+        holder: Second robot, which holds the workpiece that the path is on. None without the block.
         plate: Plate with pins that a gripper takes from a magazine and mounts into a frame. None
             without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
@@ -127,6 +129,7 @@ class Scenario:
     faults: FaultParameters = dc.field(default_factory=FaultParameters)
     notch: NotchParameters | None = None
     workpiece: WorkpieceParameters | None = None
+    holder: HolderParameters | None = None
     plate: PlateParameters | None = None
     duration: float = 0.0
     judged_after: float = 0.0

@@ -7,6 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.belief import believed_robot
 from diagrams.scenario.checks import require
+from diagrams.tasks.held_frame import HeldFrame
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
@@ -69,6 +70,8 @@ class Following:
         start: Joint coordinates at the start, shape (N,).
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
+        held: What carries the task's manifold, if anything does.
+        carries: Whether the robot carries something that moves with it.
     """
 
     options: FollowingOptions
@@ -78,6 +81,8 @@ class Following:
     start: np.ndarray
     on_motors: bool = False
     friction: Coefficients | None = None
+    held: HeldFrame | None = None
+    carries: bool = False
 
 
 @dataclass(frozen=True)
@@ -136,7 +141,10 @@ def add_place(
             builder.Connect(override, generator.GetInputPort("override"))
         desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-    place = task.add_place(builder, tool_pose, desired, period)
+    if following.held is None:
+        place = task.add_place(builder, tool_pose, desired, period)
+    else:
+        place, tool_pose = following.held.add_place(builder, task, tool_pose, desired, period)
     signals = {
         "joint_state": joint_state,
         "tool_pose": tool_pose,
@@ -204,6 +212,7 @@ def add_law(
         place.signals | forces,
         compliance.observed if yields else None,
         place.predictor,
+        carries=following.carries,
     )
     made |= {"law": controller.GetOutputPort("law")}
     desired = place.desired_reference

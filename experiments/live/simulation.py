@@ -8,9 +8,10 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from diagrams.fault_description import FoundFault
 from diagrams.live_view import LiveFrame
 from diagrams.scenario import Scenario
-from diagrams.station import FoundFault, Station
+from diagrams.station import Station
 from diagrams.surroundings.operator import PULL
 from experiments.simulation import SimulationResult, chunk_ticks, configure
 from pfsc_drake.physics.operator_hand import ASKED, HOLD, TARGET

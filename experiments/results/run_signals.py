@@ -8,6 +8,7 @@ from diagrams.station import Station
 from experiments.results.drives import add_friction
 from experiments.results.found_links import add_found_links
 from experiments.results.guidance import add_guidance
+from experiments.results.holder import add_holder_signals, seen_poses, workpiece_motion
 from experiments.results.mounting import add_mounting_signals
 from experiments.results.path import add_pressing
 from experiments.results.posture import add_link_signals, add_posture
@@ -64,10 +65,14 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     if measured is not None:
         _add_joint_state(log, station, measured, "_measured")
     pose = _tool_poses(station, raw["joint_state"])
+    frames = workpiece_motion(station, raw)
+    if frames is not None:
+        pose = seen_poses(pose, frames)
     log.add("y_t", pose[:, :3])
     log.add("R_e", pose[:, 3:])
     add_found_links(log, station, raw)
-    deceived = measured is not None or not station.part.belief.sees_truth
+    # of what another robot holds, the controller has a belief
+    deceived = measured is not None or not station.part.belief.sees_truth or frames is not None
     if deceived:
         log.add("y_t_measured", raw["tool_pose"][:, :3])
         log.add("R_e_measured", raw["tool_pose"][:, 3:])
@@ -81,7 +86,8 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
         else:
             _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
         points = _project(station, pose)
-        seen = _path_output(station, raw["joint_state"], points)
+        true_points = points if frames is None else np.hstack([points, frames])
+        seen = _path_output(station, raw["joint_state"], true_points)
         # the orientation errors of trajectory tracking stay those from the moving reference
         rotational = indices(station.task.place.coordinates, Kind.ROTATIONAL)
         moving = linearization.manifold.follows_time and rotational.stop > 0
@@ -96,6 +102,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     add_pressing(log, station, raw, points)
     add_guidance(log, station, raw, pose[:, :3])
     add_mounting_signals(log, station, raw)
+    add_holder_signals(log, station, raw)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     _add_plan(log, station)
@@ -205,7 +212,8 @@ def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) 
     n, linearization = station.robot.dimension, station.law.linearization
     if len(points) == 0:
         return np.zeros((0, 2, linearization.num_outputs))
-    function = virtual_output_function(station.robot, station.task.place).map(len(points))
+    place = station.task.place if station.holder is None else linearization.manifold
+    function = virtual_output_function(station.robot, place).map(len(points))
     Y = np.array(function(joint_state[:, :n].T, joint_state[:, n : 2 * n].T, points.T))
     return Y.T.reshape(len(points), 2, linearization.num_outputs)
 

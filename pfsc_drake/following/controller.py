@@ -107,6 +107,8 @@ def add_controller(
     ports: dict[str, OutputPort],
     tool: ObservedForceParameters | None = None,
     predictor: BlockSystem | None = None,
+    *,
+    carries: bool = False,
 ) -> tuple[FollowingController, dict[str, OutputPort], dict[str, OutputPort]]:
     """Add a law and connect all of its inputs but ``reference`` and ``alarms``.
 
@@ -120,6 +122,7 @@ def add_controller(
             ``wrench_measured``, ``push_torque``.
         tool: How forces on the tool are observed for compliance, if they are.
         predictor: What foretells ``joint_state``, if anything does.
+        carries: Whether the robot carries something that moves with it.
 
     Returns:
         The controller; the ports given with all that was added (see the functions that add it);
@@ -131,7 +134,8 @@ def add_controller(
     """
     watched = supervision(options.law, faults, believed)
     controller = builder.AddNamedSystem(
-        "following_controller", FollowingController(law, options.sampling_time, watched)
+        "following_controller",
+        FollowingController(law, options.sampling_time, watched, carries=carries),
     )
     robot, signals = believed.robot, dict(ports)
     signals |= add_external_torque(builder, robot, options, controller, signals)

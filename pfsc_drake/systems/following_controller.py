@@ -9,6 +9,7 @@ from pfsc_drake.control.compliance.tool_compensation import Alarms
 from pfsc_drake.control.law.exact_linearization import ExactLinearization
 from pfsc_drake.control.law.fault import Fault, FaultLatch, FaultSwitch
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.joint_jet import JointJet
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.sampled_law import LawReport, SampledLaw
 from pfsc_drake.control.law.supervision import DriveWatch, Supervision, SupervisionParameters
@@ -77,11 +78,14 @@ class FollowingController(Diagram):
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`Fault`, shape (1,).
         law (output): All of these, laid out by the law's ``layout``.
+        joint_jet (output): Of a robot that carries something, see :class:`JointJet`.
 
     Args:
         law: The law.
         period: Sampling time [s].
         supervision: What is watched of joints and drives; nothing if omitted.
+        carries: Whether the robot carries something that moves with it, for which its motion is
+            told.
 
     Attributes:
         period: Sampling time [s].
@@ -95,6 +99,8 @@ class FollowingController(Diagram):
         law: FollowingLaw,
         period: float,
         supervision: SupervisionParameters | None = None,
+        *,
+        carries: bool = False,
     ) -> None:
         super().__init__()
         self.period, self.layout = period, law.layout
@@ -165,6 +171,11 @@ class FollowingController(Diagram):
         builder.ExportOutput(report.GetOutputPort("status"), "status")
         builder.ExportOutput(fault, "fault")
         builder.ExportOutput(report.GetOutputPort("law"), "law")
+        if carries:
+            motion = add("joint_jet", JointJet(law.linearization, law.layout))
+            connect(linear.GetOutputPort("relation"), motion.GetInputPort("relation"))
+            connect(sampled.GetOutputPort("evaluation"), motion.GetInputPort("evaluation"))
+            builder.ExportOutput(motion.GetOutputPort("joint_jet"), "joint_jet")
         builder.BuildInto(self)
 
 

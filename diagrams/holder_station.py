@@ -1,0 +1,288 @@
+"""The robot of a station that holds the workpiece, with its controller, and what it tells."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+
+from diagrams.fault_description import FaultScene, FoundFault, describe, first_instant
+from diagrams.named_builder import PrefixingBuilder
+from diagrams.robots.arm import Arm, add_arm
+from diagrams.robots.drives import add_drives, add_friction, believed_friction
+from diagrams.robots.held_workpiece import holding
+from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
+from diagrams.robots.model import is_delta
+from diagrams.scenario import DriverParameters, HolderParameters, Scenario
+from diagrams.scenario.checks import require
+from diagrams.signal_log import SignalLog
+from diagrams.station_parts import (
+    belief_source,
+    following_options,
+    friction_options,
+    holder_scenario,
+    make_task,
+)
+from diagrams.station_start import find_rest, find_start
+from diagrams.station_warnings import controller_warnings
+from diagrams.tasks.drive_limits import keep_drive_limits
+from diagrams.tasks.following import Following, add_law, add_place
+from diagrams.tasks.held_frame import HeldFrame
+from diagrams.tasks.task import StartPoint, Task
+from pfsc_drake.blocks.wiring_blocks import Hold
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame
+from pfsc_drake.control.manifolds.moving_frame import frame_size
+from pfsc_drake.control.planning.course import CourseStart
+from pfsc_drake.errors import InputError
+from pfsc_drake.following.law import make_law
+from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.robot.robot_model import pose_function
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.following_controller import ControllerAccess, FollowingController
+from pfsc_drake.systems.fuse import BlockAccess
+
+# before the names of all systems and signals of the robot that holds the workpiece
+HOLDER = "holder_"
+
+
+@dataclass
+class Holder:
+    """A robot that holds the workpiece.
+
+    Attributes:
+        parameters: What the scenario says of it.
+        part: The robot, whose tool frame is the workpiece's.
+        task: What it does with the workpiece.
+        law: Its law.
+        controller: Its controller.
+        initial_state: State of its model at the start.
+        start: Where the workpiece is at the start.
+        on_motors: Whether its law acts on the pose of the motors.
+        frame: The workpiece's frame, and its motion as the other controller knows it.
+        signals: What to log, by names with the prefix.
+        warnings: What there is to say, one sentence each.
+        projector: Name of what finds the workpiece's place on its path.
+        measured: System and port that the measured joint state comes from, by name.
+    """
+
+    parameters: HolderParameters
+    part: Arm
+    task: Task
+    law: FollowingLaw
+    controller: ControllerAccess
+    initial_state: np.ndarray
+    start: StartPoint
+    on_motors: bool
+    frame: HeldFrame
+    signals: dict[str, OutputPort]
+    warnings: list[str] = field(default_factory=list)
+    projector: str = ""
+    measured: tuple[str, str] = ("", "")
+
+    def set_start(self, blocks: BlockAccess, root: Context) -> None:
+        """Put the robot at its start.
+
+        Args:
+            blocks: Blocks of the diagram.
+            root: Context of the diagram.
+        """
+        self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), self.initial_state)
+        blocks.set_state(root, f"{self.projector}.place", self.start.place)
+
+    def found_fault(self, log: SignalLog, blocks: BlockAccess, root: Context) -> FoundFault | None:
+        """Return why the robot's controller is in its safe state, if it is.
+
+        Args:
+            log: Log of the station.
+            blocks: Blocks of the diagram.
+            root: Context of the diagram.
+        """
+        fault = self.controller.fault(blocks, root)
+        if fault is Fault.NONE:
+            return None
+        suspects = self.controller.suspects(blocks, root)
+        own, column = log.of(HOLDER), self.law.layout.status.start
+        now, before = first_instant(own, blocks, root, "law", column)
+        place, robot = self.task.place, self.part.belief.robot
+        scene = FaultScene(self.law, robot, place, self.on_motors, now, before, suspects)
+        sentence = f"the robot that holds the workpiece: {describe(fault, scene)}"
+        return FoundFault(sentence, now.time)
+
+
+def add_holder(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    order: int,
+    folder: FilePath,
+    progress: Progress | None = None,
+    like: Holder | None = None,
+) -> tuple[Holder, FollowingController]:
+    """Add the robot that holds the workpiece of a scenario, with its controller.
+
+    All of its systems have names that begin with ``holder_``.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario, with a holder.
+        order: Relative degree of the other robot's law, for which the workpiece's motion is told.
+        folder: Where relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
+        like: The same but for how it is integrated, if it has been built.
+
+    Returns:
+        The robot, and its controller in the diagram.
+
+    Raises:
+        InputError: If it cannot be built, or does not suit the other robot.
+    """
+    holder, own = scenario.holder, holder_scenario(scenario)
+    assert holder is not None
+    named, period = PrefixingBuilder(builder, HOLDER), scenario.controller.sampling_time
+    with naming_holder():
+        _check(holder, period)
+        task = make_task(own, folder, progress) if like is None else like.task
+        part = add_arm(named, holding(belief_source(own, folder), holder.workpiece))
+        task.require_joints(part.robot.dimension)
+        start, state = (
+            find_start(own.start, task, part) if like is None else (like.start, like.initial_state)
+        )
+        rest = cache(lambda: find_rest(task, part, start, state))
+        believed = part.belief.robot
+        law = make_law(own.controller, believed, task.manifold, rest, own.faults)
+        known = law.linearization.relative_degree
+        allowed = f"a law of relative degree {order} or more, as the other robot's is"
+        require(known >= order, "controller.law", own.controller.law, allowed)
+        on_motors = own.controller.law == "rigid" and not believed.is_rigid
+        rubbing = friction_options(own, folder)
+        friction = believed_friction(part, own.controller.friction.believed, rubbing)
+        q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
+        begun = CourseStart(rest().q_J, start.place)
+        keep_drive_limits(
+            own.reference, own.controller, scenario.duration, task, law, begun, friction
+        )
+        true_state = part.joint_state(named)
+        failure = own.simulation.sensor_failure
+        measured = add_joint_state(
+            named, true_state, part.robot, own.encoders, failure, period, period
+        )
+        links = add_link_state(
+            named, part, own.controller, own.encoders, measured, true_state, q_J, friction
+        )
+        following = Following(
+            following_options(own), believed, task, law, q_J, on_motors, friction, carries=True
+        )
+        place = add_place(named, following, links.joint_state)
+        controller, made = add_law(named, following, place, {})
+    drive = controller.GetOutputPort(controller.drive_port)
+    if links.drive_torque is not None:
+        builder.Connect(drive, links.drive_torque)
+    ports = place.signals | {"drive": drive}
+    add_drives(named, part, None, DriverParameters(), period, ports, state)
+    rubs = add_friction(named, part, true_state, rubbing, [controller.GetOutputPort("fault")])
+    motion = _add_motion(named, holder, following, order, controller)
+    pose = np.array(pose_function(part.robot)(q_J)).ravel()
+    logged = place.signals | made | rubs | {"frame_jet": motion}
+    logged |= states_to_log(true_state, place.signals["joint_state"])
+    source = measured.get_system().get_name(), measured.get_name()
+    planned = [] if task.drive_plan is None else task.drive_plan.said
+    link_state = part.coordinates.link_rows @ state
+    said = task.warnings + own.model_error.warnings + planned
+    said += part.start_warnings(own.start, q_J, start.target)
+    said += controller_warnings(own, task, part, law, link_state, rest())
+    made_holder = Holder(
+        holder,
+        part,
+        task,
+        law,
+        ControllerAccess(controller),
+        state,
+        start,
+        on_motors,
+        HeldFrame(pose, order, motion),
+        {f"{HOLDER}{name}": port for name, port in logged.items()},
+        [f"the robot that holds the workpiece: {line}" for line in said],
+        place.projector.get_name(),
+        source,
+    )
+    return made_holder, controller
+
+
+def stop_both(
+    builder: DiagramBuilder, first: FollowingController, second: FollowingController
+) -> None:
+    """Let a fault of one of two controllers stop the other's robot as well.
+
+    The second one's stops the first at the same tick. The first one's stops the second at the next
+    tick, since both at once would ask each other.
+
+    Args:
+        builder: Builder of the diagram.
+        first: The controller that acts on what the second one tells.
+        second: The other.
+    """
+    period = first.period
+    hold = builder.AddNamedSystem(f"{HOLDER}stop", BlockSystem(Hold(1), period))
+    builder.Connect(second.GetOutputPort("fault"), first.GetInputPort("stop_request"))
+    builder.Connect(first.GetOutputPort("fault"), hold.GetInputPort("value"))
+    builder.Connect(hold.GetOutputPort("held"), second.GetInputPort("stop_request"))
+
+
+@contextmanager
+def naming_holder() -> Iterator[None]:
+    """Name the block of the scenario in what is said against the robot that holds."""
+    try:
+        yield
+    except InputError as error:
+        message = str(error)
+        raise InputError(
+            message if message.startswith("holder.") else f"holder.{message}"
+        ) from None
+
+
+def _check(holder: HolderParameters, period: float) -> None:
+    """Refuse what no holder can be."""
+    model, own = holder.robot.model, holder.controller.sampling_time
+    require(not is_delta(model), "robot.model", model, "a serial arm, which turns what it holds")
+    holder.workpiece.check()
+    require(own == period, "controller.sampling_time", own, f"{period:g} s, the other robot's")
+
+
+def _add_motion(
+    builder: DiagramBuilder,
+    holder: HolderParameters,
+    following: Following,
+    order: int,
+    controller: FollowingController,
+) -> OutputPort:
+    """Add what tells the workpiece's motion, and return its port."""
+    robot, period = following.robot, controller.period
+    highest = order if holder.derivatives == "known" else 0
+    flange = FlangeFrame(
+        robot,
+        following.law.linearization.relative_degree,
+        order,
+        _placement(holder),
+        min(highest, holder.highest),
+    )
+    frame = builder.AddNamedSystem("flange_frame", BlockSystem(flange, period))
+    builder.Connect(controller.GetOutputPort("joint_jet"), frame.GetInputPort("joint_jet"))
+    told = frame.GetOutputPort("frame_jet")
+    if holder.derivatives == "differenced":
+        block = DifferencedFrame(order, holder.highest, period)
+        guess = builder.AddNamedSystem("differenced_frame", BlockSystem(block, period))
+        builder.Connect(told, guess.GetInputPort("frame_jet"))
+        told = guess.GetOutputPort("differenced")
+    assert told.size() == frame_size(order)
+    return told
+
+
+def _placement(holder: HolderParameters) -> np.ndarray:
+    """Return where the base is believed to be against where it is, ``[p, R by rows]``, (12,)."""
+    X_WB = holder.robot.base_pose.transform()
+    shift = X_WB @ holder.placement_error.transform() @ X_WB.inverse()
+    return np.concatenate([shift.translation(), shift.rotation().matrix().ravel()])

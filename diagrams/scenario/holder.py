@@ -1,0 +1,130 @@
+"""A second robot that holds the workpiece, on which the path of the first one is."""
+
+import dataclasses as dc
+
+from diagrams.scenario.checks import (
+    require,
+    require_between,
+    require_numbers,
+    require_one_of,
+)
+from diagrams.scenario.model_error import ModelErrorParameters
+from diagrams.scenario.motion import ReferenceParameters, StartParameters
+from diagrams.scenario.path import PathParameters
+from diagrams.scenario.robot import PoseParameters, RobotParameters
+from diagrams.scenario.simulation import SensorFailureParameters
+from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.options.follower import FaultParameters
+from pfsc_drake.following.options.friction import JointFrictionParameters
+from pfsc_drake.physics.joint_sensors import EncoderOptions
+
+_SMALLEST, _LARGEST, _HEAVIEST = 1e-4, 10.0, 1e3  # m, m, kg
+DERIVATIVES = ("known", "differenced", "none")
+
+
+@dc.dataclass
+class SolidParameters:
+    """A solid that a workpiece consists of: a box, or a cylinder.
+
+    Attributes:
+        box: Edges along x, y, z [m]; empty for a cylinder.
+        cylinder: Radius, and length along z [m]; empty for a box.
+        pose: Where its centre and axes are in the workpiece's frame.
+        mass: Its mass, evenly spread [kg].
+    """
+
+    box: list[float] = dc.field(default_factory=list)
+    cylinder: list[float] = dc.field(default_factory=list)
+    pose: PoseParameters = dc.field(default_factory=PoseParameters)
+    mass: float = 1.0
+
+    def __post_init__(self) -> None:
+        for key, count in (("box", 3), ("cylinder", 2)):
+            values = getattr(self, key)
+            if not values:
+                continue
+            require_numbers(key, values, count)
+            good = all(_SMALLEST <= value <= _LARGEST for value in values)
+            require(good, key, values, f"{count} numbers from {_SMALLEST:g} to {_LARGEST:g} m")
+        require_between("mass", self.mass, 0.0, _HEAVIEST, "kg")
+
+
+@dc.dataclass
+class HeldWorkpieceParameters:
+    """The workpiece that a robot holds.
+
+    Attributes:
+        pose: Where its frame is in the ``tool_frame`` of the robot that holds it.
+        solids: What it consists of, one or more with mass.
+    """
+
+    pose: PoseParameters = dc.field(default_factory=PoseParameters)
+    solids: list[SolidParameters] = dc.field(default_factory=list)
+
+    def check(self) -> None:
+        """Refuse what is no body.
+
+        Raises:
+            InputError: If a solid is neither a box nor a cylinder, or there is no mass.
+        """
+        for i, solid in enumerate(self.solids):
+            one = bool(solid.box) != bool(solid.cylinder)
+            allowed = "given where there is no box, and only there"
+            require(one, f"workpiece.solids[{i}].cylinder", solid.cylinder, allowed)
+        mass = sum(solid.mass for solid in self.solids)
+        require(mass > 0.0, "workpiece.solids", f"{len(self.solids)}, {mass:g} kg", "some with mass")
+
+
+@dc.dataclass
+class HolderParameters:
+    """A robot that holds the workpiece and moves it along a path of its own.
+
+    The scenario's ``path`` or ``surface`` is then one of the workpiece, in the workpiece's frame,
+    and its robot follows it wherever the workpiece is.
+
+    Attributes:
+        robot: Which robot; its ``tool_frame`` is where it holds the workpiece.
+        workpiece: What it holds.
+        path: Path of the workpiece's frame in the world.
+        controller: Its controller, with the sampling time of the other one.
+        model_error: What its controller believes wrongly of the robot and, as its tool, of the
+            workpiece.
+        placement_error: Where its base is believed to be, in its own axes, beside where it is: an
+            error of calibration that no controller sees.
+        reference: Motion along its path.
+        start: Where it starts.
+        friction: Friction of its joints.
+        encoders: What its encoders do to its joint state.
+        faults: What is a fault, and how it ends. A fault of one robot stops both.
+        sensor_failure: One of its sensors that fails on the way.
+        derivatives: What the other robot's controller knows of the workpiece's motion: ``known``:
+            all derivatives that its law needs; for comparison ``differenced``, from the poses of
+            the last ticks, or ``none``, the pose alone.
+        highest: Highest derivative that is known or differenced, 0 to 4.
+    """
+
+    robot: RobotParameters = dc.field(default_factory=RobotParameters)
+    workpiece: HeldWorkpieceParameters = dc.field(default_factory=HeldWorkpieceParameters)
+    path: PathParameters = dc.field(default_factory=PathParameters)
+    controller: ControllerParameters = dc.field(default_factory=ControllerParameters)
+    model_error: ModelErrorParameters = dc.field(default_factory=ModelErrorParameters)
+    placement_error: PoseParameters = dc.field(default_factory=PoseParameters)
+    reference: ReferenceParameters = dc.field(default_factory=ReferenceParameters)
+    start: StartParameters = dc.field(default_factory=StartParameters)
+    friction: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
+    encoders: EncoderOptions = dc.field(default_factory=EncoderOptions)
+    faults: FaultParameters = dc.field(default_factory=FaultParameters)
+    sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
+    derivatives: str = "known"
+    highest: int = 4
+
+    def __post_init__(self) -> None:
+        require_one_of("derivatives", self.derivatives, DERIVATIVES)
+        require(0 <= self.highest <= 4, "highest", self.highest, "0 to 4")
+        manifold = self.controller.manifold
+        require(manifold == "path", "controller.manifold", manifold, "path, of a robot that holds")
+        law = self.controller.law
+        allowed = "a law of torques, of a robot that holds"
+        require(law != "velocity_servo", "controller.law", law, allowed)
+        delay = self.controller.delay
+        require(delay is None, "controller.delay", delay, "null, of a robot that holds")
