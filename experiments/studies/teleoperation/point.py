@@ -1,4 +1,4 @@
-"""A leader, a hand at it and a point that follows among planes, one function for thousands of runs."""
+"""A leader, a hand and a point that follows among planes, as one function for many runs."""
 
 import math
 from collections.abc import Sequence
@@ -151,7 +151,10 @@ class PointTeleoperation:
         self._stepper = Stepper(_network(station))
 
     def run(
-        self, asked: np.ndarray, there: ChannelParameters, back: ChannelParameters,
+        self,
+        asked: np.ndarray,
+        there: ChannelParameters,
+        back: ChannelParameters,
         wall: tuple[float, float] = (1.0, 0.0),
     ) -> Motion:
         """Return what happens.
@@ -162,7 +165,7 @@ class PointTeleoperation:
             back: The other way.
             wall: Its place along x [m], and its stiffness [N/m].
         """
-        stepper, program = self._stepper, self._stepper._program
+        stepper = self._stepper
         ages = [message_ages(channel, PERIOD) for channel in (there, back)]
         told = np.zeros((2, len(asked) + 1, MESSAGE))
         stepper.tick, none = 0, np.zeros(MESSAGE)
@@ -185,8 +188,14 @@ class PointTeleoperation:
             stepper._x[:] = results["x_next"]
         logs = {name: np.array(row) for name, row in rows.items()}
         return Motion(
-            logs["handle"], logs["hand"][:, :3], logs["motor"], logs["joints"][:, :3],
-            logs["leader"], logs["follower"], logs["wall"][:, :3], logs["reference"][:, 3:6],
+            logs["handle"],
+            logs["hand"][:, :3],
+            logs["motor"],
+            logs["joints"][:, :3],
+            logs["leader"],
+            logs["follower"],
+            logs["wall"][:, :3],
+            logs["reference"][:, 3:6],
         )
 
 

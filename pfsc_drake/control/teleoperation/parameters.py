@@ -50,7 +50,8 @@ class CouplingParameters:
         force_share: Share of the other side's felt force, ``four_channel``.
         motion_scale: How far the follower moves by the leader's way.
         force_scale: What the leader feels of the follower's forces.
-        smoothing: Time constant [s] with which what arrives is taken over; about the jitter.
+        smoothing: Time constant [s] of each of two lags by which what arrives is taken over;
+            about half the jitter.
         velocity_smoothing: Time constant [s] of the side's own velocity.
         tank: What one side may give.
     """

@@ -5,6 +5,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+import scipy.linalg
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
@@ -32,9 +33,9 @@ class TeleoperationPort(Block):
 
     Waves go as their integrals A and O (Niemeyer and Slotine): what a message lost is in the next
     one, and where both sides rest, both positions are the same, drift or not. What arrives, A or
-    ``x_o``, is taken over by a lag ``tau``, whose rate is the wave a, or ``v_o``::
+    ``x_o``, is taken over by two lags ``tau``, and its rate is the wave a, or ``v_o``::
 
-        a = (A_arrived - A) / tau,   A+ = A + T a
+        tau^2 A'' + 2 tau A' + A = A_arrived,   a = (A+ - A) / T
 
     Energy (Franken et al.): the tank gets what the other side gave away, and pays the work of the
     force and what is sent on. Work is counted as of a held force over the displacement of its tick,
@@ -64,7 +65,7 @@ class TeleoperationPort(Block):
             force and of the wave that could be paid.
 
     State:
-        tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``; ``given``, what was sent of O;
+        tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``, and its ``rate``; ``given``, what was sent of O;
         ``origin``, ``last``: x at the start and at the last tick; ``velocity``; ``forces`` and
         ``taken``: forces that are to act, and A that they are of, oldest last; ``begun``.
 
@@ -77,6 +78,7 @@ class TeleoperationPort(Block):
     def __init__(self, side: str, coupling: CouplingParameters, limits: PortLimits) -> None:
         self._side, self._coupling, self._limits = side, coupling, limits
         self._waves = coupling.coupling == "waves"
+        self._takeover = _takeover(coupling.smoothing, limits.period)
         count = 3 * (1 + limits.ticks_late)
         self.inputs = {
             "position": Port(3, "m"),
@@ -90,7 +92,7 @@ class TeleoperationPort(Block):
             "record": Port(_ENDS[-1], "N, m, J, 1"),
         }
         self.states = {
-            "tank": 1, "sent": 1, "received": 1, "heard": 3, "given": 3,
+            "tank": 1, "sent": 1, "received": 1, "heard": 3, "rate": 3, "given": 3,
             "origin": 3, "last": 3, "velocity": 3, "forces": count, "taken": count,
         }  # fmt: skip
         self.inner = {f"{name}_after": size for name, size in self.states.items()}
@@ -108,7 +110,8 @@ class TeleoperationPort(Block):
         fade = 1.0 - math.exp(-T / way.velocity_smoothing) if way.velocity_smoothing > 0.0 else 1.0
         velocity = x.velocity + fade * (step / T - x.velocity)
         signal, energy = u.message[FIELDS["signal"]], u.message[FIELDS["energy"]]
-        rate = (signal - x.heard) / max(way.smoothing, T)
+        heard, slope = ca.horzsplit(ca.horzcat(signal - x.heard, x.rate) @ self._takeover)
+        heard, rate = x.heard + heard, heard / T
         tank = x.tank - ca.dot(x.forces[-3:], step) + energy - x.received
         tank = ca.fmin(tank, way.tank.capacity) if way.passive else tank
         given, sent, paid = self._send(x, there, tank)
@@ -120,9 +123,8 @@ class TeleoperationPort(Block):
         forces = ca.vertcat(force, x.forces)
         message = ca.vertcat(t + 1.0, told, felt, x.sent + sent)
         record = ca.vertcat(forces[-6:-3], there, left, x.sent + sent, energy, ca.fmin(share, paid))
-        heard = x.heard + T * rate
         after = {
-            "tank": left, "sent": x.sent + sent, "received": energy, "heard": heard,
+            "tank": left, "sent": x.sent + sent, "received": energy, "heard": heard, "rate": slope,
             "given": given, "origin": x.origin, "last": position, "velocity": velocity,
             "forces": forces[:-3], "taken": ca.vertcat(heard, x.taken)[:-3],
         }  # fmt: skip
@@ -173,3 +175,21 @@ class TeleoperationPort(Block):
         share = where(size > most, most / size, 1.0)
         grip = ca.DM(1.0) if u.grip is None else ca.fmax(0.0, ca.fmin(1.0, u.grip))
         return grip * share * force, share
+
+
+def _takeover(smoothing: float, period: float) -> ca.DM:
+    """Return how what is missing, and the rate, become steps and rates, shape (2, 2).
+
+    ``[missing, rate] M = [step, rate]`` after a period in which the aim stays, exactly.
+
+    Args:
+        smoothing: ``tau`` [s]; 0 takes all over at once.
+        period: T [s].
+    """
+    if smoothing == 0.0:
+        return ca.DM([[1.0, 0.0], [0.0, 0.0]])
+    # of [missing, rate]
+    slope = np.array([[0.0, -1.0], [smoothing**-2, -2.0 / smoothing]])
+    over = scipy.linalg.expm(period * slope)
+    steps = np.array([1.0, 0.0]) - over[0]
+    return ca.DM(np.column_stack([steps, over[1]]))
