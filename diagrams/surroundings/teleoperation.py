@@ -9,6 +9,7 @@ from diagrams.scenario import HandParameters
 from diagrams.scenario.checks import require, require_whole_ticks
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.surroundings.operator import Operator
+from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.blocks.block import Block
@@ -19,12 +20,14 @@ from pfsc_drake.control.teleoperation.port import TeleoperationPort
 from pfsc_drake.control.teleoperation.reaction import FixtureReaction, LedPoint
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.channel import Channel
+from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.leader_device import Clutch, LeaderDevice
 from pfsc_drake.physics.operator_hand import LiveHand, OperatorHand
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 
 _LONGEST_WAY = 5000  # ticks
+_BEYOND = 0.5  # m
 
 
 @dataclass(frozen=True)
@@ -168,11 +171,34 @@ def add_operator_afar(
         "leader_record": leader.GetOutputPort("record"),
         "follower_record": follower.GetOutputPort("record"),
         "leader_state": handle.GetOutputPort("state"),
-        "leader_pose": clutch.GetOutputPort("pose"),
+        "led_point": clutch.GetOutputPort("position"),
         "leader_motor": motor.GetOutputPort("product"),
         "leader_hand": held.GetOutputPort("wrench"),
     }
     return LedFromAfar(follower, wrench.GetOutputPort("product"), signals, period)
+
+
+@dataclass(frozen=True)
+class _BeyondEnds:
+    """Where coordinates of an open path are in the world, along its tangents beyond its ends.
+
+    Attributes:
+        place: Where they are on it.
+        length: Length of the path [m].
+    """
+
+    place: Place
+    length: float
+
+    def __call__(self, coordinates: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return position [m] and velocity [m/s] in the world, shape (3,) each."""
+        eta = float(np.clip(coordinates[0], 0.0, self.length))
+        if eta == coordinates[0]:
+            return self.place(coordinates, rates)
+        end = np.array([eta, *coordinates[1:]])
+        at, along = self.place(end, np.array([1.0, 0.0, 0.0]))
+        _, beside = self.place(end, np.array([0.0, *rates[1:]]))
+        return at + (coordinates[0] - eta) * along, rates[0] * along + beside
 
 
 def _add_hand(
@@ -189,11 +215,18 @@ def _add_hand(
         builder.Connect(operator.pull, held.GetInputPort("asked"))
         return held
     assert hand is not None
+    target, is_open = task.target(), isinstance(task, PathTask) and not task.path.closed
     if hand.frame == "manifold":
-        for i, place in enumerate(hand.places()[1]):
-            task.check_place(place, f"hand.waypoints[{i}].position")
+        for i, (eta, *beside) in enumerate(hand.places()[1]):
+            # a hand that presses the tool on at an end of its path is beyond it
+            past = max(-eta, eta - task.length, 0.0) if is_open else 0.0
+            key = f"hand.waypoints[{i}].position"
+            require(past <= _BEYOND, key, [eta, *beside], f"at most {_BEYOND:g} m beyond an end")
+            task.check_place(np.array([eta if past == 0.0 else 0.0, *beside]), key)
+    if is_open:
+        target = _BeyondEnds(target, task.length)
     try:
-        block = OperatorHand(hand, period, task.target())
+        block = OperatorHand(hand, period, target)
     except InputError as error:
         raise InputError(f"hand.{error}") from None
     return builder.AddNamedSystem("operator_hand", BlockSystem(block, period))

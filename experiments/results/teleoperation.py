@@ -24,7 +24,7 @@ def add_teleoperation(log: RunLog, raw: dict[str, FloatArray]) -> None:
     log.add("leader_position", raw["leader_state"][:, :3])
     log.add("leader_hand", raw["leader_hand"][:, :3])
     log.add("leader_force", raw["leader_motor"])
-    log.add("led_point", raw["leader_pose"][:, :3])
+    log.add("led_point", raw["led_point"])
     for name, rows in RECORD.items():
         size = rows.stop - rows.start
         sides = [raw[f"{side}_record"][:, rows] for side in SIDES]
