@@ -26,6 +26,7 @@ from diagrams.scenario.checks import require
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.station_parts import (
+    add_afar,
     add_robot,
     check_holder,
     choose_mounting,
@@ -35,6 +36,7 @@ from diagrams.station_parts import (
     make_task,
     make_workpiece,
     outside,
+    servo_lag,
     servo_options,
 )
 from diagrams.station_start import find_rest, find_start
@@ -163,8 +165,10 @@ def build_station(
         operator = add_operator(
             builder, scenario.operator, scenario.switched_regions, period, folder
         )
+    afar = add_afar(builder, scenario, operator, task, start)
+    at_tool = operator if afar is None else None
     forces = add_surroundings(
-        builder, part, task, outside(scenario), around, start, operator, mounting, spring
+        builder, part, task, outside(scenario), around, start, at_tool, mounting, spring
     )
     if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
@@ -172,9 +176,13 @@ def build_station(
         forces |= add_sensor(builder, part, scenario.sensor, failure, period, states | forces)
         if mounting is not None:
             forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
-    requests = {} if operator is None else operator.requests
-    controller, made = add_law(builder, following, place, forces | requests)
+    led = {} if operator is None else operator.requests
+    if afar is not None:
+        led = led | {"wrench_led": afar.lead(builder, forces)}
+    controller, made = add_law(builder, following, place, forces | led)
     signals = place.signals | forces | made | links.signals
+    if afar is not None:
+        signals |= afar.connect(builder, task, believed, servo_lag(scenario), signals)
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     if links.drive_torque is not None:
         builder.Connect(drive["drive"], links.drive_torque)

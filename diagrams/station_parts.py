@@ -21,12 +21,14 @@ from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.surroundings.forces import Outside
 from diagrams.surroundings.mounting import Mounting, make_mounting
+from diagrams.surroundings.operator import Operator
+from diagrams.surroundings.teleoperation import LedFromAfar, add_operator_afar
 from diagrams.surroundings.workpieces import NotchedWorkpiece, PressedWorkpiece
 from diagrams.tasks.following import FollowingOptions
 from diagrams.tasks.path_following import PathTask, TrajectoryTask
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.surface_following import SurfaceTask
-from diagrams.tasks.task import Task
+from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -82,6 +84,17 @@ def choose_lead(scenario: Scenario) -> Lead:
     )
 
 
+def servo_lag(scenario: Scenario) -> float:
+    """Return the lag between what a law asks of a tool that follows, and where the tool is [s].
+
+    Args:
+        scenario: The scenario.
+    """
+    if RELATIVE_DEGREE[scenario.controller.law] > 1:
+        return 0.0
+    return 1.0 / scenario.servo.bandwidth + scenario.servo.bus_delay
+
+
 def make_workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
     """Return what a tool presses on or runs in, if there is anything.
 
@@ -105,6 +118,32 @@ def make_workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
     if not isinstance(task, PathTask):
         raise InputError("notch = given: must be null where the task is no path")
     return NotchedWorkpiece(task.path, scenario.notch)
+
+
+def add_afar(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    operator: Operator | None,
+    task: Task,
+    start: StartPoint,
+) -> LedFromAfar | None:
+    """Add a scenario's operator who is far away, if there is one, with device and channel.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario.
+        operator: A person at the device, if there is one.
+        task: What the tool is to do.
+        start: Where the tool starts.
+
+    Raises:
+        InputError: If nobody is there, or times do not suit the sampling time.
+    """
+    if scenario.teleoperation is None:
+        return None
+    period = scenario.controller.sampling_time
+    way, y_0 = scenario.teleoperation, start.target.y_t
+    return add_operator_afar(builder, way, scenario.hand, operator, task, y_0, period)
 
 
 def make_spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:
@@ -295,7 +334,7 @@ def outside(scenario: Scenario) -> Outside:
         scenario.forces,
         scenario.hold_back,
         scenario.pushes,
-        scenario.hand,
+        scenario.hand if scenario.teleoperation is None else None,
         scenario.needs_sensor,
         scenario.controller.sampling_time,
     )

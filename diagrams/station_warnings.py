@@ -77,6 +77,8 @@ def expected_forces(scenario: Scenario) -> ExpectedForces:
         scenario: The scenario.
     """
     hands = [scenario.hand, scenario.operator and scenario.operator.hand]
+    if scenario.teleoperation is not None:
+        hands = []
     return ExpectedForces(
         largest_force(scenario.forces, [hand for hand in hands if hand]),
         bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces),

@@ -30,6 +30,7 @@ from diagrams.scenario.simulation import (
     SimulationParameters,
 )
 from diagrams.scenario.surface import SurfaceParameters
+from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.compliance import ComplianceParameters
@@ -78,6 +79,8 @@ class Scenario:
             or with ``hand: null``.
         operator: A person who guides the tool while the robot moves, in a live session or as
             recorded in one. None without the block.
+        teleoperation: What is between the tool and the hand, or the person, that leads it from
+            afar. None without the block: they are at the tool.
         hold_back: A wrench that only slows the robot down.
         servo: Velocity controllers of the joints, for the law ``velocity_servo``.
         driver: What is between a law that commands torques and the drives.
@@ -118,6 +121,7 @@ class Scenario:
     pushes: list[LinkHandParameters] = dc.field(default_factory=list)
     hand: HandParameters | None = None
     operator: OperatorParameters | None = None
+    teleoperation: TeleoperationParameters | None = None
     hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
     servo: ServoParameters = dc.field(default_factory=ServoParameters)
     driver: DriverParameters = dc.field(default_factory=DriverParameters)
@@ -142,6 +146,9 @@ class Scenario:
         for key in ("duration", "judged_after"):
             require_not_negative(key, getattr(self, key))
         require_positive("settling_tolerance", self.settling_tolerance)
+        if self.teleoperation is not None:
+            allowed = "null where nothing yields to what a sensor measures (compliance)"
+            require(self.compliance.needs_sensor, "teleoperation", "given", allowed)
         for law in self.targets:
             require_one_of("targets", law, RELATIVE_DEGREE)
 
@@ -198,7 +205,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         InputError: If it needs what only a simulation knows.
     """
     left, plain = deepcopy(scenario), Scenario()
-    for key in ("plate", "operator"):
+    for key in ("plate", "operator", "teleoperation"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
     controller = scenario.controller

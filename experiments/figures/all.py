@@ -51,6 +51,7 @@ from experiments.figures.posture import (
     has_conditioning,
     has_pushes,
 )
+from experiments.figures.teleoperation import draw_port_energy, draw_teleoperation
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from reporting.registry import FIGURES
@@ -114,6 +115,8 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "guidance": (draw_guidance, has_regions),
     "contact": (draw_contact, has_contact),
     "energy": (draw_energy, gives_energy),
+    "teleoperation": (draw_teleoperation, _always),
+    "port_energy": (draw_port_energy, _always),
     "limits": (draw_limits, held_by_robot),
     "use_case": (draw_use_case, _always),
     "mounting": (draw_mounting, _always),

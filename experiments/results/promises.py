@@ -23,7 +23,7 @@ from reporting.metrics import Metric, Metrics, format_quantity
 from reporting.registry import possible_metrics
 
 # held at every instant, so that also a run that was cut short is judged by them
-_ALWAYS = ("deepest_violation", "max_unanswered_force")
+_ALWAYS = ("deepest_violation", "max_unanswered_force", "least_port_tank", "energy_margin")
 # how far a tool is from where it should be, the first of them that a run has, and from when on
 # that is worth a word [m]
 _DISTANCES = ("max_error_from_compliant_reference", "max_path_deviation")
@@ -85,6 +85,10 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
         # what is less would be taken for a bias
         bound = f"<= {settings.sensor.taring_spread[:3].max():g}"
         metrics.set_target("max_unanswered_force", bound, "sensor.taring_spread")
+    way = settings.teleoperation
+    for name in ("least_port_tank", "energy_margin"):
+        if way is not None and way.passive and name in metrics:
+            metrics.set_target(name, ">= 0", "teleoperation.passive")
     for name, target in settings.targets.get(settings.controller.law, {}).items():
         # what another choice of the controller would tell has been checked, and is no metric here
         if name in metrics:

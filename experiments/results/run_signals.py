@@ -13,6 +13,7 @@ from experiments.results.mounting import add_mounting_signals
 from experiments.results.path import add_pressing
 from experiments.results.posture import add_link_signals, add_posture
 from experiments.results.run_log import FloatArray, RunLog
+from experiments.results.teleoperation import add_teleoperation
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
@@ -103,6 +104,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     add_guidance(log, station, raw, pose[:, :3])
     add_mounting_signals(log, station, raw)
     add_holder_signals(log, station, raw)
+    add_teleoperation(log, raw)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     _add_plan(log, station)

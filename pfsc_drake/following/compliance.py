@@ -74,12 +74,12 @@ def force_ports(
     Args:
         compliance: How the tool yields.
         ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
-            ``ready``.
+            ``ready``; ``wrench_led``, where a tool is led by more than what is measured.
     """
     names = ("wrench_measured", "tared")
     if compliance.source == "observed":
         names = ("wrench_observed", "ready")
-    return ports[names[0]], ports[names[1]]
+    return ports.get("wrench_led", ports[names[0]]), ports[names[1]]
 
 
 def add_compliance(

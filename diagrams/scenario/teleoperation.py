@@ -1,0 +1,46 @@
+"""A robot that is led from afar: coupling, channel, the device in the operator's hand."""
+
+import dataclasses as dc
+
+from diagrams.scenario.checks import require, require_positive
+from pfsc_drake.control.teleoperation.parameters import CouplingParameters
+from pfsc_drake.physics.channel import ChannelParameters
+from pfsc_drake.physics.leader_device import ClutchParameters, LeaderParameters
+
+# the way back draws its own delays and losses
+_OTHER_SEED = 1000
+
+
+@dc.dataclass
+class TeleoperationParameters(CouplingParameters):
+    """A hand elsewhere that leads the tool, and feels what the tool feels.
+
+    The scenario's ``hand`` holds the leader then, and says where the tool is to be.
+
+    Attributes:
+        channel: Between the two, each way.
+        leader: The device in the operator's hand.
+        clutch: When the operator lets it loose, to take hold of it elsewhere.
+        follower_force: Largest force by which the tool is led [N].
+        follower_speed: Largest speed that the tool is led with, which the follower's reserve of
+            energy is for [m/s]; within regions it is at least that of ``fixtures.guidance``.
+    """
+
+    channel: ChannelParameters = dc.field(default_factory=ChannelParameters)
+    leader: LeaderParameters = dc.field(default_factory=LeaderParameters)
+    clutch: list[ClutchParameters] = dc.field(default_factory=list)
+    follower_force: float = 60.0
+    follower_speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for key in ("follower_force", "follower_speed"):
+            require_positive(key, getattr(self, key))
+        ends = [time for at in self.clutch for time in (at.begin, at.end)]
+        allowed = "times that follow each other"
+        require(ends == sorted(ends), "clutch", ends, allowed)
+
+    @property
+    def back(self) -> ChannelParameters:
+        """Channel from the follower to the leader."""
+        return dc.replace(self.channel, seed=self.channel.seed + _OTHER_SEED)

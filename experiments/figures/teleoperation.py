@@ -1,0 +1,64 @@
+"""Figures of a tool that is led from afar: where it follows, what is felt, where energy is."""
+
+import numpy as np
+
+from experiments.results.run_log import RunLog
+from experiments.results.teleoperation import stored_in_channel, works
+from reporting.style import COLOURS, INK, Drawing, make_panels, place_legend
+
+_AXES = ("x", "y", "z")
+
+
+def draw_teleoperation(log: RunLog) -> Drawing:
+    """Where the leader has the tool and where that is, and what both sides feel."""
+    canvas, (way, apart, force) = make_panels(3)
+    led, tool = log["led_point"].values, log["y_t"].values
+    for k, axis in enumerate(_AXES):
+        way.plot(log.time, tool[:, k] - tool[0, k], color=COLOURS[k], label=axis)
+        way.plot(log.time, led[:, k] - led[0, k], "--", color=COLOURS[k], linewidth=0.9)
+    way.set(title="Way of the tool, and of the leader (dashed)", ylabel="way in m")
+    distance = np.linalg.norm((led - led[0]) - (tool - tool[0]), axis=1)
+    apart.plot(log.time, 1e3 * distance, color=COLOURS[0])
+    apart.set(title="Between where the leader is and the tool", ylabel="distance in mm")
+    felt = np.linalg.norm(log["leader_force"].values, axis=1)
+    given = np.linalg.norm(log["port_force"].values[:, 3:], axis=1)
+    force.plot(log.time, felt, color=COLOURS[1], label="that the hand feels")
+    force.plot(log.time, given, color=INK, linewidth=0.9, label="that leads the tool")
+    force.set(title="Forces", ylabel="force in N")
+    place_legend(way)
+    place_legend(force)
+    caption = (
+        "Ways since the start in the follower's lengths. A force at rest holds the leader off by "
+        "the force times the delay, by the impedance of the waves."
+    )
+    return Drawing("teleoperation", "Led from afar", caption, canvas)
+
+
+def draw_port_energy(log: RunLog) -> Drawing:
+    """Work of both ports, and the energy in channel and tanks."""
+    canvas, (work, stored, share) = make_panels(3)
+    done = -works(log)
+    work.plot(log.time, done[:, 0], color=COLOURS[0], label="taken from the hand")
+    work.plot(log.time, -done[:, 1], color=COLOURS[1], label="given to the follower")
+    bound = float(log["port_tank"].values[0].sum())
+    total = done.sum(axis=1)
+    work.plot(log.time, total, color=INK, label="taken less given")
+    work.axhline(-bound, color=INK, linestyle="--", linewidth=0.9, label="never below")
+    work.set(title="Work of the coupling's forces", ylabel="work in J")
+    tank, under_way = log["port_tank"].values, stored_in_channel(log)
+    for k, name in enumerate(("leader", "follower")):
+        stored.plot(log.time, tank[:, k], color=COLOURS[k], label=f"tank of the {name}")
+        stored.plot(
+            log.time, under_way[:, k], ":", color=COLOURS[k], label=f"under way from the {name}"
+        )
+    stored.set(title="Energy that is stored", ylabel="energy in J")
+    for k, name in enumerate(("leader", "follower")):
+        share.plot(log.time, log["port_share"].values[:, k], color=COLOURS[k], label=name)
+    share.set(title="Share of force and wave that could be paid", ylabel="share", ylim=(0, 1.05))
+    for panel in (work, stored, share):
+        place_legend(panel)
+    caption = (
+        "What the coupling takes from the hand, less what it gives to the follower, lies in tanks "
+        "and channel or is lost; it never gives more than was in the tanks at the start."
+    )
+    return Drawing("port_energy", "Energy of the teleoperation", caption, canvas)

@@ -1,0 +1,145 @@
+"""A tool that is led from afar: its signals, how well it follows, and its energy, checked."""
+
+import numpy as np
+
+from diagrams.scenario import Scenario
+from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.control.teleoperation.port import RECORD, SIDES
+from reporting.metrics import Metrics
+
+_AXES = ("x", "y", "z")
+_LONGEST = 1.5  # s, by which a tool may follow late
+_STEP = 4  # ticks between delays that are tried
+
+
+def add_teleoperation(log: RunLog, raw: dict[str, FloatArray]) -> None:
+    """Add what leader, channel and both ports did.
+
+    Args:
+        log: To add to.
+        raw: What the station logged.
+    """
+    if "leader_record" not in raw:
+        return
+    log.add("leader_position", raw["leader_state"][:, :3])
+    log.add("leader_hand", raw["leader_hand"][:, :3])
+    log.add("leader_force", raw["leader_motor"])
+    log.add("led_point", raw["led_point"])
+    for name, rows in RECORD.items():
+        size = rows.stop - rows.start
+        sides = [raw[f"{side}_record"][:, rows] for side in SIDES]
+        axes = _AXES if size > 1 else ("",)
+        labels = [f"{side} {axis}".strip() for side in SIDES for axis in axes]
+        log.add(f"port_{name}", np.hstack(sides), labels=labels)
+
+
+def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
+    """Return how well a tool followed from afar, and what the audit of its energy finds.
+
+    Args:
+        log: Log of a run.
+        settings: Its scenario.
+
+    Returns:
+        ``following_delay`` [s] and ``following_error`` [m]: by which delay the tool follows best,
+        and how far it is from there, rms; ``led_distance_end`` [m]: between the two when all is
+        over; ``largest_felt_force`` [N]; ``least_port_tank`` [J]; ``energy_margin`` [J]: how far
+        the work of the hand and of what the tool touches, as it truly was, stayed above what was
+        stored at the start; ``audit_ports`` [J]: beside the law of the tanks; ``audit_channel``
+        [J]: what arrived beyond what was sent.
+    """
+    metrics = Metrics()
+    way = settings.teleoperation
+    if way is None or "port_force" not in log or log.time.size < 2:
+        return metrics
+    delay, error = _following(log)
+    metrics.add("following_delay", delay)
+    metrics.add("following_error", error)
+    apart = log["led_point"].values[-1] - log["y_t"].values[-1]
+    metrics.add("led_distance_end", float(np.linalg.norm(apart)))
+    felt = np.linalg.norm(log["leader_force"].values, axis=1)
+    metrics.add("largest_felt_force", float(felt.max()))
+    metrics.add("least_port_tank", float(log["port_tank"].values.min()))
+    scale = way.motion_scale / way.force_scale
+    metrics.add("energy_margin", float(energy_above_bound(log, scale).min()))
+    metrics.add("audit_ports", tank_residual(log, way.tank.capacity if way.passive else np.inf))
+    metrics.add("audit_channel", float(np.max(-stored_in_channel(log), initial=0.0)))
+    return metrics
+
+
+def _following(log: RunLog) -> tuple[float, float]:
+    """Return the delay by which the tool follows best [s], and how far it is then, rms [m]."""
+    led, tool = log["led_point"].values, log["y_t"].values
+    period = float(np.median(np.diff(log.time)))
+    longest = min(round(_LONGEST / period), len(tool) // 2)
+    delays = range(0, max(longest, 1), _STEP)
+    errors = [
+        float(np.sqrt(np.mean(np.sum((led[: len(led) - d] - tool[d:]) ** 2, axis=1))))
+        for d in delays
+    ]
+    best = int(np.argmin(errors))
+    return delays[best] * period, errors[best]
+
+
+def works(log: RunLog) -> FloatArray:
+    """Return the work that each port's force did by each tick [J], shape (samples, 2).
+
+    Args:
+        log: Log of a run.
+    """
+    force, position = (log[f"port_{name}"].values for name in ("force", "position"))
+    steps = force[:-1] * np.diff(position, axis=0)
+    done = np.stack([steps[:, :3].sum(axis=1), steps[:, 3:].sum(axis=1)], axis=1)
+    return np.vstack([np.zeros(2), np.cumsum(done, axis=0)])
+
+
+def energy_above_bound(log: RunLog, scale: float) -> FloatArray:
+    """Return how far the true work on both ends is above minus what was stored [J], (samples,).
+
+    Args:
+        log: Log of a run.
+        scale: Work at the follower by that at the leader, motion scale by force scale.
+    """
+    hand = log["leader_hand"].values[:-1] * np.diff(log["leader_position"].values, axis=0)
+    total = scale * hand.sum(axis=1)
+    if "wrench_ext" in log:
+        total += _touching(log)
+    stored = float(log["port_tank"].values[0].sum())
+    if "tank" in log:
+        stored += float(log["tank"].values[0, 0])
+    return stored + np.concatenate([[0.0], np.cumsum(total)])
+
+
+def _touching(log: RunLog) -> FloatArray:
+    """Return the work at each tick of what the tool touches, shape (samples - 1,) [J]."""
+    wrench, y_t = log["wrench_ext"].values[:-1], log["y_t"].values
+    R = log["R_e"].values.reshape(-1, 3, 3)
+    turned = R[1:] @ np.swapaxes(R[:-1], 1, 2)
+    skew = (turned - np.swapaxes(turned, 1, 2)) / 2.0
+    angles = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+    moved = np.hstack([np.diff(y_t, axis=0), angles])
+    return np.asarray(np.sum(wrench * moved, axis=1))
+
+
+def stored_in_channel(log: RunLog) -> FloatArray:
+    """Return what each side sent that has not arrived [J], leader's first, shape (samples, 2).
+
+    Args:
+        log: Log of a run.
+    """
+    sent, received = log["port_sent"].values, log["port_received"].values
+    return np.asarray(sent - received[:, ::-1])
+
+
+def tank_residual(log: RunLog, capacity: float) -> float:
+    """Return how much the tanks are off their law at worst [J].
+
+    Args:
+        log: Log of a run.
+        capacity: Most that a tank holds [J].
+    """
+    tank, sent, received = (log[f"port_{name}"].values for name in ("tank", "sent", "received"))
+    work = np.diff(works(log), axis=0)
+    before = tank[:-1] - work + np.diff(received, axis=0)
+    expected = np.minimum(before, capacity) - np.diff(sent, axis=0)
+    return float(np.max(np.abs(expected - tank[1:]), initial=0.0))

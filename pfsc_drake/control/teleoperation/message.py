@@ -1,0 +1,12 @@
+"""What two sides tell each other, at every tick, and in which order it stands."""
+
+import numpy as np
+
+# number of the message, from 1 on; what is followed; what is felt; energy that was given away
+_SIZES = {"count": 1, "signal": 3, "felt": 3, "energy": 1}
+_ENDS = np.cumsum(list(_SIZES.values())).tolist()
+FIELDS = {
+    name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)
+}
+MESSAGE = _ENDS[-1]
+UNITS = "1, J^(1/2) s^(1/2) or m, N, J"

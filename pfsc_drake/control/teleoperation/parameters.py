@@ -1,0 +1,109 @@
+"""How leader and follower are coupled, and the numbers that keep them passive."""
+
+import math
+from dataclasses import dataclass, field
+
+from pfsc_drake.errors import require, require_one_of, require_positive
+
+COUPLINGS = ("waves", "position_force", "four_channel")
+
+
+@dataclass
+class PortTankParameters:
+    """Energy that one side may give to what it moves, beyond what it got [J].
+
+    Attributes:
+        capacity: Most that the tank holds [J].
+        initial: What it holds at the start [J]; where it holds less, the side damps what it moves.
+        refill: That damping, where the tank is empty [N s/m].
+        share: Share of what is above ``initial`` that a side without waves sends on in a second
+            [1/s].
+    """
+
+    capacity: float = 1.0
+    initial: float = 0.2
+    refill: float = 20.0
+    share: float = 20.0
+
+    def __post_init__(self) -> None:
+        require_positive("capacity", self.capacity)
+        good = 0.0 < self.initial <= self.capacity
+        require(good, "initial", self.initial, f"above 0, up to the capacity, {self.capacity:g} J")
+        for key in ("refill", "share"):
+            value = getattr(self, key)
+            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
+
+
+@dataclass
+class CouplingParameters:
+    """How leader and follower are coupled, in lengths and forces of the follower.
+
+    Attributes:
+        coupling: ``waves``: each side sends a wave, and no more energy than its own;
+            ``position_force``: the follower is drawn to where the leader is, the leader feels how
+            much; ``four_channel``: positions and felt forces go both ways.
+        passive: Whether no side gives energy that it has not got, whatever the channel does.
+        impedance: ``b`` of the waves [N s/m]; that of a follower that moves freely, its damping,
+            reflects none.
+        stiffness: K of the other couplings [N/m].
+        damping: D of the other couplings [N s/m].
+        force_share: Share of the other side's felt force, ``four_channel``.
+        motion_scale: How far the follower moves by the leader's way.
+        force_scale: What the leader feels of the follower's forces.
+        smoothing: Time constant [s] of each of two lags by which what arrives is taken over;
+            about half the jitter.
+        velocity_smoothing: Time constant [s] of the side's own velocity.
+        tank: What one side may give.
+    """
+
+    coupling: str = "waves"
+    passive: bool = True
+    impedance: float = 40.0
+    stiffness: float = 1000.0
+    damping: float = 40.0
+    force_share: float = 0.5
+    motion_scale: float = 1.0
+    force_scale: float = 1.0
+    smoothing: float = 0.01
+    velocity_smoothing: float = 0.004
+    tank: PortTankParameters = field(default_factory=PortTankParameters)
+
+    def __post_init__(self) -> None:
+        require_one_of("coupling", self.coupling, COUPLINGS)
+        for key in ("impedance", "stiffness", "motion_scale", "force_scale"):
+            require_positive(key, getattr(self, key))
+        for key in ("damping", "smoothing", "velocity_smoothing"):
+            value = getattr(self, key)
+            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
+        good = 0.0 <= self.force_share <= 1.0
+        require(good, "force_share", self.force_share, "0 to 1")
+
+
+@dataclass(frozen=True)
+class PortLimits:
+    """What a port may count on, of what it moves.
+
+    Attributes:
+        force: Largest force that it gives [N].
+        speed: Largest speed of what it moves [m/s].
+        ticks_late: Ticks after which its force acts.
+        period: Sampling time [s].
+
+    Raises:
+        InputError: If a number is out of range.
+    """
+
+    force: float
+    speed: float
+    ticks_late: int
+    period: float
+
+    def __post_init__(self) -> None:
+        for key in ("force", "speed", "period"):
+            require_positive(key, getattr(self, key))
+        require(0 <= self.ticks_late <= 10, "ticks_late", self.ticks_late, "0 to 10")
+
+    @property
+    def reserve(self) -> float:
+        """Most energy that forces take which are given and still to act [J]."""
+        return self.force * self.speed * self.period * (1 + self.ticks_late)

@@ -1,0 +1,195 @@
+"""One side of a teleoperation: what it does to what it moves, and what it tells the other side."""
+
+import math
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import scipy.linalg
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE, UNITS
+from pfsc_drake.control.teleoperation.parameters import CouplingParameters, PortLimits
+
+SIDES = ("leader", "follower")
+_RECORD = {"force": 3, "position": 3, "tank": 1, "sent": 1, "received": 1, "share": 1}
+_ENDS = np.cumsum(list(_RECORD.values())).tolist()
+RECORD = {
+    name: slice(end - size, end) for (name, size), end in zip(_RECORD.items(), _ENDS, strict=True)
+}
+
+
+class TeleoperationPort(Block):
+    r"""A force on what a side moves, from what the other side tells, paid from a tank.
+
+    Both sides are alike. With x the position of what is moved and v its velocity, by
+    ``coupling``::
+
+        waves            F = sqrt(2b) a - b v,     out: O = sqrt(2b) x - A
+        position_force   follower  F = K (x_o - x) + D (v_o - v),  out: x, F
+                         leader    F = -F_o,                       out: x
+        four_channel     F = K (x_o - x) + D (v_o - v) + c f_o,    out: x, f
+
+    Waves go as their integrals A and O (Niemeyer and Slotine): what a message lost is in the next
+    one, and where both sides rest, both positions are the same, drift or not. What arrives, A or
+    ``x_o``, is taken over by two lags ``tau``, and its rate is the wave a, or ``v_o``::
+
+        tau^2 A'' + 2 tau A' + A = A_arrived,   a = (A+ - A) / T
+
+    Energy (Franken et al.): the tank gets what the other side gave away, and pays the work of the
+    force and what is sent on. Work is counted as of a held force over the displacement of its tick,
+    which is exact (Stramigioli et al.)::
+
+        E = min(capacity, E- - F_k . (x_k+1 - x_k) + arrived) - sent
+
+    A wave takes ``T |o|^2 / 2`` with it, ``o = (O - what was sent) / T``; as
+    ``a^2/2 - F v = o^2/2``, that is what is left, and the tank stays as it is but for what arrives
+    unevenly. Others send a share of what is above the tank's initial content. What is sent leaves a
+    reserve, and a force is given that could not empty what is left at the largest speed. So E never
+    falls below zero, and both sides together give no more than their tanks held at the start,
+    whatever the channel delays or loses.
+
+    Where E is below its initial content, damping ``-d_r v`` fills it.
+
+    Ports:
+        position (input): x, in the world of the follower [m], shape (3,).
+        message (input): What arrived last from the other side, shape (8,), see :data:`FIELDS`;
+            zero if nothing did.
+        felt (input, optional): Force that the side feels, for the other one [N], shape (3,).
+        grip (input, optional): Share of the force that is given, shape (1,); 1 if not connected.
+        force (output): F [N], shape (3,); it acts ``ticks_late`` ticks later.
+        message (output): For the other side, shape (8,).
+        record (output): See :data:`RECORD`: the force that acts from this tick on, x since the
+            start, what is left in the tank, all that was sent and received, and the share of the
+            force and of the wave that could be paid.
+
+    State:
+        tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``, and its ``rate``; ``given``, what was sent of O;
+        ``origin``, ``last``: x at the start and at the last tick; ``velocity``; ``forces`` and
+        ``taken``: forces that are to act, and A that they are of, oldest last; ``begun``.
+
+    Args:
+        side: ``leader`` or ``follower``.
+        coupling: How it is coupled.
+        limits: What it may count on.
+    """
+
+    def __init__(self, side: str, coupling: CouplingParameters, limits: PortLimits) -> None:
+        self._side, self._coupling, self._limits = side, coupling, limits
+        self._waves = coupling.coupling == "waves"
+        self._takeover = _takeover(coupling.smoothing, limits.period)
+        count = 3 * (1 + limits.ticks_late)
+        self.inputs = {
+            "position": Port(3, "m"),
+            "message": Port(MESSAGE, UNITS),
+            "felt": Port(3, "N", optional=True),
+            "grip": Port(1, optional=True),
+        }
+        self.outputs = {
+            "force": Port(3, "N"),
+            "message": Port(MESSAGE, UNITS),
+            "record": Port(_ENDS[-1], "N, m, J, 1"),
+        }
+        self.states = {
+            "tank": 1, "sent": 1, "received": 1, "heard": 3, "rate": 3, "given": 3,
+            "origin": 3, "last": 3, "velocity": 3, "forces": count, "taken": count,
+        }  # fmt: skip
+        self.inner = {f"{name}_after": size for name, size in self.states.items()}
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """Return what is remembered at the start; what is left out is zero."""
+        return {"tank": self._coupling.tank.initial, "origin": u.position, "last": u.position}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        way, T = self._coupling, self._limits.period
+        position = where(all_finite(u.position), u.position, x.last)
+        there = position - x.origin
+        step = position - x.last
+        fade = 1.0 - math.exp(-T / way.velocity_smoothing) if way.velocity_smoothing > 0.0 else 1.0
+        velocity = x.velocity + fade * (step / T - x.velocity)
+        signal, energy = u.message[FIELDS["signal"]], u.message[FIELDS["energy"]]
+        heard, slope = ca.horzsplit(ca.horzcat(signal - x.heard, x.rate) @ self._takeover)
+        heard, rate = x.heard + heard, heard / T
+        tank = x.tank - ca.dot(x.forces[-3:], step) + energy - x.received
+        tank = ca.fmin(tank, way.tank.capacity) if way.passive else tank
+        given, sent, paid = self._send(x, there, tank)
+        left = tank - sent
+        force, share = self._affordable(x, u, self._force(x, u, there, velocity, rate, tank), left)
+        felt = u.felt if u.felt is not None else ca.DM.zeros(3)
+        felt = force if way.coupling == "position_force" else felt
+        told = given if self._waves else there
+        forces = ca.vertcat(force, x.forces)
+        message = ca.vertcat(t + 1.0, told, felt, x.sent + sent)
+        record = ca.vertcat(forces[-6:-3], there, left, x.sent + sent, energy, ca.fmin(share, paid))
+        after = {
+            "tank": left, "sent": x.sent + sent, "received": energy, "heard": heard, "rate": slope,
+            "given": given, "origin": x.origin, "last": position, "velocity": velocity,
+            "forces": forces[:-3], "taken": ca.vertcat(heard, x.taken)[:-3],
+        }  # fmt: skip
+        outputs = {"force": force, "message": message, "record": record}
+        return outputs | {f"{name}_after": value for name, value in after.items()}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """Return what is remembered at the next tick; what is left out stays."""
+        return {name: getattr(y, f"{name}_after") for name in self.states}
+
+    def _force(self, x: Values, u: Values, there: Any, velocity: Any, rate: Any, tank: Any) -> Any:
+        """Return the force that the coupling wants [N], shape (3,)."""
+        way, felt = self._coupling, u.message[FIELDS["felt"]]
+        if self._waves:
+            force = math.sqrt(2.0 * way.impedance) * rate - way.impedance * velocity
+        elif way.coupling == "position_force" and self._side == "leader":
+            force = -felt
+        else:
+            force = way.stiffness * (x.heard - there) + way.damping * (rate - velocity)
+            if way.coupling == "four_channel":
+                force += way.force_share * felt
+        if way.passive:
+            lack = ca.fmax(0.0, ca.fmin(1.0, 1.0 - tank / way.tank.initial))
+            force -= way.tank.refill * lack * velocity
+        return force
+
+    def _send(self, x: Values, there: Any, tank: Any) -> tuple[Any, Any, Any]:
+        """Return what was sent of O by now, energy that goes with it [J], and the share of it."""
+        way, T = self._coupling, self._limits.period
+        free = ca.fmax(0.0, tank - self._limits.reserve)
+        if not self._waves:
+            above = ca.fmax(0.0, tank - max(way.tank.initial, self._limits.reserve))
+            return x.given, T * way.tank.share * above if way.passive else ca.DM(0.0), ca.DM(1.0)
+        wanted = math.sqrt(2.0 * way.impedance) * there - x.taken[-3:] - x.given
+        energy = ca.sumsqr(wanted) / (2.0 * T)
+        share = where(energy > free, ca.sqrt(free / energy), 1.0) if way.passive else ca.DM(1.0)
+        return x.given + share * wanted, share**2 * energy, share
+
+    def _affordable(self, x: Values, u: Values, force: Any, left: Any) -> tuple[Any, Any]:
+        """Return the force that is given [N], and its share of what is wanted."""
+        limits = self._limits
+        size, most = ca.norm_2(force), limits.force
+        if self._coupling.passive:
+            pending = ca.fmax(0.0, left) / (limits.speed * limits.period)
+            for k in range(limits.ticks_late):
+                pending -= ca.norm_2(x.forces[3 * k : 3 * k + 3])
+            most = ca.fmin(most, ca.fmax(0.0, pending))
+        share = where(size > most, most / size, 1.0)
+        grip = ca.DM(1.0) if u.grip is None else ca.fmax(0.0, ca.fmin(1.0, u.grip))
+        return grip * share * force, share
+
+
+def _takeover(smoothing: float, period: float) -> ca.DM:
+    """Return how what is missing, and the rate, become steps and rates, shape (2, 2).
+
+    ``[missing, rate] M = [step, rate]`` after a period in which the aim stays, exactly.
+
+    Args:
+        smoothing: ``tau`` [s]; 0 takes all over at once.
+        period: T [s].
+    """
+    if smoothing == 0.0:
+        return ca.DM([[1.0, 0.0], [0.0, 0.0]])
+    # of [missing, rate]
+    slope = np.array([[0.0, -1.0], [smoothing**-2, -2.0 / smoothing]])
+    over = scipy.linalg.expm(period * slope)
+    steps = np.array([1.0, 0.0]) - over[0]
+    return ca.DM(np.column_stack([steps, over[1]]))

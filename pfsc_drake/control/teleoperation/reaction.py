@@ -1,0 +1,85 @@
+"""Where a tool is that is led, and what it feels, for whoever leads it from elsewhere."""
+
+from typing import Any
+
+import casadi as ca
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
+
+
+class FixtureReaction(Block):
+    """Where guidance has the tool, and what regions and surroundings do to it.
+
+    Ports:
+        record (input): Of the guidance, see :class:`GuidanceRecord`.
+        wrench (input, optional): Of the surroundings on the tool as measured, shape (6,) [N, Nm].
+        position (output): ``z`` [m], shape (3,), the last one that was finite.
+        felt (output): ``f + sum phi_i n_i`` [N], shape (3,).
+
+    State:
+        last: ``z`` [m].
+
+    Args:
+        num_regions: M.
+    """
+
+    def __init__(self, num_regions: int) -> None:
+        self._record = GuidanceRecord(num_regions)
+        self.inputs = {
+            "record": Port(self._record.size),
+            "wrench": Port(6, "N, Nm", optional=True),
+        }
+        self.outputs = {"position": Port(3, "m"), "felt": Port(3, "N")}
+        self.states = {"last": 3}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        z, near = (u.record[self._record.fields[name]] for name in ("point", "near"))
+        slots = ca.reshape(near, len(SLOT), -1).T
+        n = slots[:, SLOT.index("n_x") : SLOT.index("n_z") + 1]
+        felt = n.T @ slots[:, SLOT.index("phi")]
+        if u.wrench is not None:
+            felt += u.wrench[:3]
+        known = all_finite(z, felt)
+        return {"position": where(known, z, x.last), "felt": where(known, felt, 0.0)}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """Return what is remembered at the next tick; what is left out stays."""
+        return {"last": y.position}
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """Return what is remembered at the start; what is left out is zero."""
+        return {"last": u.record[self._record.fields["point"]]}
+
+
+class LedPoint(Block):
+    """Where a tool comes to rest that follows a path or a surface, and what it feels.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
+        wrench (input): Of the surroundings on the tool as measured, shape (6,) [N, Nm].
+        position (output): ``y_t + lag y_t'`` [m], shape (3,).
+        felt (output): Its force [N], shape (3,).
+
+    Args:
+        robot: The robot as it is believed.
+        lag: Between what is asked of the tool and where it is [s].
+    """
+
+    def __init__(self, robot: RobotModel, lag: float) -> None:
+        self._size, self._lag = robot.dimension, lag
+        self._motion = tool_motion_function(robot)
+        self.inputs = {
+            "joint_state": Port(4 * robot.dimension, "rad, rad/s or m, m/s"),
+            "wrench": Port(6, "N, Nm"),
+        }
+        self.outputs, self.states = {"position": Port(3, "m"), "felt": Port(3, "N")}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        n = self._size
+        motion = self._motion(u.joint_state[:n], u.joint_state[n : 2 * n])
+        return {"position": motion[:3] + self._lag * motion[12:15], "felt": u.wrench[:3]}
