@@ -44,6 +44,7 @@ class PacedReference(Block):
         stretch_speeds (input, optional): ``w_j``, shape (J,) [m/s].
         reference (output): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,)
             [m, m/s, ..]; transversal and rotational references are zero.
+        motion (output): The same of the arc length alone, shape (r + 1,).
         stop (output): Where it would rest at most if it braked from the next tick on [m], (1,).
         overrun (output): By how much it will pass g at most [m], shape (1,); zero as a rule.
 
@@ -82,6 +83,7 @@ class PacedReference(Block):
         }
         self.outputs = {
             "reference": Port((order + 1) * num_outputs, "m, m/s, .."),
+            "motion": Port(order + 1, "m, m/s, .."),
             "stop": Port(1, "m"),
             "overrun": Port(1, "m"),
         }
@@ -107,6 +109,7 @@ class PacedReference(Block):
         later = ca.fmax(stop, ca.fmin(goal, stop + 2.0 * T * speed + 1.5 * A * T**2))
         return {
             "reference": ca.vec(ca.horzcat(eta, ca.densify(rest)).T),
+            "motion": eta,
             "stop": later,
             "overrun": ca.fmax(stop - goal, 0.0),
         }

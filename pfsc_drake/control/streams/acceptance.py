@@ -6,7 +6,7 @@ import casadi as ca
 
 from pfsc_drake.blocks.block import Values
 from pfsc_drake.blocks.cases import all_finite, where
-from pfsc_drake.control.streams.course import POSE, POSITION, Course
+from pfsc_drake.control.streams.course import POSE, POSITION, Course, picked
 from pfsc_drake.control.streams.growth import Fields, Growth
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
 from pfsc_drake.control.streams.parameters import StreamParameters
@@ -88,7 +88,7 @@ class Acceptance:
         d, M = self._layout.dimension, self._layout.length
         waiting = message[0] - taken
         place = ca.fmin(ca.fmax(M - waiting, 0.0), M - 1.0)
-        return ca.MX(message)[2 + (d + 1) * ca.MX(place) + ca.DM(range(d + 1))], waiting > M
+        return picked(message, 2.0 + (d + 1) * place + ca.DM(range(d + 1))), waiting > M
 
     def offer(self, x: Values, known: Fields, message: Any) -> Offer:
         """Return what the next way point is to the path."""

@@ -99,7 +99,19 @@ class Course:
             position_only: Whether their quaternions are left out.
         """
         d, count = self.dimension, self.spline.degree + 1
-        own = ca.MX(points)[d * ca.MX(span) + ca.DM(range(d * count))]
+        own = picked(points, d * span + ca.DM(range(d * count)))
         if not position_only or d == POSITION:
             return own
         return ca.vec(ca.reshape(own, d, count)[:POSITION, :])
+
+
+def picked(values: Any, places: Any) -> Any:
+    """Return values at places that are calculated.
+
+    Args:
+        values: Numbers or an expression, shape (n,).
+        places: Whole numbers from 0 to n - 1, or an expression of them, shape (k,).
+    """
+    if isinstance(values, ca.DM) and isinstance(places, ca.DM):
+        return values[[int(place) for place in places.full().ravel()]]
+    return ca.MX(values)[ca.MX(places)]

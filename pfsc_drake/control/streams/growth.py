@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.control.streams.course import POSE, POSITION, Course
+from pfsc_drake.control.streams.course import POSE, POSITION, Course, picked
 from pfsc_drake.control.streams.parameters import StreamParameters
 
 # of the spacing of way points, the least |sigma'| of a path that is regular
@@ -53,13 +53,15 @@ class Growth:
             spacing: Distance of its control points [m].
         """
         course, middle = self._course, self._course.columns - 1 - self._course.spline.reach
+        # the first piece begins with control point 0
+        before = 2 * course.spline.reach + 1
         places = spacing * (np.arange(course.columns) - middle)
         points = np.tile(at_rest, (course.columns, 1))
         points[:, :POSITION] += np.outer(places, direction)
         return {
-            "first": ca.DM(-middle),
+            "first": ca.DM(-middle - before),
             "piece": ca.DM(0.0),
-            "root": ca.DM(self.root - middle),
+            "root": ca.DM(self.root - middle - before),
             "points": ca.DM(points.ravel()),
             "eta": ca.DM(spacing * (np.arange(course.spans + 1) - self.root)),
             "speed": ca.DM(np.full(course.spans, self._parameters.velocity)),
@@ -104,10 +106,11 @@ class Growth:
             newest: The last way point, which is its own control point.
             further: How many control points it would be beyond the last one.
         """
-        d, columns = self._course.dimension, ca.MX(self._course.columns)
-        far = ca.fmax(further, 1.0)
-        points, part = ca.MX(known["points"]), ca.DM(range(d))
-        middle, other = (points[d * (columns - k * far) + part] for k in (1.0, 2.0))
+        d, columns = self._course.dimension, self._course.columns
+        far, part = ca.fmax(further, 1.0), ca.DM(range(d))
+        middle, other = (
+            picked(known["points"], d * (columns - k * far) + part) for k in (1.0, 2.0)
+        )
         return where(further > 0.0, 2.0 * middle - other, newest)
 
     def begun(self, known: Fields, controls: Sequence[Any], eta: Any) -> Fields:
@@ -159,12 +162,13 @@ class Growth:
         which = ca.vec(
             ca.repmat(d * columns.T, d, 1) + ca.repmat(ca.DM(range(d)), 1, len_(columns))
         )
-        after = known["points"][d * ca.fmin(last + 1.0, course.columns - 1.0) + ca.DM(range(d))]
+        next_one = d * ca.fmin(last + 1.0, course.columns - 1.0) + ca.DM(range(d))
+        after = picked(known["points"], next_one)
         cut = known | {
             "first": known["first"] - gone,
-            "points": known["points"][which],
-            "eta": known["eta"][ca.fmax(ca.DM(range(course.spans + 1)) - gone, 0.0)],
-            "speed": known["speed"][ca.fmax(ca.DM(range(course.spans)) - gone, 0.0)],
+            "points": picked(known["points"], which),
+            "eta": picked(known["eta"], ca.fmax(ca.DM(range(course.spans + 1)) - gone, 0.0)),
+            "speed": picked(known["speed"], ca.fmax(ca.DM(range(course.spans)) - gone, 0.0)),
         }
         return cut, after, gone
 

@@ -51,7 +51,7 @@ class WaypointIntake(Block):
     Ports:
         waypoints (input): Message laid out by :class:`WaypointLayout`.
         manifold_point (input): Point of the path next to the tool, of which theta is read.
-        reference (input): Derivatives 0..r of the virtual output's reference by rows.
+        motion (input): Derivatives of the reference's arc length, shape (n + 1,).
         stop (input): Arc length at which the reference can stop [m], shape (1,).
         course (output): The path, laid out by :class:`Course`.
         goal (output): Arc length at which the free way ends [m], shape (1,).
@@ -71,7 +71,7 @@ class WaypointIntake(Block):
         course: Layout of the path.
         parameters: How way points become a path.
         layout: Layout of the messages.
-        num_outputs: m.
+        highest: Order n of the highest derivative of the reference.
         period: Sampling time [s].
         at_rest: Where the tool rests at the start: position [m], and quaternion where way points
             have one, shape (d,).
@@ -86,14 +86,14 @@ class WaypointIntake(Block):
         course: Course,
         parameters: StreamParameters,
         layout: WaypointLayout,
-        num_outputs: int,
+        highest: int,
         period: float,
         *,
         at_rest: ArrayLike,
         direction: ArrayLike = (1.0, 0.0, 0.0),
     ) -> None:
         self._course, self._parameters, self._layout = course, parameters, layout
-        self._growth, self._m = Growth(course, parameters), num_outputs
+        self._growth, self._highest = Growth(course, parameters), highest
         self._patience = round(parameters.patience / period)
         self._begin, along = np.asarray(at_rest, dtype=float), np.asarray(direction, dtype=float)
         d, r = course.dimension, course.order
@@ -106,7 +106,7 @@ class WaypointIntake(Block):
         self.inputs = {
             "waypoints": Port(layout.size, "1, m"),
             "manifold_point": Port(PathPointLayout(r, d == POSE).size),
-            "reference": Port((r + 1) * num_outputs, "m, m/s, .."),
+            "motion": Port(highest + 1, "m, m/s, .."),
             "stop": Port(1, "m"),
         }
         self.outputs = {
@@ -149,7 +149,7 @@ class WaypointIntake(Block):
             "goal": goal,
             "stretches": known["eta"],
             "stretch_speeds": known["speed"],
-            "stream": ca.vertcat(status, counts.taken, goal - u.reference[0]),
+            "stream": ca.vertcat(status, counts.taken, goal - u.motion[0]),
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
@@ -167,14 +167,14 @@ class WaypointIntake(Block):
         acts = ca.logic_or(ca.logic_or(grows, begins), counts.phase >= ENDING)
         told = ca.vertcat(x.counts[:6], silence, counts.reason)
         remembered = [x.course, x.older, x.newest, x.fresh, told, x.rest]
-        given = [u.waypoints, ca.vertcat(u.reference[self._derivatives]), u.stop, runs_dry]
+        given = [u.waypoints, u.motion[: self._watched], u.stop, runs_dry]
         after = self._whether(acts, *remembered, *given)
         return dict(zip(self.states, after, strict=True))
 
     @property
-    def _derivatives(self) -> list[int]:
-        """Where in the reference the first derivatives of the arc length stand."""
-        return [k * self._m for k in range(min(3, self._course.order + 1))]
+    def _watched(self) -> int:
+        """How many derivatives tell whether the reference rests, the arc length itself included."""
+        return min(len(_AT_REST), self._highest + 1)
 
     def _is_urgent(self, counts: Counts, u: Values) -> Any:
         """Return whether the next way point begins a new path, or has been missed."""
@@ -185,7 +185,7 @@ class WaypointIntake(Block):
     @cached_property
     def _whether(self) -> ca.Function:
         """``(acts, states, inputs) -> states``: what becomes of them if there is anything to do."""
-        sizes = [*self.states.values(), self._layout.size, len(self._derivatives), 1, 1]
+        sizes = [*self.states.values(), self._layout.size, self._watched, 1, 1]
         arguments = [ca.MX.sym(f"a{k}", size) for k, size in enumerate(sizes)]
         states = arguments[: len(self.states)]
         x = Values(**dict(zip(self.states, states, strict=True)))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, is_finite, where
-from pfsc_drake.control.streams.course import POSE, Course
+from pfsc_drake.control.streams.course import POSE, Course, picked
 from pfsc_drake.geometry import ProjectionStatus
 from pfsc_drake.geometry.evaluator import alpha_function
 from pfsc_drake.geometry.foot import GOES_ON, MINIMUM, step_function
@@ -39,8 +39,8 @@ class StreamedProjector(Block):
         manifold_point (output): The path next to the tool, laid out by ``layout``.
 
     State:
-        foot: ``[piece, theta, sigma, e_par, e_perp]`` of the last foot, shape (11,). It starts at
-        the begin of the piece, and stays where it is while the tool is nowhere.
+        place: theta of the last foot. foot: ``[piece, sigma, e_par, e_perp]`` there, shape (10,).
+        They start at the begin of the piece, and stay as they are while the tool is nowhere.
 
     Args:
         course: What is known of the path.
@@ -56,7 +56,8 @@ class StreamedProjector(Block):
         self.layout = PathPointLayout(course.order, course.dimension == POSE)
         self.inputs = {"tool_pose": Port(12, "m, 1"), "course": Port(course.size)}
         self.outputs = {"manifold_point": Port(self.layout.size)}
-        self.states, self.inner = {"foot": 11}, {"next_foot": 11}
+        self.states = {"place": 1, "foot": 10}
+        self.inner = {"next_place": 1, "next_foot": 10}
         domain = [(0.0, float(course.spans))]
         self._step = step_function(domain, [False], _LONGEST_STEP)
         self._point = course.spline.point_function(course.dimension, course.order + 1)
@@ -74,14 +75,14 @@ class StreamedProjector(Block):
             direction = where(steep, ca.DM([1.0, 0.0, 0.0]), upwards)
         else:
             direction = ca.DM(np.asarray(self._normal, dtype=float))
-        place = ca.vertcat(known["piece"], known["first"] + theta, sigma, e_par)
-        return {"foot": ca.vertcat(place, _across(direction, e_par))}
+        foot = ca.vertcat(known["piece"], sigma, e_par, _across(direction, e_par))
+        return {"place": known["first"] + theta, "foot": foot}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         layout, known, y = self.layout, self._course.split(u.course), u.tool_pose[:3]
-        piece, last = x.foot[0], x.foot[1]
-        guess = where(piece == known["piece"], last, known["root"]) - known["first"]
+        begun = x.foot[0] != known["piece"]
+        guess = where(begun, known["root"], x.place) - known["first"]
         theta, state = self._found(known, y, guess)
         derivatives, span, part = self._on(known, theta)
         r, d = layout.order, self._course.dimension
@@ -89,10 +90,10 @@ class StreamedProjector(Block):
         position = ca.vertcat(*[row[:3] for row in rows])
         sigma, slope = position[:3], position[3:6]
         own = self._course.of_span(known["points"], span, position_only=True)
-        eta = known["eta"][span] + self._course.spline.length(own, part)
+        eta = picked(known["eta"], span) + self._course.spline.length(own, part)
         alpha = alpha_function(1)(y, ca.reshape(position[:9], 3, 3))
         e_par = slope / ca.norm_2(slope)
-        normal = _transported(x.foot[2:5], x.foot[5:8], x.foot[8:11], sigma, e_par)
+        normal = _transported(*ca.vertsplit(x.foot[1:], 3), sigma, e_par)
         least, _, beyond, ended = ca.vertsplit(state[3:])
         found = where(
             ended == GOES_ON, ca.fabs(state[2]) < _STALLED * self._course.spans, ended == MINIMUM
@@ -108,12 +109,17 @@ class StreamedProjector(Block):
         told = ca.vertcat(eta, alpha, status, normal, position, *turned)
         told = where(is_finite(least), ca.vertcat(place, told), math.nan)
         told = ca.vertcat(told[:3], status, told[4:])
-        after = ca.vertcat(known["piece"], place, sigma, e_par, normal)
-        return {"manifold_point": told, "next_foot": where(all_finite(after), after, x.foot)}
+        foot = ca.vertcat(known["piece"], sigma, e_par, normal)
+        known_foot = all_finite(place, foot)
+        return {
+            "manifold_point": told,
+            "next_place": where(known_foot, place, x.place),
+            "next_foot": where(known_foot, foot, x.foot),
+        }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
-        return {"foot": y.next_foot}
+        return {"place": y.next_place, "foot": y.next_foot}
 
     def _span(self, theta: Any) -> tuple[Any, Any]:
         """Return the number of a place's span, and the part of it that has been gone through."""

@@ -18,7 +18,7 @@ from pfsc_drake.systems.fuse import fuse
 
 PERIOD = 1e-3
 _WIRES = """
-t.tool_pose.p i.course.p p.manifold_point.i p.manifold_point.t r.reference.i r.reference.t
+t.tool_pose.p i.course.p p.manifold_point.i p.manifold_point.t r.motion.i r.reference.t
 r.stop.i i.goal.r i.stretches.r i.stretch_speeds.r
 """
 _TOLD = "i.course i.goal i.stream p.manifold_point r.reference r.overrun"
@@ -71,7 +71,7 @@ class Stream:
         self.course = Course(order, len(start), parameters.columns)
         self.layout = WaypointLayout(len(start), length)
         intake = WaypointIntake(
-            self.course, parameters, self.layout, m, PERIOD, at_rest=start, direction=direction
+            self.course, parameters, self.layout, order, PERIOD, at_rest=start, direction=direction
         )
         projector = StreamedProjector(self.course)
         pace = PacedReference(parameters.limits, order, m, PERIOD, stretches=self.course.spans)
