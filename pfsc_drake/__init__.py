@@ -3,8 +3,8 @@
 After B. Bischof, "Path and Surface Following Control for Industrial Robotic
 Applications", dissertation, TU Wien, 2018.
 
-The three doors, :func:`add_path_following`, :func:`add_surface_following` and
-:func:`add_guidance`, and what their arguments are made of. Behind it, imports only
+The doors, :func:`add_path_following`, :func:`add_path_streaming`, :func:`add_surface_following`
+and :func:`add_guidance`, and what their arguments are made of. Behind it, imports only
 point downwards:
 
 * :mod:`pfsc_drake.following`: whole controllers, from the joint state to the drives.
@@ -43,9 +43,12 @@ _DOOR = {
     "Profile": "pfsc_drake.control.compliance.impedance_parameters",
     "SphereRegion": "pfsc_drake.geometry.regions.shapes",
     "StreamLimits": "pfsc_drake.control.law.timed_reference",
+    "StreamParameters": "pfsc_drake.control.streams.parameters",
+    "WaypointSender": "pfsc_drake.control.streams.messages",
     "WaypointTable": "pfsc_drake.geometry",
     "add_guidance": "pfsc_drake.following.guidance",
     "add_path_following": "pfsc_drake.following.path_following",
+    "add_path_streaming": "pfsc_drake.following.streaming",
     "add_surface_following": "pfsc_drake.following.surface_following",
     "export": "pfsc_drake.codegen.export",
     "fuse": "pfsc_drake.systems.fuse",

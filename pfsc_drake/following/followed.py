@@ -11,7 +11,9 @@ from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.manifold import Manifold, Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.control.streams.projector import StreamedProjector
 from pfsc_drake.following.options.follower import FixtureOptions
+from pfsc_drake.following.streamed_path import StreamedPath
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
@@ -44,22 +46,25 @@ class Followed:
     Attributes:
         manifold: The manifold that the law makes linear.
         projector: Finds the place of the tool on it.
-        motion: Tangential coordinates of the reference over time [m]; None where a hand leads.
+        motion: Tangential coordinates of the reference over time [m]; None where a hand leads, and
+            where way points come while the tool moves.
         start: Where the tool is when the motion begins.
         point: The manifold's point there, laid out by the manifold's layout.
         lap: Length of the path [m] if it is closed.
         length: Length of the path [m], if there is one.
         guided: What a hand leads the tool through, where one leads.
+        streamed: The path, where its way points come while the tool moves.
     """
 
     manifold: Manifold
-    projector: Projector
+    projector: Projector | StreamedProjector
     motion: PiecewisePolynomialCurve | None
     start: ToolTarget
     point: np.ndarray
     lap: float | None = None
     length: float = 0.0
     guided: Guided | None = None
+    streamed: StreamedPath | None = None
 
 
 @dataclass(frozen=True)

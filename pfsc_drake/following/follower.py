@@ -29,6 +29,7 @@ from pfsc_drake.following.options.controller import (
 )
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.prediction import add_prediction
+from pfsc_drake.following.streamed_path import StreamedPath, add_stream
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_rest
@@ -51,6 +52,8 @@ class Follower(Diagram):
         override (input, optional): Pace of the motion, shape (1,); see :class:`TimedReference`.
         goal (input): With ``stream``: arc length of the last way point [m], shape (1,), and
         speed (input, optional): how fast to go there [m/s]; see :class:`StreamedReference`.
+        waypoints (input): On a path of way points that come: a message of the last of them, see
+            :func:`~pfsc_drake.add_path_streaming`.
         wrench (input): Force and torque on the tool at the tool point, world axes, shape (6,)
             [N, Nm], the load of the tool itself taken off: where a hand leads the tool, where it
             yields by ``compliance``, and where the law or the posture is told of forces that are
@@ -64,6 +67,7 @@ class Follower(Diagram):
         limit_force (output): Where a hand leads it along a manifold: by what forces the robot's
             limits hold it, see :class:`LedMotion`.
         mode, record (output): Where a hand leads it through space, see :class:`FixtureGuidance`.
+        stream (output): On a path of way points that come: what became of them.
         manifold_state (output): Derivatives 0..r-1 of the virtual output by rows, shape (r m,).
         manifold_point (output): Where on the manifold the tool is.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
@@ -181,8 +185,11 @@ class Follower(Diagram):
         controller, signals, _ = add_controller(
             builder, law, believed, chosen, options.faults, ports, observed, predictor
         )
-        desired, made = self._motion(options, signals)
         followed, robot = self.followed, self.robot
+        if followed.streamed is not None:
+            desired, made = self._streamed(followed.streamed, options, projector)
+        else:
+            desired, made = self._motion(options, signals)
         motion = followed.motion if options.stream is None else None
         end = math.inf if motion is None else motion.domain[1]
         wanted = Wanted(self.start_posture, options.transition, followed.lap, followed.length, end)
@@ -195,7 +202,7 @@ class Follower(Diagram):
         builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
         builder.ExportOutput(drive, controller.drive_port)
         builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
-        for name in ("reference", "manifold_force", "limit_force", "mode", "record"):
+        for name in ("reference", "manifold_force", "limit_force", "mode", "record", "stream"):
             if name in made:
                 builder.ExportOutput(made[name], name)
         builder.ExportOutput(ports["manifold_point"], "manifold_point")
@@ -215,6 +222,19 @@ class Follower(Diagram):
         measured = wrench.GetOutputPort("measured")
         made |= {"wrench_measured": measured} if sensed else {}
         return made | ({"wrench_ext": measured} if known else {})
+
+    def _streamed(
+        self, path: StreamedPath, options: FollowerOptions, projector: BlockSystem
+    ) -> tuple[OutputPort, Ports]:
+        """Return the reference along a path of way points that come, and what is told of them."""
+        only = "no override and no stream: way points themselves come"
+        require(not (options.override or options.stream), "options", "both given", only)
+        linearization = self.law.linearization
+        order = reference_order(options.compliance, linearization)
+        m, builder = linearization.num_outputs, self._builder
+        stream = add_stream(builder, path, projector, order, m, self.period)
+        builder.ExportInput(stream.waypoints, "waypoints")
+        return stream.reference, {"stream": stream.stream}
 
     def _motion(self, options: FollowerOptions, signals: Ports) -> tuple[OutputPort, Ports]:
         """Return the reference before it yields, and what else is told of it."""

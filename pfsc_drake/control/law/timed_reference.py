@@ -205,7 +205,7 @@ class StreamedReference(Block):
     ) -> None:
         self._limits, self._order, self._m, self._period = limits, order, num_outputs, period
         self._start, self._end = start, end
-        self._rates = _lags(order, limits.bandwidth)
+        self._rates = lags(order, limits.bandwidth)
         self._step = ca.DM(expm(period * self._rates)[:-1])
         self.inputs = {"goal": Port(1, "m"), "speed": Port(1, "m/s", optional=True)}
         self.outputs = {"reference": Port((order + 1) * num_outputs, "m, m/s, ..")}
@@ -250,13 +250,23 @@ class StreamedReference(Block):
             fastest = ca.fmin(ca.fmax(asked, 0.0), fastest)
         place, speed = ca.vertsplit(x.place)
         left = ca.fmax(goal - place - T * speed / 2.0, 0.0)
-        # the difference of two roots, without cancellation
-        to_stop = 2.0 * left / (ca.sqrt(T**2 + 2.0 * left / A) + T)
-        wanted = ca.fmin(ca.fmin(fastest, speed + A * T), to_stop)
+        wanted = ca.fmin(ca.fmin(fastest, speed + A * T), speed_to_stop(left, A, T))
         return ca.fmax(wanted, ca.fmax(speed - A * T, 0.0))
 
 
-def _lags(order: int, bandwidth: float) -> np.ndarray:
+def speed_to_stop(left: Any, acceleration: float, period: float) -> Any:
+    """Return the largest speed at the end of a period from which there is room to stop [m/s].
+
+    Args:
+        left: Way left, less what half a period at the speed before takes [m], not negative.
+        acceleration: A [m/s^2].
+        period: T [s].
+    """
+    # the difference of two roots, without cancellation
+    return 2.0 * left / (ca.sqrt(period**2 + 2.0 * left / acceleration) + period)
+
+
+def lags(order: int, bandwidth: float) -> np.ndarray:
     """Return the rates of ``[y, y', .., y^(r-1), p, v, a]``, shape (r + 3, r + 3)."""
     poles = np.polynomial.polynomial.polyfromroots([-bandwidth] * order)
     rates = np.zeros((order + 3, order + 3))

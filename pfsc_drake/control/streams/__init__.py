@@ -1,0 +1,1 @@
+"""Paths whose way points come while the tool moves."""

@@ -1,0 +1,305 @@
+"""Way points that come while the tool moves become a path that it can always stop on."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import BSpline
+from tests.control.streams.streaming import PERIOD, Stream, sent_at
+
+from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
+from pfsc_drake.control.streams.parameters import StreamParameters
+from pfsc_drake.errors import InputError
+
+BEND = StreamParameters(spacing=0.012, velocity=0.5)
+
+
+def bend(count=61):
+    """Return way points about 0.02 m from each other, (count, 3)."""
+    s = np.linspace(0.0, 0.02 * (count - 1), count)
+    return np.stack([0.8 + 0.2 * np.sin(4.0 * s), s, 1.0 + 0.1 * np.cos(5.0 * s)], axis=1)
+
+
+def even(count, rate=20.0):
+    return np.arange(count) / rate
+
+
+@pytest.fixture(name="run", scope="module")
+def fixture_run():
+    w = bend()
+    stream = Stream(BEND, w[0])
+    return stream.run(sent_at(stream.layout, w[1:], even(len(w) - 1)), 6000, keep=10)
+
+
+def whole_path(run):
+    """Return the spline through all control points of a run of one piece, theta being their own."""
+    d, columns = run.course.dimension, run.course.columns
+    points = {}
+    for course in run.courses:
+        first = int(course[0])
+        own = course[3 : 3 + d * columns].reshape(columns, d)
+        # those of before the first way point do not count
+        points |= {first + k: own[k] for k in range(columns) if course[1] == 1.0}
+    numbers = sorted(points)
+    assert numbers == list(range(numbers[0], numbers[-1] + 1))
+    degree = run.course.order + 2
+    knots = np.arange(numbers[0] - degree, numbers[-1] + 2, dtype=float)
+    return BSpline(knots, np.array([points[n] for n in numbers]), degree)
+
+
+def test_it_leads_by_all_way_points_and_ends_at_the_last(run):
+    w, begun = bend(), run.pieces == 1.0
+    off = [np.linalg.norm(run.sigma[begun] - point, axis=1).min() for point in w]
+    # 0.5 mm of way a tick
+    assert max(off) < 3e-4
+    np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
+    assert run.stream[-1, 0] == StreamStatus.WAITING
+    assert run.stream[-1, 1] == len(w) - 1
+
+
+def test_it_never_passes_what_it_knows_and_leaves_room_to_stop(run):
+    assert run.overrun.max() <= 1e-12
+    assert np.all(run.eta[:, 0] <= run.goal + 1e-12)
+    assert run.eta[:, 1].max() > 0.9 * BEND.velocity
+    assert np.abs(np.diff(run.eta[:, 1])).max() <= BEND.acceleration * PERIOD * (1.0 + 1e-6)
+
+
+def test_control_points_never_change(run):
+    d, columns, seen = 3, run.course.columns, {}
+    for course in run.courses:
+        if course[1] != 1.0:
+            continue
+        own = course[3 : 3 + d * columns].reshape(columns, d)
+        for k in range(columns):
+            number = int(course[0]) + k
+            np.testing.assert_array_equal(seen.setdefault(number, own[k]), own[k])
+
+
+def test_arc_length_and_frame_are_those_of_the_whole_spline(run):
+    spline, layout = whole_path(run), run.layout
+    begun = np.flatnonzero(run.pieces == 1.0)
+    first, last = run.points[begun[0]], run.points[-1]
+    slope, bent = spline.derivative(1), spline.derivative(2)
+    knots = np.arange(np.ceil(first[0]), last[0])
+    length, _ = quad(
+        lambda theta: np.linalg.norm(slope(theta)),
+        first[0],
+        last[0],
+        limit=400,
+        points=knots,
+        epsabs=1e-11,
+    )
+    assert last[1] - first[1] == pytest.approx(length, abs=1e-9)
+
+    def rate(theta, normal):
+        tangent, speed = slope(theta), np.linalg.norm(slope(theta))
+        turning = (bent(theta) - tangent * (tangent @ bent(theta)) / speed**2) / speed
+        return -(turning @ normal) * tangent / speed
+
+    begin = first[layout.normal]
+    solved = solve_ivp(
+        rate, (first[0], last[0]), begin, method="DOP853", rtol=1e-11, atol=1e-12, max_step=0.5
+    )
+    np.testing.assert_allclose(last[layout.normal], solved.y[:, -1], rtol=0, atol=1e-8)
+
+
+def test_derivatives_are_those_of_the_whole_spline(run):
+    spline, layout = whole_path(run), run.layout
+    for k in (1500, 3000):
+        found = run.points[k, layout.position].reshape(-1, 3)
+        expected = [spline(run.points[k, 0], nu=j) for j in range(6)]
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_laws_of_other_orders_get_the_same_end(order):
+    w = bend(20)
+    stream = Stream(BEND, w[0], order=order)
+    run = stream.run(sent_at(stream.layout, w[1:], even(19)), 3500)
+    np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
+    assert run.overrun.max() <= 1e-12
+    assert run.stream[-1, 0] == StreamStatus.WAITING
+
+
+def test_a_stream_that_runs_dry_is_followed_to_its_last_point_and_goes_on_later():
+    w = bend(40)
+    times = even(39)
+    times[20:] += 3.0
+    stream = Stream(BEND, w[0])
+    run = stream.run(sent_at(stream.layout, w[1:], times), 7500)
+    pause = round((times[20] - 0.01) / PERIOD)
+    np.testing.assert_allclose(run.sigma[pause], w[20], rtol=0, atol=1e-7)
+    assert run.stream[pause, 0] == StreamStatus.WAITING
+    np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
+    assert run.pieces[-1] == 2.0
+    assert run.overrun.max() <= 1e-12
+    assert np.linalg.norm(np.diff(run.sigma, axis=0), axis=1).max() < 1.01 * PERIOD * BEND.velocity
+
+
+def zigzag():
+    """Return way points with a corner of 120 deg, one of 180 deg, and the numbers of the corners."""
+    legs = [np.array([1.0, 0.0, 0.0]), np.array([-0.5, 0.8, 0.0]), np.array([0.5, -0.8, 0.0])]
+    points, corners = [np.array([0.8, 0.0, 1.0])], []
+    for leg in legs:
+        for _ in range(12):
+            points.append(points[-1] + 0.02 * leg)
+        corners.append(len(points) - 1)
+    return np.array(points), corners[:-1]
+
+
+def test_at_corners_it_rests_and_goes_on():
+    w, corners = zigzag()
+    stream = Stream(BEND, w[0])
+    run = stream.run(sent_at(stream.layout, w[1:], even(len(w) - 1)), 8000)
+    np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-9)
+    assert StreamStatus.TURNING in run.stream[:, 0]
+    assert run.pieces[-1] == 3.0
+    for corner in corners:
+        k = np.linalg.norm(run.sigma - w[corner], axis=1).argmin()
+        np.testing.assert_allclose(run.sigma[k], w[corner], rtol=0, atol=1e-6)
+        assert run.eta[k, 1] < 1e-4
+    # lines all along: nothing is rounded off
+    for leg in np.split(w, [corners[0] + 1, corners[1] + 1]):
+        assert all(np.linalg.norm(run.sigma - p, axis=1).min() < 3e-4 for p in leg)
+
+
+def test_a_new_path_while_moving_is_blended():
+    w, angle = bend(61), np.deg2rad(25.0)
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    k_new, along = 1100, np.array([0.05, 1.0, 0.0])
+    stream, sender = Stream(BEND, w[0]), None
+    sender = WaypointSender(stream.layout)
+    other = {}
+
+    def message(k, told):
+        if k < k_new and k % 30 == 0:
+            sender.add(w[1 + k // 30])
+        if k == k_new:
+            # off to the side of where the tool is, some way ahead
+            start = w[round(told[1])]
+            for j in range(25):
+                new = start + turn @ along * 0.02 * j + [0.03, 0.0, 0.0]
+                other[j] = new
+                sender.add(new, new_path=j == 0)
+            sender.end()
+        return sender.message
+
+    run = stream.run(message, 6000, keep=1)
+    assert run.overrun.max() <= 1e-12
+    assert run.pieces[-1] == 1.0
+    np.testing.assert_allclose(run.sigma[-1], other[24], rtol=0, atol=1e-4)
+    moving = slice(k_new, k_new + 1500)
+    assert run.eta[moving, 1].min() > 0.05
+    # the path on which the tool is does not change: what it did is one spline of class C^5
+    spline = whole_path_driven(run)
+    for k in range(400, 5000, 100):
+        found = run.points[k, run.layout.position].reshape(-1, 3)
+        expected = [spline(run.points[k, 0], nu=j) for j in range(6)]
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+
+
+def whole_path_driven(run):
+    """Return the spline through the control points as the tool met them."""
+    d, columns, points = 3, run.course.columns, {}
+    for course, point in zip(run.courses, run.points, strict=True):
+        if course[1] == 1.0:
+            own = course[3 : 3 + d * columns].reshape(columns, d)
+            span = int(np.floor(point[0]))
+            for n in range(span, span + run.course.spline.degree + 1):
+                points[n] = own[n - int(course[0])]
+    numbers = sorted(points)
+    degree = run.course.spline.degree
+    knots = np.arange(numbers[0] - degree, numbers[-1] + 2, dtype=float)
+    return BSpline(knots, np.array([points[n] for n in numbers]), degree)
+
+
+def test_way_points_that_were_missed_end_the_path():
+    w = bend(61)
+    stream = Stream(BEND, w[0], length=8)
+    told = sent_at(stream.layout, w[1:], even(60), end=False)
+    held = {}
+
+    def message(k, stream):
+        now = told(k, stream)
+        # no message for a second
+        if not 800 <= k < 1800:
+            held["last"] = now.copy()
+        return held["last"]
+
+    run = stream.run(message, 5000)
+    assert run.stream[-1, 0] == StreamStatus.MISSED
+    np.testing.assert_allclose(run.sigma[-1], w[16], rtol=0, atol=1e-7)
+    assert run.overrun.max() <= 1e-12
+
+
+@pytest.mark.parametrize("bad", [[np.nan, 0.3, 1.0], [0.8, 9.0, 1.0]])
+def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
+    w = bend(61)
+    parameters = StreamParameters(spacing=0.012, velocity=0.5, upper=[2.0, 2.0, 2.0])
+    rows = w[1:].copy()
+    rows[25] = bad
+    rows[45] = w[26]
+    stream = Stream(parameters, w[0])
+    told = sent_at(stream.layout, rows, even(60), new=(45,))
+    run = stream.run(told, 7000)
+    assert (run.stream[:, 0] == StreamStatus.REFUSED).any()
+    # what comes in between is left out
+    off = np.linalg.norm(run.sigma - w[25], axis=1)
+    assert off.min() < 1e-6
+    np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
+    assert run.overrun.max() <= 1e-12
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
+    random = np.random.default_rng(seed)
+    parameters = StreamParameters(spacing=0.006, velocity=0.4, through=bool(seed % 2), patience=0.2)
+    heading, points = 0.0, [np.array([0.8, 0.0, 1.0])]
+    for _ in range(250):
+        heading += random.normal(0.0, 0.3) + (random.random() < 0.03) * random.uniform(-3.2, 3.2)
+        step = random.exponential(0.006) * np.array([np.cos(heading), np.sin(heading), 0.0])
+        points.append(points[-1] + step)
+    times = np.cumsum(random.exponential(0.016, 250) + (random.random(250) < 0.01) * 1.5)
+    stream = Stream(parameters, points[0])
+    run = stream.run(sent_at(stream.layout, np.array(points[1:]), times, heard=True), 25000)
+    assert np.isfinite(run.points).all()
+    assert run.overrun.max() <= 1e-12
+    assert np.abs(np.diff(run.eta[:, 1])).max() <= parameters.acceleration * PERIOD * (1 + 1e-6)
+    slope, second = (run.points[:, run.layout.position].reshape(-1, 6, 3)[:, k] for k in (1, 2))
+    speed = np.linalg.norm(slope, axis=1)
+    curvature = np.linalg.norm(np.cross(slope, second), axis=1) / speed**3
+    assert speed.min() > 0.15 * parameters.spacing
+    assert curvature.max() < 1.15 / parameters.least_radius
+    # bends are gone through slowly
+    across = curvature * run.eta[:, 1] ** 2
+    assert across.max() < 1.3 * parameters.normal_acceleration
+    assert run.stream[-1, 0] == StreamStatus.WAITING
+    assert np.linalg.norm(run.sigma[-1] - points[-1]) < parameters.spacing
+
+
+def test_orientations_come_with_way_points():
+    w = bend(40)
+    angles = np.linspace(0.0, 1.2, 40)
+    q = np.stack([np.cos(angles / 2), np.sin(angles / 2), 0 * angles, 0 * angles], axis=1)
+    q[7::5] *= -1.0  # the same orientations
+    poses = np.hstack([w, q])
+    stream = Stream(BEND, poses[0])
+    run = stream.run(sent_at(stream.layout, poses[1:], even(39)), 5000)
+    found = run.points[:, run.layout.quaternion][:, :4]
+    found /= np.linalg.norm(found, axis=1)[:, None]
+    assert abs(found[-1] @ q[-1]) == pytest.approx(1.0, abs=1e-7)
+    for k in range(0, 40, 3):
+        near = np.linalg.norm(run.sigma - w[k], axis=1).argmin()
+        assert abs(found[near] @ q[k]) > np.cos(0.02 / 2)
+    assert np.abs(np.diff(found, axis=0)).max() < 1e-2
+
+
+def test_senders_refuse_what_is_no_way_point():
+    stream = Stream(BEND, bend()[0])
+    sender = WaypointSender(stream.layout, lower=[0.0, -1.0, 0.0], upper=[1.0, 1.0, 1.0])
+    with pytest.raises(InputError, match=r"way point 1: \[nan, 0.0, 0.0\]; must be 3 finite"):
+        sender.add([np.nan, 0.0, 0.0])
+    with pytest.raises(InputError, match=r"way point 1: \[0.5, 2.0, 0.5\] m; must be from"):
+        sender.add([0.5, 2.0, 0.5])
+    assert sender.total == 0
