@@ -22,6 +22,8 @@ _LONGEST_REST = 1e6  # s
 _SHORTEST_REST = 1e-6  # s
 _TRANSITIONS = (1e-3, 1e3)  # s
 _LIMITS = ("respect", "warn")
+_SPEEDS = ("asked", "fastest")
+_VELOCITY = 0.1  # m/s
 
 
 @dc.dataclass
@@ -53,20 +55,26 @@ class ReferenceParameters:
         places: Places of a surface, instead: pairs of tangential coordinates to visit [m], along
             straight lines of these coordinates.
         second: Second of a surface, with points for its first coordinate: the motion of the second.
-        velocity: Largest velocity, 1e-6 to 1e3 [m/s].
-        acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2].
+        velocity: Largest velocity, 1e-6 to 1e3 [m/s]; null for 0.1, and with ``speed: fastest`` for
+            any.
+        acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2]; with ``speed: fastest`` the drives
+            decide.
         dwell: Rest before, between and after the moves, 0 or 1e-6 to 1e6 [s].
         swings: How the path or surface itself moves along its normals (5.1), (5.2).
         limits: ``respect``: where the drives, as they are believed, could not follow, the
             reference is slowed; ``warn``: only that is said.
         reserve: Share of the drives' torques, and of the speeds of velocity servos, that the
             reference leaves, from 0 to below 1.
+        speed: ``asked``: as velocity and acceleration say; ``fastest``: in the least time in which
+            the drives, as they are believed, can follow, all but the reserve.
+        torque_rate: With ``speed: fastest`` the largest rate of the drives' torques [Nm/s], of
+            strong ones ten times their largest torque in a second; ``.inf`` for any.
     """
 
     points: list[float | str] = dc.field(
         default_factory=lambda: [0.0, 0.1], metadata=NUMBERS_OR_END
     )
-    velocity: float = 0.1
+    velocity: float | None = None
     acceleration: float = 1.0
     dwell: float = 0.3
     swings: list[Swing] = dc.field(default_factory=list)
@@ -74,6 +82,8 @@ class ReferenceParameters:
     second: SecondReference | None = None
     limits: str = "respect"
     reserve: float = 0.3
+    speed: str = "asked"
+    torque_rate: float = 1000.0
 
     def __post_init__(self) -> None:
         _check_motion(self)
@@ -89,6 +99,21 @@ class ReferenceParameters:
         require(good, "dwell", self.dwell, allowed)
         require_one_of("limits", self.limits, _LIMITS)
         require(0.0 <= self.reserve < 1.0, "reserve", self.reserve, "from 0 to below 1")
+        require_one_of("speed", self.speed, _SPEEDS)
+        require(self.torque_rate > 0.0, "torque_rate", self.torque_rate, "a positive number")
+        if self.speed == "fastest":
+            self._check_fastest()
+
+    def _check_fastest(self) -> None:
+        """Refuse motions of which the fastest is not looked for."""
+        allowed = "none with speed: fastest"
+        require(self.second is None, "second", "given", f"{allowed}; write places")
+        require(not self.swings, "swings", f"{len(self.swings)} given", allowed)
+
+    @property
+    def largest_velocity(self) -> float:
+        """Largest velocity of a motion as it is asked for [m/s]."""
+        return _VELOCITY if self.velocity is None else self.velocity
 
     def arc_lengths(self, length: float | None) -> list[float]:
         """Return the points [m].
@@ -111,7 +136,8 @@ def _check_motion(motion: SecondReference | ReferenceParameters) -> None:
     require(enough, "points", motion.points, "two or more finite numbers")
     near = all(abs(point) <= _FARTHEST for point in points)
     require(near, "points", motion.points, f"numbers of at most {_FARTHEST:g} m")
-    require_between("velocity", motion.velocity, *_VELOCITIES, "m/s, a positive number")
+    if motion.velocity is not None:
+        require_between("velocity", motion.velocity, *_VELOCITIES, "m/s, a positive number")
     require_between(
         "acceleration", motion.acceleration, *_ACCELERATIONS, "m/s^2, a positive number"
     )

@@ -7,26 +7,20 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from diagrams.scenario import ReferenceParameters
+from diagrams.scenario.checks import require
+from diagrams.tasks.fastest_motion import FastestPlanner
+from diagrams.tasks.motion_demand import MotionDemand
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import DrivePlan, Task
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.control.planning.course import CourseFinder, CourseStart
-from pfsc_drake.control.planning.drive_demand import (
-    Clock,
-    DriveDemand,
-    DriveLimits,
-    allowed_demand,
-    find_pace,
-    with_pace,
-)
+from pfsc_drake.control.planning.course import CourseStart
+from pfsc_drake.control.planning.drive_demand import Clock, find_pace, with_pace
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.robot.robot_model import largest_speeds
-from pfsc_drake.yaml.typed import spread
 
 # s, between the samples of a course: at a glance, while it is checked, and while it is slowed
 _GLANCED, _CHECKED, _SLOWED, _FINEST = 16e-3, 4e-3, 1e-3, 2.5e-4
@@ -40,8 +34,6 @@ _OF_RADIUS, _OF_RAMP = 1.0 / 12.0, 1.0 / 6.0
 _SMOOTHING = 0.04
 # s, between the knots of a slowed reference, and its degree
 _KNOTS, _DEGREE = 2e-3, 7
-# share of joint speeds that is left where torques are commanded
-_SPEED_RESERVE = 0.05
 # of the pace, from which on a place counts as slowed
 _SLOW = 0.99
 
@@ -69,15 +61,26 @@ def keep_drive_limits(
         friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
             are believed.
     """
+    fastest = reference.speed == "fastest"
     along = indices(task.place.coordinates, Kind.TANGENTIAL)
     led = isinstance(task, SpaceTask) or law.stabilization.is_free[along].any()
-    if task.drive_plan is not None or led or task.motion.domain[1] > _LONGEST:
+    if task.drive_plan is not None:
         return
-    task.drive_plan = _Planner(reference, controller, duration, task, law, start, friction).plan()
+    if led:
+        require(not fastest, "reference.speed", "fastest", "asked; where a hand leads nobody plans")
+        return
+    if fastest:
+        known = reference, controller, task, law, start, friction
+        task.drive_plan = FastestPlanner(*known).plan()
+    elif task.motion.domain[1] <= _LONGEST:
+        planner = _Planner(reference, controller, duration, task, law, start, friction)
+        task.drive_plan = planner.plan()
+    else:
+        return
     task.motion = task.drive_plan.motion
 
 
-class _Planner:
+class _Planner(MotionDemand):
     """Plans one reference of one robot."""
 
     def __init__(
@@ -90,22 +93,8 @@ class _Planner:
         start: CourseStart,
         friction: tuple[np.ndarray, np.ndarray] | None,
     ) -> None:
-        self._reference, self._period = reference, controller.sampling_time
-        self._run_duration, self._task, self._law, self._start = duration, task, law, start
-        self.robot, reserve = law.robot, reference.reserve
-        f_c, f_v = friction or (np.zeros(self.robot.dimension),) * 2
-        damping = spread(controller.boundary_layer_damping, self.robot.dimension)
-        self.demand = DriveDemand(
-            self.robot, controller.law, f_v, np.array(damping) if damping else None
-        )
-        self._finder = CourseFinder(self.robot, task.place, task.evaluate, law.inverse, law.posture)
-        effort = self.robot.gather("effort_limit") * controller.effort_scale
-        effort = np.maximum(effort - f_c, 1e-3 * effort)
-        speed = largest_speeds(self.robot)
-        self.limits = DriveLimits(effort, speed).together
-        # of speeds only servos run short; with torques, nothing but the motion decides over them
-        of_speeds = reserve if law.linearization.relative_degree == 1 else _SPEED_RESERVE
-        self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
+        super().__init__(reference, controller, task, law, start, friction)
+        self._run_duration = duration
 
     @once_per_content()
     def plan(self) -> DrivePlan:
@@ -146,38 +135,21 @@ class _Planner:
         Raises:
             InputError: If the joints cannot follow.
         """
-        task, order = self._task, self._law.linearization.relative_degree
-        duration = task.motion.domain[1]
-        step = self._step(longest)
-        times = np.linspace(0.0, duration, int(np.ceil(duration / step)) + 1)
-        asked = task.motion.derivatives(times, order)
-        reference = np.zeros((len(times), order + 1, len(task.place.coordinates)))
-        reference[:, :, : asked.shape[2]] = asked
-        still = longest > _CHECKED
-        course = self._finder.find(self._start, reference, times, still=still)
-        while course.shape[1] <= self.demand.derivatives:
-            further = np.gradient(course[:, -1:], times[1], axis=0)
-            course = np.concatenate([course, further], axis=1)
-        return float(times[1]), course[:, : self.demand.derivatives + 1]
+        return self.course_of(self._task.motion, self._step(longest), still=longest > _CHECKED)
 
     def _step(self, longest: float) -> float:
         """Return how far samples may be apart [s]: narrow bends need more of them."""
         reference, glance = self._reference, longest > _CHECKED
         coarser = 1.0 / (3.0 * _OF_RADIUS) if glance else 1.0
         radius = getattr(self._task.shape, "smallest_radius", np.inf)
-        bend = coarser * _OF_RADIUS * radius / reference.velocity
-        ramp = _OF_RAMP * reference.velocity / reference.acceleration
+        bend = coarser * _OF_RADIUS * radius / reference.largest_velocity
+        ramp = _OF_RAMP * reference.largest_velocity / reference.acceleration
         ramp = max(ramp, 2.0 * _SLOWED if glance else _SLOWED)
         if self._law.posture is not None and not glance:
             # it moves as fast as a sampled law lets it
             longest = min(longest, self._period)
         step = min(max(bend, min(_FINEST, longest)), ramp, longest)
         return max(float(step), self._task.motion.domain[1] / _MOST)
-
-    def allowed(self, course: np.ndarray) -> np.ndarray:
-        """Return what may be asked of the drives, (samples, 2N)."""
-        at_rest = self.demand.of(with_pace(course, np.zeros((len(course), 4))))
-        return allowed_demand(at_rest, self.limits, self._reserve)
 
     def fits(self, course: np.ndarray, share: float) -> bool:
         """Return whether a course asks for no more than a share of what it may."""
@@ -186,7 +158,7 @@ class _Planner:
     def slowed(self, asked: DrivePlan, course: np.ndarray, step: float) -> DrivePlan:
         """Return a plan that waits where the drives need it."""
         reference, duration = self._reference, self._task.motion.domain[1]
-        change = reference.acceleration / reference.velocity
+        change = reference.acceleration / reference.largest_velocity
         allowed = self.allowed(course)
         excess = self._excess(asked, allowed)
         try:

@@ -100,7 +100,7 @@ class PathTask(Task):
         self._check_points(self._points)
         self.motion = rest_to_rest(
             self._points,
-            velocity=reference.velocity,
+            velocity=reference.largest_velocity,
             acceleration=reference.acceleration,
             dwell=reference.dwell,
         )

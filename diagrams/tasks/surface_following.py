@@ -220,7 +220,7 @@ class SurfaceTask(Task):
 
 def _motion(reference: ReferenceParameters) -> PiecewisePolynomialCurve:
     """Return the tangential references over time, of dimension 2."""
-    limits = (reference.velocity, reference.acceleration, reference.dwell)
+    limits = (reference.largest_velocity, reference.acceleration, reference.dwell)
     if reference.places:
         return straight_lines(reference.places, *limits)
     if reference.second is None:

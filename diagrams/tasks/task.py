@@ -15,6 +15,7 @@ from pfsc_drake.control.manifolds.manifold import (
     PlaceManifold,
     Projector,
 )
+from pfsc_drake.control.planning.limiting import Limiting
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport, zyx_to_matrix
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport
@@ -65,6 +66,7 @@ class DrivePlan:
         pace: Speed in units of the one that was asked for, (samples,).
         motion: The reference that is followed: the one asked for where that fits.
         said: What there is to say, one sentence each.
+        limiting: Which limits it is at, if it is the fastest.
     """
 
     times: np.ndarray
@@ -74,6 +76,7 @@ class DrivePlan:
     pace: np.ndarray
     motion: PiecewisePolynomialCurve
     said: list[str]
+    limiting: Limiting | None = None
 
     def fastest_pace(self, relative_degree: int) -> float:
         """Return how many times as fast the motion may be made, at least 1.

@@ -1,0 +1,98 @@
+"""What a task's motion asks of the drives, as they are believed."""
+
+import numpy as np
+
+from diagrams.scenario import ReferenceParameters
+from diagrams.tasks.task import Task
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.planning.course import CourseFinder, CourseStart
+from pfsc_drake.control.planning.drive_demand import (
+    DriveDemand,
+    DriveLimits,
+    allowed_demand,
+    with_pace,
+)
+from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.robot.robot_model import largest_speeds
+from pfsc_drake.yaml.typed import spread
+
+# share of joint speeds that is left where torques are commanded
+_SPEED_RESERVE = 0.05
+
+
+class MotionDemand:
+    """What the motions of one task ask of one robot.
+
+    Args:
+        reference: The reference, with what it leaves of the drives.
+        controller: What is chosen of the controller.
+        task: What the tool is to do.
+        law: The law that does it.
+        start: Where the robot starts, near the first place of the reference.
+        friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
+            are believed.
+
+    Attributes:
+        robot: The robot as it is believed, N joints.
+        demand: What a motion of its joints asks for.
+        limits: What drives can do: torques, then speeds, shape (2N,).
+    """
+
+    def __init__(
+        self,
+        reference: ReferenceParameters,
+        controller: ControllerParameters,
+        task: Task,
+        law: FollowingLaw,
+        start: CourseStart,
+        friction: tuple[np.ndarray, np.ndarray] | None,
+    ) -> None:
+        self._reference, self._period = reference, controller.sampling_time
+        self._task, self._law, self._start = task, law, start
+        self.robot, reserve = law.robot, reference.reserve
+        f_c, f_v = friction or (np.zeros(self.robot.dimension),) * 2
+        damping = spread(controller.boundary_layer_damping, self.robot.dimension)
+        self.demand = DriveDemand(
+            self.robot, controller.law, f_v, np.array(damping) if damping else None
+        )
+        self._finder = CourseFinder(self.robot, task.place, task.evaluate, law.inverse, law.posture)
+        effort = self.robot.gather("effort_limit") * controller.effort_scale
+        effort = np.maximum(effort - f_c, 1e-3 * effort)
+        speed = largest_speeds(self.robot)
+        self.limits = DriveLimits(effort, speed).together
+        # of speeds only servos run short; with torques, nothing but the motion decides over them
+        of_speeds = reserve if law.linearization.relative_degree == 1 else _SPEED_RESERVE
+        self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
+
+    def course_of(
+        self, motion: PiecewisePolynomialCurve, step: float, *, still: bool
+    ) -> tuple[float, np.ndarray]:
+        """Return the joints' course on an even grid of a motion's time, and its step [s].
+
+        Args:
+            motion: Tangential coordinates over time.
+            step: From sample to sample at most [s].
+            still: Whether joints beyond the outputs only move with them, as little as they can.
+
+        Raises:
+            InputError: If the joints cannot follow.
+        """
+        order, duration = self._law.linearization.relative_degree, motion.domain[1]
+        times = np.linspace(0.0, duration, int(np.ceil(duration / step)) + 1)
+        asked = motion.derivatives(times, order)
+        reference = np.zeros((len(times), order + 1, len(self._task.place.coordinates)))
+        reference[:, :, : asked.shape[2]] = asked
+        course = self._finder.find(self._start, reference, times, still=still)
+        while course.shape[1] <= self.demand.derivatives:
+            further = np.gradient(course[:, -1:], times[1], axis=0)
+            course = np.concatenate([course, further], axis=1)
+        return float(times[1]), course[:, : self.demand.derivatives + 1]
+
+    def allowed(self, course: np.ndarray) -> np.ndarray:
+        """Return what may be asked of the drives, (samples, 2N)."""
+        return allowed_demand(self.at_rest(course), self.limits, self._reserve)
+
+    def at_rest(self, course: np.ndarray) -> np.ndarray:
+        """Return what the places of a course ask for at rest, (samples, 2N)."""
+        return self.demand.of(with_pace(course, np.zeros((len(course), 4))))

@@ -1,0 +1,102 @@
+"""What a motion asks of the drives, as a polynomial of its pace and the pace's derivatives."""
+
+from dataclasses import dataclass
+from math import prod
+
+import numpy as np
+
+from pfsc_drake.control.planning.drive_demand import DriveDemand, with_pace
+
+# exponents of (c, c', c'', c''') in every monomial of weight up to 4: the k-th derivative of the
+# joint coordinates has the weight k, and so has each of its terms in (planning-pace)
+_EXPONENTS = (
+    (0, 0, 0, 0),
+    (1, 0, 0, 0),
+    (2, 0, 0, 0),
+    (0, 1, 0, 0),
+    (3, 0, 0, 0),
+    (1, 1, 0, 0),
+    (0, 0, 1, 0),
+    (4, 0, 0, 0),
+    (2, 1, 0, 0),
+    (0, 2, 0, 0),
+    (1, 0, 1, 0),
+    (0, 0, 0, 1),
+)
+# how many places are tried to find monomials from values, and which are the best conditioned
+_TRIALS = 100
+
+
+def exponents(highest: int) -> list[tuple[int, ...]]:
+    """Return the exponents of ``(c, c', c'', c''')`` in the monomials of a demand.
+
+    Args:
+        highest: Highest derivative of the joint coordinates that it depends on, 2 to 4.
+    """
+    return [powers for powers in _EXPONENTS if _weight(powers) <= highest]
+
+
+def _weight(powers: tuple[int, ...]) -> int:
+    return sum((k + 1) * power for k, power in enumerate(powers))
+
+
+@dataclass(frozen=True)
+class DemandPolynomial:
+    """Torques of the drives along a course, ``tau = sum_m a_m c^i c'^j c''^k c'''^l``.
+
+    At a posture the inverse dynamics is a polynomial of the joints' derivatives, and these are
+    polynomials of the pace ``c`` and its time derivatives. With elastic joints there are twelve
+    monomials, from the weight to ``c^4`` and ``c'''``, with rigid ones four. The coefficients are
+    found once, from as many values, and are exact but for rounding.
+
+    Attributes:
+        exponents: Of the M monomials.
+        coefficients: a_m, shape (samples, M, N).
+    """
+
+    exponents: list[tuple[int, ...]]
+    coefficients: np.ndarray
+
+    @classmethod
+    def of(cls, demand: DriveDemand, course: np.ndarray, scale: float) -> "DemandPolynomial":
+        """Return the polynomials of a course.
+
+        Args:
+            demand: Tells what a motion asks for.
+            course: Joint coordinates and derivatives at the pace 1, shape (samples, K + 1, N).
+            scale: Time in which the pace may change [s]; for the sake of rounding only.
+        """
+        powers = exponents(demand.derivatives)
+        paces = _well_conditioned(powers) * scale ** -np.arange(4.0)
+        values = np.array([_torques(demand, course, pace) for pace in paces])
+        # each in units of its own size
+        size = np.array([scale ** -sum(k * p for k, p in enumerate(power)) for power in powers])
+        table = _monomials(powers, paces) / size
+        found = np.linalg.solve(table, values.reshape(len(powers), -1)).reshape(values.shape)
+        return cls(powers, (found / size[:, None, None]).transpose(1, 0, 2))
+
+    def torques(self, rates: np.ndarray) -> np.ndarray:
+        """Return the torques at a pace, shape (samples, N).
+
+        Args:
+            rates: ``c, c', c'', c'''``, shape (samples, 4).
+        """
+        return np.einsum("smn,sm->sn", self.coefficients, _monomials(self.exponents, rates))
+
+
+def _torques(demand: DriveDemand, course: np.ndarray, pace: np.ndarray) -> np.ndarray:
+    both = demand.of(with_pace(course, np.tile(pace, (len(course), 1))))
+    return both[:, : both.shape[1] // 2]
+
+
+def _monomials(powers: list[tuple[int, ...]], rates: np.ndarray) -> np.ndarray:
+    terms = [prod(rates[..., k] ** p for k, p in enumerate(power)) for power in powers]
+    return np.stack(np.broadcast_arrays(*terms), axis=-1)
+
+
+def _well_conditioned(powers: list[tuple[int, ...]]) -> np.ndarray:
+    """Return as many paces as monomials from which these are told apart best, (M, 4)."""
+    rng = np.random.default_rng(0)
+    trials = rng.uniform(-1.0, 1.0, (_TRIALS, len(powers), 4))
+    condition = [np.linalg.cond(_monomials(powers, trial)) for trial in trials]
+    return trials[int(np.argmin(condition))]

@@ -1,0 +1,112 @@
+"""A pace as a spline: how fast a motion's own time passes, smooth to the order of the law."""
+
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from pfsc_drake.control.planning.drive_demand import with_pace
+from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry.curves.hermite import hermite_curve
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+class PaceSpline:
+    """The pace ``c = dtheta/dt`` of a motion with the own time theta, from 0 to an end.
+
+    Args:
+        end: Where theta ends [s].
+        coefficients: Of a clamped B-spline over even intervals, one for each and one for each
+            degree.
+        degree: Its degree d, at least 3; the pace is C^(d-1).
+
+    Attributes:
+        end: Where theta ends [s].
+    """
+
+    def __init__(self, end: float, coefficients: np.ndarray, degree: int) -> None:
+        self.end, self._intervals = end, len(coefficients) - degree
+        knots = knots_of(end, self._intervals, degree)
+        spline = BSpline(knots, coefficients, degree)
+        self._derivatives = [spline] + [spline.derivative(k) for k in range(1, 4)]
+
+    def rates(self, theta: np.ndarray) -> np.ndarray:
+        """Return ``c`` and its time derivatives, shape (samples, 4) [1, 1/s, ..].
+
+        Args:
+            theta: Own times of the motion [s], shape (samples,).
+        """
+        c, c_1, c_2, c_3 = (derivative(theta) for derivative in self._derivatives)
+        return np.stack(time_derivatives(c, c_1, c_2, c_3), axis=1)
+
+    @cached_property
+    def _clock(self) -> tuple[np.ndarray, np.ndarray]:
+        """Knots of theta and the times at which they come [s]."""
+        knots = np.linspace(0.0, self.end, self._intervals + 1)
+        step = knots[1] / 2.0
+        middles = knots[:-1] + step
+        slowness = 1.0 / self._derivatives[0](middles[:, None] + step * _NODES)
+        return knots, np.concatenate([[0.0], np.cumsum(step * slowness @ _WEIGHTS)])
+
+    @property
+    def duration(self) -> float:
+        """How long the motion takes [s]."""
+        return float(self._clock[1][-1])
+
+    def times(self, theta: np.ndarray) -> np.ndarray:
+        """Return when own times come [s], shape (samples,).
+
+        Args:
+            theta: Own times of the motion [s], shape (samples,).
+        """
+        knots, times = self._clock
+        i = np.clip(np.searchsorted(knots, theta, side="right") - 1, 0, self._intervals - 1)
+        half = (theta - knots[i]) / 2.0
+        slowness = 1.0 / self._derivatives[0]((knots[i] + half)[:, None] + half[:, None] * _NODES)
+        return times[i] + half * (slowness @ _WEIGHTS)
+
+    def applied_to(
+        self, motion: PiecewisePolynomialCurve, order: int, longest: float
+    ) -> PiecewisePolynomialCurve:
+        """Return the motion over the time t, of class C^order.
+
+        Args:
+            motion: The motion over theta, of class C^order.
+            order: Up to 4.
+            longest: Of its pieces [s].
+        """
+        knots, times = self._clock
+        parts = np.ceil(np.diff(times) / longest).astype(int)
+        pieces = [
+            begin + step * np.arange(n) / n
+            for begin, step, n in zip(knots[:-1], np.diff(knots), parts, strict=True)
+        ]
+        theta = np.append(np.concatenate(pieces), self.end)
+        derivatives = with_pace(motion.derivatives(theta, order), self.rates(theta))
+        return hermite_curve(self.times(theta), derivatives)
+
+
+def knots_of(end: float, intervals: int, degree: int) -> np.ndarray:
+    """Return the knots of a clamped spline over even intervals.
+
+    Args:
+        end: Where it ends; it begins at 0.
+        intervals: Number of intervals.
+        degree: Degree of the spline.
+    """
+    inner = np.linspace(0.0, end, intervals + 1)
+    return np.concatenate([np.zeros(degree), inner, np.full(degree, end)])
+
+
+def time_derivatives(c: np.ndarray, c_1: np.ndarray, c_2: np.ndarray, c_3: np.ndarray) -> list:
+    """Return the pace and its derivatives by time from those by its own time, numbers or symbols.
+
+    With ``d/dt = c d/dtheta``.
+    """
+    return [
+        c,
+        c * c_1,
+        c * (c_1**2 + c * c_2),
+        c * (c_1**3 + 4.0 * c * c_1 * c_2 + c**2 * c_3),
+    ]
