@@ -75,6 +75,7 @@ html_theme = "furo"
 html_title = "pfsc_drake"
 html_static_path = ["style"]
 html_css_files = ["site.css"]
+html_js_files = ["tables.js"]
 html_copy_source = False
 html_show_sourcelink = False
 
