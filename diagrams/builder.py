@@ -7,8 +7,10 @@ from pathlib import Path as FilePath
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from diagrams.drawing.held_look import held_look
 from diagrams.drawing.mounting_look import mounting_look
-from diagrams.drawing.replay import RecordedMotion, build_delta_replay, build_replay
+from diagrams.drawing.recorded import RecordedMotion
+from diagrams.drawing.replay import build_delta_replay, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.holder_station import add_holder, stop_both
 from diagrams.robots.arm import Arm
@@ -263,7 +265,12 @@ def draw_station(settings: Scenario, folder: FilePath, station: Station) -> Robo
     """
     if not isinstance(station.part, Arm):
         return None
-    return draw_robot(station.part.model, station.part.tool, settings.robot, folder)
+    drawing = draw_robot(station.part.model, station.part.tool, settings.robot, folder)
+    if settings.holder is None or station.holder is None:
+        return drawing
+    part = station.holder.part
+    holder = draw_robot(part.model, part.tool, settings.holder.robot, folder)
+    return replace(drawing, warnings=drawing.warnings + holder.warnings, holder=holder)
 
 
 def build_station_replay(
@@ -291,4 +298,8 @@ def build_station_replay(
         return build_delta_replay(robot, drawn, motion, meshcat, period, look)
     assert drawing is not None  # draw_station knows every other robot
     plates = None if station.mounting is None else mounting_look(station.mounting)
-    return build_replay(drawing, drawn, motion, meshcat, period, look, plates)
+    held = None
+    if settings.holder is not None and station.holder is not None:
+        assert drawing.holder is not None  # draw_station knows it
+        held = held_look(settings.holder.workpiece, drawing.holder)
+    return build_replay(drawing, drawn, motion, meshcat, period, look, plates, held)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, System
 
+from diagrams.holder_station import HOLDER
 from diagrams.robots.joint_state import DEVIATION
 from diagrams.station import Station
 from pfsc_drake.blocks.network import Network, Wiring
@@ -37,7 +38,8 @@ class ControllerPart:
         period: Sampling time [s].
         inputs: Ports of the station's systems that the network's inputs come from, by name.
         outputs: The same of its outputs: ``drive_torque`` or ``velocity_reference``,
-            ``manifold_state``, ``status``, ``fault``, ``reference``; then standard deviations,
+            ``manifold_state``, ``status``, ``fault``, ``reference``; where another robot holds
+            the workpiece ``holder_drive_torque`` and ``holder_fault``; then standard deviations,
             where links are found without encoders on them.
     """
 
@@ -83,6 +85,10 @@ class _Search:
             name, port = station.measured
             measured = station.diagram.GetSubsystemByName(name).GetOutputPort(port)
             self._inputs["joint_state"] = measured
+        if station.holder is not None:
+            name, port = station.holder.measured
+            measured = station.diagram.GetSubsystemByName(name).GetOutputPort(port)
+            self._inputs[f"{HOLDER}joint_state"] = measured
         self._wiring = Wiring()
 
     def part(self) -> ControllerPart:
@@ -97,6 +103,11 @@ class _Search:
         reference = self._source(controller.GetInputPort("reference"))
         assert reference is not None  # every law has one
         outputs["reference"] = reference
+        if self._station.holder is not None:
+            carrier = self._station.diagram.GetSubsystemByName(f"{HOLDER}{_CONTROLLER}")
+            self._add(carrier)
+            for name in (self._station.holder.controller.drive_port, "fault"):
+                outputs[f"{HOLDER}{name}"] = carrier.GetOutputPort(name)
         if self._station.diagram.HasSubsystemNamed(DEVIATION):
             deviation = self._station.diagram.GetSubsystemByName(DEVIATION)
             self._add(deviation)

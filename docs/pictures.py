@@ -40,6 +40,7 @@ MOMENTS = {
     "pfc_comau_6r_elastic": 1.8,
     "pfc_compliant_6r": 2.8,
     "pfc_elbow_7r": 5.4,
+    "pfc_two_arms": 1.9,
     "plate_mounting": 9.5,
     "plate_return": 7.0,
     "sfc_comau_paraboloid": 7.2,

@@ -12,7 +12,8 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.mounting_look import mounting_stages
-from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.drawing.recorded import RecordedMotion
+from diagrams.drawing.replay import record
 from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import posture_text

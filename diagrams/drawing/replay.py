@@ -1,7 +1,6 @@
 """A logged run in Meshcat: robot, path, moving frame and trail of the tool; a DELTA robot hangs."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -14,7 +13,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from diagrams.drawing.held_look import HeldLook, add_held_drawing, held_points
 from diagrams.drawing.mounting_look import MountingLook, add_mounting_drawing
+from diagrams.drawing.recorded import RecordedMotion, RecordedPushes
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
@@ -35,65 +36,6 @@ _TOOL, _ELBOW = Rgba(0.9, 0.25, 0.1, 1.0), Rgba(0.45, 0.2, 0.75, 1.0)
 _CLEARANCE = 0.15
 
 
-@dataclass(frozen=True)
-class RecordedPushes:
-    """What pushes K points of a robot, at the recording's frames.
-
-    Attributes:
-        points: Where [m], shape (frames, 3K).
-        forces: World axes [N], shape (frames, 3K).
-    """
-
-    points: np.ndarray
-    forces: np.ndarray
-
-
-@dataclass(frozen=True)
-class RecordedDistance:
-    """The tool's distance from a surface, at the recording's frames.
-
-    Attributes:
-        values: Signed [m], shape (frames,).
-        largest: Magnitude that has full colour [m], positive.
-    """
-
-    values: np.ndarray
-    largest: float
-
-
-@dataclass(frozen=True)
-class RecordedMotion:
-    """What a log holds of a motion, at the recording's frames.
-
-    Attributes:
-        times: Times of the frames [s], shape (frames,), increasing from 0.
-        positions: The plant's positions, shape (frames, nq).
-        tool_pose: ``[y_t, R_e]``, shape (frames, 12).
-        manifold_point: The manifold next to the tool, shape (frames, layout.size).
-        elbow: A point of the arm whose way is drawn, too [m], shape (frames, 3).
-        pushes: What pushes its links.
-        distance: What the colour of the tool's way tells; of one colour without.
-        tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
-        trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
-        region_clock: Region clock of regions that move [s], shape (frames,).
-        plates: ``[p, R by rows]`` of K plates, shape (frames, 12 K).
-        phases: When which phase of their mounting begins [s].
-    """
-
-    times: np.ndarray
-    positions: np.ndarray
-    tool_pose: np.ndarray
-    manifold_point: np.ndarray
-    elbow: np.ndarray | None = None
-    pushes: RecordedPushes | None = None
-    distance: RecordedDistance | None = None
-    tool_force: np.ndarray | None = None
-    trail: np.ndarray | None = None
-    region_clock: np.ndarray | None = None
-    plates: np.ndarray | None = None
-    phases: Sequence[tuple[float, str]] = ()
-
-
 def build_replay(
     robot: RobotDrawing,
     manifold: ManifoldDrawing,
@@ -102,6 +44,7 @@ def build_replay(
     period: float,
     workpiece: WorkpieceLook | None = None,
     mounting: MountingLook | None = None,
+    held: HeldLook | None = None,
 ) -> Diagram:
     """Return a diagram that draws a recorded motion while its time advances.
 
@@ -113,9 +56,14 @@ def build_replay(
         period: Time between frames [s].
         workpiece: What its tool touches, if anything.
         mounting: How the plates of the motion are drawn, if there are any.
+        held: How the workpiece and the robot that holds it are drawn, if one does.
     """
     bodies = body_origins(robot.plant, motion.positions[0])
     points = np.concatenate(manifold.outline())
+    if held is not None and motion.held is not None:
+        points = held_points(points, motion.held)
+        others = body_origins(held.robot.plant, motion.held.positions[0])
+        bodies = np.vstack([bodies, others])
     meshcat.SetCameraPose(*camera_and_target(points, bodies))
     if workpiece is not None:
         look_down_at(meshcat, points.mean(axis=0))
@@ -123,6 +71,10 @@ def build_replay(
     positions = add_motion(builder, manifold, motion, workpiece, meshcat, period)
     if mounting is not None:
         _add_mounting(builder, mounting, motion, meshcat, period)
+    if held is not None and motion.held is not None:
+        pose = add_source(builder, "workpiece_pose", motion.times, motion.held.workpiece_pose)
+        holder = add_source(builder, "holder_positions", motion.times, motion.held.positions)
+        add_held_drawing(builder, held, pose, holder, meshcat, period)
     visualizer = RobotVisualizer(robot.plant, robot.parts, meshcat, period)
     body = builder.AddNamedSystem("robot_visualizer", visualizer)
     builder.Connect(positions, body.GetInputPort("positions"))

@@ -35,11 +35,13 @@ class RobotDrawing:
         plant: The plant whose bodies the parts move with.
         parts: What to draw.
         warnings: What cannot be drawn, one sentence each.
+        holder: The same of the robot that holds its workpiece, if one does.
     """
 
     plant: MultibodyPlant
     parts: list[BodyPart]
     warnings: list[str] = field(default_factory=list)
+    holder: "RobotDrawing | None" = None
 
 
 def draw_robot(

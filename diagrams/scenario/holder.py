@@ -72,7 +72,9 @@ class HeldWorkpieceParameters:
             allowed = "given where there is no box, and only there"
             require(one, f"workpiece.solids[{i}].cylinder", solid.cylinder, allowed)
         mass = sum(solid.mass for solid in self.solids)
-        require(mass > 0.0, "workpiece.solids", f"{len(self.solids)}, {mass:g} kg", "some with mass")
+        require(
+            mass > 0.0, "workpiece.solids", f"{len(self.solids)}, {mass:g} kg", "some with mass"
+        )
 
 
 @dc.dataclass

@@ -52,6 +52,7 @@ from experiments.figures.posture import (
     has_pushes,
 )
 from experiments.figures.teleoperation import draw_port_energy, draw_teleoperation
+from experiments.figures.two_arms import draw_holder_torques, draw_two_arms
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from reporting.registry import FIGURES
@@ -124,6 +125,7 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "orientation": (draw_orientation, _always),
     "angles": (draw_angles, _always),
     "axis": (draw_axis, _always),
+    "two_arms": (draw_two_arms, _always),
     "virtual_input": (draw_virtual_input, has_virtual_input),
     "forces": (draw_forces, has_forces),
     "damping": (draw_damping, has_varying_damping),
@@ -136,6 +138,7 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "conditioning": (draw_conditioning, has_conditioning),
     "velocities": (draw_velocities, _always),
     "drive_torques": (draw_efforts, _always),
+    "holder_torques": (draw_holder_torques, _always),
     "friction": (draw_friction, _always),
     "friction_estimate": (draw_friction_estimate, _always),
     "friction_coefficients": (draw_friction_coefficients, _always),

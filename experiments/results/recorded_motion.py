@@ -4,7 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
-from diagrams.drawing.replay import RecordedDistance, RecordedMotion, RecordedPushes
+from diagrams.drawing.recorded import (
+    RecordedDistance,
+    RecordedHolder,
+    RecordedMotion,
+    RecordedPushes,
+)
+from diagrams.holder_station import HOLDER
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.guidance import region_times
@@ -40,7 +46,7 @@ def collect_motion(
     pushes = None
     if "push_force" in log:
         pushes = RecordedPushes(log["push_point"].values[frames], log["push_force"].values[frames])
-    points = raw["manifold_point"][frames]
+    points = raw["manifold_point"][frames, : station.task.place.layout.size]
     return RecordedMotion(
         log.time[frames],
         positions,
@@ -54,7 +60,21 @@ def collect_motion(
         _region_times(station, log, frames),
         log["plate_pose"].values[frames] if "plate_pose" in log else None,
         mounting_phases(log),
+        _holder(station, raw, log, frames),
     )
+
+
+def _holder(
+    station: Station, raw: dict[str, FloatArray], log: RunLog, frames: NDArray[np.int_]
+) -> RecordedHolder | None:
+    """Return what a robot does that holds the workpiece, if one does."""
+    if station.holder is None:
+        return None
+    coordinates = station.holder.part.coordinates
+    states = [coordinates.plant_state(x) for x in raw[f"{HOLDER}joint_state"][frames]]
+    half = coordinates.num_states // 2
+    positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
+    return RecordedHolder(positions, log["workpiece_pose"].values[frames])
 
 
 def _region_times(station: Station, log: RunLog, frames: NDArray[np.int_]) -> FloatArray | None:

@@ -55,14 +55,15 @@ class BodyPart:
     color: Rgba = field(default_factory=lambda: Rgba(0.9, 0.9, 0.9, 1.0))
 
 
-def body_path(plant: MultibodyPlant, body: RigidBody) -> str:
+def body_path(plant: MultibodyPlant, body: RigidBody, root: str = _ROOT) -> str:
     """Return the Meshcat path under which the parts of a body are drawn.
 
     Args:
         plant: The body's plant.
         body: The body.
+        root: Path of all bodies.
     """
-    return f"{_ROOT}/{plant.GetModelInstanceName(body.model_instance())}/{body.name()}"
+    return f"{root}/{plant.GetModelInstanceName(body.model_instance())}/{body.name()}"
 
 
 class RobotVisualizer(LeafSystem):
@@ -79,14 +80,20 @@ class RobotVisualizer(LeafSystem):
         parts: What to draw.
         meshcat: Where to draw, axes of the world.
         period: Time between frames [s].
+        root: Path of all bodies.
     """
 
     def __init__(
-        self, plant: MultibodyPlant, parts: Sequence[BodyPart], meshcat: Meshcat, period: float
+        self,
+        plant: MultibodyPlant,
+        parts: Sequence[BodyPart],
+        meshcat: Meshcat,
+        period: float,
+        root: str = _ROOT,
     ) -> None:
         super().__init__()
-        self._plant, self._parts, self._meshcat = plant, parts, meshcat
-        self._bodies = {body_path(plant, part.body): part.body for part in parts}
+        self._plant, self._parts, self._meshcat, self._root = plant, parts, meshcat, root
+        self._bodies = {body_path(plant, part.body, root): part.body for part in parts}
         # a worksheet for kinematics; nothing in it outlives a frame
         self._kinematics = plant.CreateDefaultContext()
         self._positions = self.DeclareVectorInputPort("positions", plant.num_positions())
@@ -95,7 +102,7 @@ class RobotVisualizer(LeafSystem):
 
     def _draw_parts(self, context: Context) -> EventStatus:
         for part in self._parts:
-            path = f"{body_path(self._plant, part.body)}/{part.name}"
+            path = f"{body_path(self._plant, part.body, self._root)}/{part.name}"
             if isinstance(part.form, Triangles):
                 corners, triangles = part.form.vertices.T, part.form.triangles.T
                 self._meshcat.SetTriangleMesh(path, corners, triangles, part.color)

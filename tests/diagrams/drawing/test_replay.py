@@ -9,9 +9,8 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
+from diagrams.drawing.recorded import RecordedMotion, RecordedPushes
 from diagrams.drawing.replay import (
-    RecordedMotion,
-    RecordedPushes,
     build_replay,
     camera_and_target,
     record,

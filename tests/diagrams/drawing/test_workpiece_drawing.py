@@ -6,7 +6,7 @@ from pydrake.geometry import Meshcat, MeshcatParams, Sphere
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station, build_station_replay, draw_station
-from diagrams.drawing.replay import RecordedMotion
+from diagrams.drawing.recorded import RecordedMotion
 from diagrams.scenario import Keyframe, Line
 from diagrams.scenario.workpiece import BallParameters, NotchParameters
 from diagrams.surroundings.workpieces import NotchedWorkpiece, notch_surface

@@ -7,7 +7,8 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.drawing.replay import RecordedMotion, build_delta_replay, record
+from diagrams.drawing.recorded import RecordedMotion
+from diagrams.drawing.replay import build_delta_replay, record
 from diagrams.scenario import Scenario
 from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
