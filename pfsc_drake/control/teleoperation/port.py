@@ -65,9 +65,9 @@ class TeleoperationPort(Block):
             force and of the wave that could be paid.
 
     State:
-        tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``, and its ``rate``; ``given``, what was sent of O;
-        ``origin``, ``last``: x at the start and at the last tick; ``velocity``; ``forces`` and
-        ``taken``: forces that are to act, and A that they are of, oldest last; ``begun``.
+        tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``, and its ``rate``; ``given``,
+        what was sent of O; ``origin``, ``last``: x at the start and at the last tick; ``velocity``;
+        ``forces`` and ``taken``: forces that are to act, and A that they are of, oldest last.
 
     Args:
         side: ``leader`` or ``follower``.
