@@ -17,6 +17,7 @@ from pfsc_drake.control.teleoperation.port import RECORD, TeleoperationPort
 from pfsc_drake.errors import InputError
 
 T, B = 1e-3, 50.0
+CAPACITY = PortTankParameters().capacity
 START = np.array([0.4, -0.2, 0.9])
 
 
@@ -102,7 +103,7 @@ def test_the_tank_keeps_its_law_and_is_never_overdrawn(coupling, late):
         np.testing.assert_array_equal(force[late:], asked[: len(asked) - late])
         work = np.sum(force[:-1] * np.diff(x, axis=0), axis=1)
         before = tank[:-1, 0] - work + np.diff(received[:, 0])
-        expected = np.minimum(before, 1.0) - np.diff(sent[:, 0])
+        expected = np.minimum(before, CAPACITY) - np.diff(sent[:, 0])
         np.testing.assert_allclose(tank[1:, 0], expected, atol=1e-13)
         assert tank.min() >= 0.0
         given = np.cumsum(work) + sent[1:, 0] - received[1:, 0]
@@ -187,6 +188,23 @@ def test_what_arrives_is_taken_over_by_two_lags():
     np.testing.assert_allclose(heard, truth.y[0], atol=1e-8)
 
 
+def test_a_wave_that_cannot_be_paid_is_sent_later():
+    """A step of the position while the tank is at its reserve; later a little energy comes."""
+    port, step = make(force=30.0), np.array([2e-3, 0.0, 0.0])
+    port.start(position=START, message=np.zeros(MESSAGE))
+    port.set_state("tank", 0.03)
+    sent = []
+    for k in range(1500):
+        energy = 2e-3 if k > 20 else 0.0
+        row = port.step(position=START + step * (k > 0), message=message(k, energy=energy))
+        sent.append(row["message"][FIELDS["signal"]][0])
+    whole = math.sqrt(2 * B) * step[0]
+    assert sent[1] < 0.1 * whole
+    assert sent[-1] == pytest.approx(whole, rel=1e-3)
+    assert told(row, "tank")[0] >= 0.0
+    assert (np.diff(sent) >= 0.0).all()
+
+
 def test_an_open_grip_neither_pushes_nor_counts():
     port = make(connected=("grip",), passive=True)
     for k in range(4):
@@ -222,5 +240,5 @@ def test_wrong_limits_and_tanks_are_refused():
     with pytest.raises(InputError, match="ticks_late"):
         PortLimits(1.0, 1.0, -1, T)
     with pytest.raises(InputError, match="initial"):
-        PortTankParameters(initial=2.0)
+        PortTankParameters(initial=2.0 * CAPACITY)
     assert PortLimits(30.0, 2.0, 1, T).reserve == pytest.approx(0.12)
