@@ -37,6 +37,7 @@ _STUDIES = {
     "tracking": "path following against trajectory tracking",
     "joint_sides": "elastic joints of which both sides, torques, or motors alone are measured",
     "fixture_rules": "printed rules of forbidden regions against the program at an acute edge",
+    "teleoperation": "couplings of leader and follower over a channel: felt, stable, passive",
     "peers": "path following beside impedance control and Toppra",
     IDENTIFICATION: "from robots to their models and back",
     TEACH_IN: "a path taught by hand, and followed",
@@ -69,6 +70,7 @@ def study_command(
     from experiments.studies.peers.study import write_peers
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
+    from experiments.studies.teleoperation.study import write_teleoperation
     from experiments.studies.tracking import write_tracking
     from experiments.teaching.teach import write_teach_in
 
@@ -78,6 +80,7 @@ def study_command(
         "tracking": write_tracking,
         "joint_sides": write_joint_sides,
         "fixture_rules": write_fixture_rules,
+        "teleoperation": write_teleoperation,
         "peers": write_peers,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,

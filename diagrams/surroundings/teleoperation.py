@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import HandParameters
-from diagrams.scenario.checks import require, require_whole_ticks
+from diagrams.scenario.checks import require
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
@@ -26,7 +26,6 @@ from pfsc_drake.physics.operator_hand import LiveHand, OperatorHand
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 
-_LONGEST_WAY = 5000  # ticks
 _BEYOND = 0.5  # m
 
 
@@ -115,9 +114,6 @@ def add_operator_afar(
     require(
         hand is not None or operator is not None, "hand", "null", "given where there is a leader"
     )
-    for key in ("delay", "jitter"):
-        value = getattr(parameters.channel, key)
-        require_whole_ticks(f"teleoperation.channel.{key}", value, period, _LONGEST_WAY)
 
     def add(name: str, block: Block) -> BlockSystem:
         return builder.AddNamedSystem(name, BlockSystem(block, period))

@@ -16,7 +16,7 @@ _LONGEST, _MOST_LOST = 2.0, 0.9
 
 @dataclass
 class ChannelParameters:
-    """What a channel does to messages, one way.
+    """What a channel does to messages, one way; in whole ticks, one at least.
 
     Attributes:
         delay: Least delay [s].

@@ -20,7 +20,7 @@ class PortTankParameters:
             [1/s].
     """
 
-    capacity: float = 1.0
+    capacity: float = 4.0
     initial: float = 0.2
     refill: float = 20.0
     share: float = 20.0
@@ -107,3 +107,8 @@ class PortLimits:
     def reserve(self) -> float:
         """Most energy that forces take which are given and still to act [J]."""
         return self.force * self.speed * self.period * (1 + self.ticks_late)
+
+    @property
+    def pledged(self) -> float:
+        """What of the reserve forces may take that are given already, at least half of it [J]."""
+        return self.reserve * max(0.5, self.ticks_late / (1 + self.ticks_late))

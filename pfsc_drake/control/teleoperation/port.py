@@ -13,6 +13,9 @@ from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE, UNITS
 from pfsc_drake.control.teleoperation.parameters import CouplingParameters, PortLimits
 
 SIDES = ("leader", "follower")
+# s: within which a wave that could not be paid is sent later, and for which a tank lasts for that
+_REPAID, _LASTS = 0.1, 0.5
+_NOTHING = 1e-30  # J s
 _RECORD = {"force": 3, "position": 3, "tank": 1, "sent": 1, "received": 1, "share": 1}
 _ENDS = np.cumsum(list(_RECORD.values())).tolist()
 RECORD = {
@@ -43,12 +46,12 @@ class TeleoperationPort(Block):
 
         E = min(capacity, E- - F_k . (x_k+1 - x_k) + arrived) - sent
 
-    A wave takes ``T |o|^2 / 2`` with it, ``o = (O - what was sent) / T``; as
-    ``a^2/2 - F v = o^2/2``, that is what is left, and the tank stays as it is but for what arrives
-    unevenly. Others send a share of what is above the tank's initial content. What is sent leaves a
-    reserve, and a force is given that could not empty what is left at the largest speed. So E never
-    falls below zero, and both sides together give no more than their tanks held at the start,
-    whatever the channel delays or loses.
+    A wave takes ``T |o|^2 / 2`` with it; as ``a^2/2 - F v = o^2/2``, that is what is left, and the
+    tank stays as it is but for what arrives unevenly. What cannot be paid is sent later. Others
+    send a share of what is above the tank's initial content. What is sent leaves a reserve, and a
+    force is given that could not empty what is left at the largest speed. So E never falls below
+    zero, and both sides together give no more than their tanks held at the start, whatever the
+    channel delays or loses.
 
     Where E is below its initial content, damping ``-d_r v`` fills it.
 
@@ -65,9 +68,10 @@ class TeleoperationPort(Block):
             force and of the wave that could be paid.
 
     State:
-        tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``, and its ``rate``; ``given``, what was sent of O;
-        ``origin``, ``last``: x at the start and at the last tick; ``velocity``; ``forces`` and
-        ``taken``: forces that are to act, and A that they are of, oldest last; ``begun``.
+        tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``, and its ``rate``; ``given``,
+        what was sent of O; ``aim``, O at the last tick; ``origin``, ``last``: x at the start and at
+        the last tick; ``velocity``; ``forces`` and ``taken``: forces that are to act, and A that
+        they are of, oldest last.
 
     Args:
         side: ``leader`` or ``follower``.
@@ -92,7 +96,7 @@ class TeleoperationPort(Block):
             "record": Port(_ENDS[-1], "N, m, J, 1"),
         }
         self.states = {
-            "tank": 1, "sent": 1, "received": 1, "heard": 3, "rate": 3, "given": 3,
+            "tank": 1, "sent": 1, "received": 1, "heard": 3, "rate": 3, "given": 3, "aim": 3,
             "origin": 3, "last": 3, "velocity": 3, "forces": count, "taken": count,
         }  # fmt: skip
         self.inner = {f"{name}_after": size for name, size in self.states.items()}
@@ -114,7 +118,8 @@ class TeleoperationPort(Block):
         heard, rate = x.heard + heard, heard / T
         tank = x.tank - ca.dot(x.forces[-3:], step) + energy - x.received
         tank = ca.fmin(tank, way.tank.capacity) if way.passive else tank
-        given, sent, paid = self._send(x, there, tank)
+        aim = math.sqrt(2.0 * way.impedance) * there - x.taken[-3:]
+        given, sent, paid = self._send(x, aim, tank)
         left = tank - sent
         force, share = self._affordable(x, u, self._force(x, u, there, velocity, rate, tank), left)
         felt = u.felt if u.felt is not None else ca.DM.zeros(3)
@@ -125,7 +130,7 @@ class TeleoperationPort(Block):
         record = ca.vertcat(forces[-6:-3], there, left, x.sent + sent, energy, ca.fmin(share, paid))
         after = {
             "tank": left, "sent": x.sent + sent, "received": energy, "heard": heard, "rate": slope,
-            "given": given, "origin": x.origin, "last": position, "velocity": velocity,
+            "given": given, "aim": aim, "origin": x.origin, "last": position, "velocity": velocity,
             "forces": forces[:-3], "taken": ca.vertcat(heard, x.taken)[:-3],
         }  # fmt: skip
         outputs = {"force": force, "message": message, "record": record}
@@ -151,17 +156,29 @@ class TeleoperationPort(Block):
             force -= way.tank.refill * lack * velocity
         return force
 
-    def _send(self, x: Values, there: Any, tank: Any) -> tuple[Any, Any, Any]:
-        """Return what was sent of O by now, energy that goes with it [J], and the share of it."""
-        way, T = self._coupling, self._limits.period
-        free = ca.fmax(0.0, tank - self._limits.reserve)
+    def _send(self, x: Values, aim: Any, tank: Any) -> tuple[Any, Any, Any]:
+        """Return what was sent of O by now, energy that goes with it [J], and the share of it.
+
+        The wave of the last tick comes first, with what is above the reserve; then what has not
+        been sent before, by a part of the rest that lasts: the slower, the less energy it takes.
+        """
+        way, T, reserve = self._coupling, self._limits.period, self._limits.reserve
         if not self._waves:
-            above = ca.fmax(0.0, tank - max(way.tank.initial, self._limits.reserve))
+            above = ca.fmax(0.0, tank - max(way.tank.initial, reserve))
             return x.given, T * way.tank.share * above if way.passive else ca.DM(0.0), ca.DM(1.0)
-        wanted = math.sqrt(2.0 * way.impedance) * there - x.taken[-3:] - x.given
-        energy = ca.sumsqr(wanted) / (2.0 * T)
-        share = where(energy > free, ca.sqrt(free / energy), 1.0) if way.passive else ca.DM(1.0)
-        return x.given + share * wanted, share**2 * energy, share
+        wave = aim - x.aim
+        if not way.passive:
+            return aim, ca.sumsqr(wave) / (2.0 * T), ca.DM(1.0)
+        payable, size = 2.0 * T * ca.fmax(0.0, tank - reserve), ca.sumsqr(wave)
+        share = where(size > payable, ca.sqrt(payable / size), 1.0)
+        wave = share * wave
+        owed = T / _REPAID * (x.aim - x.given)
+        rest = ca.fmax(0.0, tank - ca.sumsqr(wave) / (2.0 * T) - self._limits.pledged)
+        along, length = ca.dot(wave, owed), ca.sumsqr(owed)
+        root = ca.sqrt(along**2 + length * 2.0 * T * T / _LASTS * rest)
+        most = (root - along) / ca.fmax(length, _NOTHING)
+        wave += ca.fmin(most, 1.0) * owed
+        return x.given + wave, ca.sumsqr(wave) / (2.0 * T), share
 
     def _affordable(self, x: Values, u: Values, force: Any, left: Any) -> tuple[Any, Any]:
         """Return the force that is given [N], and its share of what is wanted."""
