@@ -44,6 +44,7 @@ from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
+from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.warnings.law_warnings import MODES
 from pfsc_drake.control.law.loop_at_rest import RestPosture
@@ -166,6 +167,9 @@ def build_station(
     requests = {} if operator is None else operator.requests
     controller, made = add_law(builder, following, place, forces | requests)
     signals = place.signals | forces | made | links.signals
+    if isinstance(task, StreamTask) and place.stream is not None:
+        stream = place.stream
+        signals["true_place"] = task.add_true_place(builder, part.robot, true_state, stream, period)
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     if links.drive_torque is not None:
         builder.Connect(drive["drive"], links.drive_torque)

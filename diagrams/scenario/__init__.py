@@ -25,6 +25,7 @@ from diagrams.scenario.simulation import (
     SensorFailureParameters,
     SimulationParameters,
 )
+from diagrams.scenario.streamed import Streamed
 from diagrams.scenario.surface import SurfaceParameters
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
@@ -74,6 +75,7 @@ __all__ = [
     "ServoParameters",
     "SimulationParameters",
     "StartParameters",
+    "Streamed",
     "SurfaceParameters",
     "Target",
     "Waypoints",

@@ -80,7 +80,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
             log.add("tracking_error", Y[:, 0, :3])
         else:
             _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
-        points = _project(station, pose)
+        points = raw["true_place"] if "true_place" in raw else _project(station, pose)
         seen = _path_output(station, raw["joint_state"], points)
         # the orientation errors of trajectory tracking stay those from the moving reference
         rotational = indices(station.task.place.coordinates, Kind.ROTATIONAL)
