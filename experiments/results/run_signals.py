@@ -12,6 +12,7 @@ from experiments.results.mounting import add_mounting_signals
 from experiments.results.path import add_pressing
 from experiments.results.posture import add_link_signals, add_posture
 from experiments.results.run_log import FloatArray, RunLog
+from experiments.results.streaming import add_stream
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
@@ -97,6 +98,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     add_guidance(log, station, raw, pose[:, :3])
     add_mounting_signals(log, station, raw)
     add_link_signals(log, station, raw)
+    add_stream(log, station, raw)
     _add_drives(log, station, raw)
     _add_plan(log, station)
     for name, length in station.further_lengths(pose[:, :3]).items():

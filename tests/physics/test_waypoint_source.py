@@ -39,5 +39,5 @@ def test_a_sender_waits_for_who_hears():
 
 @pytest.mark.parametrize("ticks", [[3, 2], [1]])
 def test_nonsense_is_refused(ticks):
-    with pytest.raises(InputError, match="rows|ticks"):
+    with pytest.raises(InputError, match=r"rows|ticks"):
         WaypointSource(Arrivals(np.array(ticks), np.zeros((2, 4)), 9), WaypointLayout(3))

@@ -18,7 +18,7 @@ from pfsc_drake.control.streams.acceptance import (
     Counts,
     Offer,
 )
-from pfsc_drake.control.streams.course import POSE, Course
+from pfsc_drake.control.streams.course import POSE, Course, picked
 from pfsc_drake.control.streams.growth import Growth, chosen, no_direction
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
 from pfsc_drake.control.streams.parameters import StreamParameters
@@ -57,8 +57,9 @@ class WaypointIntake(Block):
         goal (output): Arc length at which the free way ends [m], shape (1,).
         stretches (output): Arc lengths at which spans begin and the last one ends [m].
         stretch_speeds (output): Largest speeds on them [m/s].
-        stream (output): ``[status, taken, way left]``, shape (3,): a :class:`StreamStatus`, how
-            many way points have been taken or left out, and how far the free way goes on [m].
+        stream (output): ``[status, taken, way left, largest speed]``, shape (4,): a
+            :class:`StreamStatus`, how many way points have been taken or left out, how far the free
+            way goes on [m], and how fast the tool may go where its reference is [m/s].
 
     State:
         course: As told. older, newest: The last two way points taken, shape (d,); the newest one
@@ -114,7 +115,7 @@ class WaypointIntake(Block):
             "goal": Port(1, "m"),
             "stretches": Port(course.spans + 1, "m"),
             "stretch_speeds": Port(course.spans, "m/s"),
-            "stream": Port(3, "1, 1, m"),
+            "stream": Port(4, "1, 1, m, m/s"),
         }
         self.states = {
             "course": course.size,
@@ -144,12 +145,15 @@ class WaypointIntake(Block):
         rests = counts.phase == RESTING
         running = where(rests, float(StreamStatus.WAITING), float(StreamStatus.RUNNING))
         status = where(counts.reason > 0.0, counts.reason, running)
+        eta = u.motion[0]
+        span = ca.fmin(ca.fmax(ca.sum1(known["eta"] <= eta) - 1.0, 0.0), self._course.spans - 1.0)
+        told = ca.vertcat(status, counts.taken, goal - eta, picked(known["speed"], span))
         return {
             "course": x.course,
             "goal": goal,
             "stretches": known["eta"],
             "stretch_speeds": known["speed"],
-            "stream": ca.vertcat(status, counts.taken, goal - u.motion[0]),
+            "stream": told,
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
