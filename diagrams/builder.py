@@ -232,6 +232,7 @@ def build_station(
         MODES if "mode" in signals else (),
         mounting,
         0 if remote else scenario.driver.ticks(period),
+        place.pen,
     )
 
 

@@ -1,11 +1,14 @@
 """When the way points of a scenario's stream come."""
 
+from collections.abc import Sequence
 from pathlib import Path as FilePath
+from typing import NamedTuple
 
 import numpy as np
 
 from diagrams.scenario.streamed import Streamed
 from pfsc_drake.control.streams.course import POSE, POSITION
+from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import read_waypoints
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
@@ -82,11 +85,57 @@ def made_arrivals(shape: Streamed, folder: FilePath, period: float) -> tuple[np.
     return start, Arrivals(ticks, np.column_stack([noisy, new]), int(ticks[-1]) + _SOON)
 
 
-def drawn_text(events: list[tuple[int, int, np.ndarray]], dimension: int) -> str:
+class Event(NamedTuple):
+    """Something that a person does with a pen.
+
+    Attributes:
+        tick: Sampling interval from which on it is told.
+        kind: ``WAY_POINT``, ``NEW_PATH`` or ``END``.
+        pose: Way point, shape (d,).
+    """
+
+    tick: int
+    kind: int
+    pose: np.ndarray
+
+
+def tell(sender: WaypointSender, event: Event) -> None:
+    """Let a sender tell an event.
+
+    Args:
+        sender: The sender.
+        event: The event.
+    """
+    if event.kind == END:
+        sender.end()
+    else:
+        sender.add(event.pose, new_path=event.kind == NEW_PATH)
+
+
+def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.ndarray, np.ndarray]:
+    """Return when messages change, shape (k,), and what they become, shape (k, size).
+
+    Args:
+        events: What a person did.
+        layout: Layout of the messages.
+    """
+    sender = WaypointSender(layout)
+    ticks, rows = [0], [sender.message]
+    for event in events:
+        tell(sender, event)
+        if event.tick == ticks[-1]:
+            rows[-1] = sender.message
+        else:
+            ticks.append(event.tick)
+            rows.append(sender.message)
+    return np.array(ticks), np.array(rows)
+
+
+def drawn_text(events: Sequence[Event], dimension: int) -> str:
     """Return what :func:`read_drawn` reads back, to the last bit.
 
     Args:
-        events: Sampling interval, kind and way point of each.
+        events: What a person did.
         dimension: 3 or 7.
     """
     lines = [",".join(columns(dimension))]
@@ -95,8 +144,8 @@ def drawn_text(events: list[tuple[int, int, np.ndarray]], dimension: int) -> str
     return "\n".join(lines) + "\n"
 
 
-def read_drawn(name: str, dimension: int) -> list[tuple[int, int, np.ndarray]]:
-    """Return what a person has drawn: sampling interval, kind and way point of each event.
+def read_drawn(name: str, dimension: int) -> list[Event]:
+    """Return what a person has drawn.
 
     Args:
         name: The file.
@@ -116,4 +165,4 @@ def read_drawn(name: str, dimension: int) -> list[tuple[int, int, np.ndarray]]:
     whole = np.all(ticks == np.round(ticks)) and np.all(np.isin(kinds, (WAY_POINT, NEW_PATH, END)))
     if not whole or np.any(np.diff(ticks) < 0.0):
         raise InputError(f"{name}: ticks and kinds; whole numbers, ticks not decreasing")
-    return [(int(row[0]), int(row[1]), row[2:]) for row in rows]
+    return [Event(int(row[0]), int(row[1]), row[2:]) for row in rows]

@@ -31,6 +31,7 @@ from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 
 # what guidance tells, for the log
 _GUIDANCE = {"guidance": "record", "mode": "mode"}
@@ -94,6 +95,7 @@ class ToolOnManifold:
         predictor: What foretells ``joint_state``, if anything does.
         signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
         stream: What makes the path, where its way points come while the tool moves.
+        pen: Where way points enter that a person draws, if one does.
     """
 
     projector: BlockSystem
@@ -102,6 +104,7 @@ class ToolOnManifold:
     predictor: BlockSystem | None
     signals: dict[str, OutputPort]
     stream: Stream | None = None
+    pen: OperatorPanel | None = None
 
 
 def add_place(
@@ -137,10 +140,10 @@ def add_place(
         order = reference_order(options.compliance, linearization)
         place = task.add_place(builder, tool_pose, None, period)
         stream = add_stream(builder, task.path, place.projector, order, m, period)
-        task.add_source(builder, stream, period)
+        pen = task.add_source(builder, stream, period)
         desired = _swung(builder, following, stream.reference, order)
     else:
-        stream = None
+        stream = pen = None
         if not isinstance(task, SpaceTask):
             order = reference_order(options.compliance, linearization)
             timed = TimedReference(task.motion, order, m, period)
@@ -157,7 +160,7 @@ def add_place(
     }
     if stream is not None:
         signals["stream"] = stream.stream
-    return ToolOnManifold(place.projector, desired, believed, predictor, signals, stream)
+    return ToolOnManifold(place.projector, desired, believed, predictor, signals, stream, pen)
 
 
 def _swung(

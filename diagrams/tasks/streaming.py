@@ -12,7 +12,7 @@ from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 from diagrams.scenario import ControllerParameters, PathParameters, StartParameters, Streamed
 from diagrams.scenario.checks import require
 from diagrams.scenario.streamed import DrawnPlane
-from diagrams.tasks.arrivals import made_arrivals, read_drawn
+from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, told_messages
 from diagrams.tasks.surface import followed_angles
 from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -27,6 +27,7 @@ from pfsc_drake.physics.waypoint_source import Arrivals, WaypointSource
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.drawing.manifold_visualizer import LineVisualizer
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
 
 _SETTLES = 3.0  # s, after the last way point has come, of a run that tells no duration
 _SLOWEST = 0.3  # of the largest speed, to tell how long a run may take
@@ -76,7 +77,7 @@ class StreamTask(Task):
         period, order = controller.sampling_time, RELATIVE_DEGREE[controller.law]
         self.plane, self._period = shape.plane, period
         self.arrivals: Arrivals | None = None
-        self.drawn: list[tuple[int, int, np.ndarray]] | None = None
+        self.drawn: list[Event] | None = None
         if shape.plane is None:
             begin, self.arrivals = made_arrivals(shape, folder, period)
             ahead = self.arrivals.rows[0, :POSITION] - begin[:POSITION]
@@ -161,19 +162,33 @@ class StreamTask(Task):
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
 
-    def add_source(self, builder: DiagramBuilder, stream: Stream, period: float) -> None:
-        """Add what way points come from, unless a person draws them.
+    def add_source(
+        self, builder: DiagramBuilder, stream: Stream, period: float
+    ) -> OperatorPanel | None:
+        """Add what way points come from.
 
         Args:
             builder: Builder of the diagram.
             stream: What takes them.
             period: Sampling time [s].
+
+        Returns:
+            Where the messages of a person who draws enter, port ``controls``; None if nobody does.
         """
-        if self.arrivals is None:
-            return
-        block = WaypointSource(self.arrivals, self.path.messages)
-        source = builder.AddNamedSystem("waypoint_source", BlockSystem(block, period))
-        builder.Connect(source.GetOutputPort("waypoints"), stream.waypoints)
+        messages = self.path.messages
+        if self.arrivals is not None:
+            block = WaypointSource(self.arrivals, messages)
+            source = builder.AddNamedSystem("waypoint_source", BlockSystem(block, period))
+            builder.Connect(source.GetOutputPort("waypoints"), stream.waypoints)
+            return None
+        parts = {"waypoints": np.zeros(messages.size)}
+        panel = builder.AddNamedSystem("pen_panel", OperatorPanel(parts, period))
+        builder.Connect(panel.GetOutputPort("waypoints"), stream.waypoints)
+        if self.drawn is not None:
+            told = told_messages(self.drawn, messages)
+            player = builder.AddNamedSystem("recorded_pen", RecordedControls(*told, period))
+            builder.Connect(player.get_output_port(), panel.GetInputPort("controls"))
+        return panel
 
     def add_true_place(
         self,
