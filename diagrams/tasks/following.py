@@ -136,6 +136,8 @@ def add_place(
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
     m = linearization.num_outputs
+    stream: Stream | None = None
+    pen: OperatorPanel | None = None
     if isinstance(task, StreamTask):
         order = reference_order(options.compliance, linearization)
         place = task.add_place(builder, tool_pose, None, period)
@@ -143,7 +145,6 @@ def add_place(
         pen = task.add_source(builder, stream, period)
         desired = _swung(builder, following, stream.reference, order)
     else:
-        stream = pen = None
         if not isinstance(task, SpaceTask):
             order = reference_order(options.compliance, linearization)
             timed = TimedReference(task.motion, order, m, period)

@@ -128,8 +128,8 @@ def with_operator(scenario: ScenarioFile) -> ScenarioFile:
     if not settings.compliance.is_given and not settings.switched_regions and not draws:
         raise InputError(
             f"{scenario.path}: compliance = not given: nothing yields to a hand; allowed in a live "
-            "session: a scenario with compliance, such as vf_soft_circle, or with a plane to draw in, "
-            "such as pfc_draw_6r"
+            "session: a scenario with compliance, such as vf_soft_circle, or with a plane to draw "
+            "in, such as pfc_draw_6r"
         )
     data = dict(scenario.data)
     operator = dict(data.get("operator") or {})
