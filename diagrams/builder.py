@@ -49,6 +49,7 @@ from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import law_manifold
+from diagrams.tasks.streaming import StreamTask
 from diagrams.warnings.law_warnings import MODES
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.following.law import make_law
@@ -185,6 +186,9 @@ def build_station(
     signals = place.signals | forces | made | links.signals
     if afar is not None:
         signals |= afar.connect(builder, task, believed, servo_lag(scenario), signals)
+    if isinstance(task, StreamTask) and place.stream is not None:
+        stream = place.stream
+        signals["true_place"] = task.add_true_place(builder, part.robot, true_state, stream, period)
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     if links.drive_torque is not None:
         builder.Connect(drive["drive"], links.drive_torque)
@@ -252,6 +256,7 @@ def build_station(
         mounting,
         0 if remote else scenario.driver.ticks(period),
         holder,
+        place.pen,
     )
 
 

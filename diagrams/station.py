@@ -22,6 +22,7 @@ from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import BlockAccess
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess
 
 
@@ -54,6 +55,7 @@ class Station:
         mounting: Where plates come from and go, if there are any.
         ticks_late: After how many ticks torques act that are told.
         holder: The robot that holds the workpiece which the path is on, if one does.
+        pen: Where way points enter that a person draws, if one does.
     """
 
     diagram: Diagram
@@ -75,6 +77,7 @@ class Station:
     mounting: Mounting | None = None
     ticks_late: int = 0
     holder: Holder | None = None
+    pen: OperatorPanel | None = None
 
     @property
     def robot(self) -> RobotModel:
@@ -129,6 +132,17 @@ class Station:
         if self.holder is not None:
             self.holder.set_start(self.blocks, root)
         self.set_place(root, self.initial_place)
+
+    def tell_way_points(self, root: Context, message: np.ndarray) -> None:
+        """Set what the station hears from the next tick on of way points that a person draws.
+
+        Args:
+            root: Context of the diagram.
+            message: Laid out as the task's path says.
+        """
+        assert self.pen is not None
+        context = self.pen.GetMyMutableContextFromRoot(root)
+        self.pen.GetInputPort("controls").FixValue(context, message)
 
     def set_place(self, root: Context, place: np.ndarray) -> None:
         """Choose where on the manifold, on which branch of it, the tool is.

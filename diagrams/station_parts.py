@@ -16,7 +16,7 @@ from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import add_remote_arm
 from diagrams.robots.workpiece import Workpiece
-from diagrams.scenario import Scenario
+from diagrams.scenario import Scenario, Streamed
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.surroundings.forces import Outside
@@ -27,6 +27,7 @@ from diagrams.surroundings.workpieces import NotchedWorkpiece, PressedWorkpiece
 from diagrams.tasks.following import FollowingOptions
 from diagrams.tasks.path_following import PathTask, TrajectoryTask
 from diagrams.tasks.space_guidance import SpaceTask
+from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
@@ -64,6 +65,10 @@ def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = 
     require(not given, "fixtures.regions", f"{len(given)} given", allowed)
     if controller.manifold == "surface":
         return SurfaceTask(scenario.surface, controller, reference, start, folder, progress)
+    if isinstance(scenario.path.shape, Streamed):
+        allowed = "path where way points come while the tool moves"
+        require(controller.manifold == "path", "controller.manifold", controller.manifold, allowed)
+        return StreamTask(scenario.path, controller, start, scenario.duration, folder)
     kind = {"path": PathTask, "trajectory": TrajectoryTask}[controller.manifold]
     return kind(scenario.path, scenario.surface, controller, reference, start, folder, progress)
 

@@ -22,7 +22,8 @@ RATE, DURATION, TURN = 20.0, 6.0, 40  # way points per second, s, number of a wa
 def way_point(k: int) -> np.ndarray:
     """Return a way point, on a wave and later on another one."""
     y, height = 0.01 * k, 0.04 if k < TURN else 0.02
-    return START + [height * np.sin(12.0 * y), y, height * (1.0 - np.cos(9.0 * y))]
+    beside = np.array([height * np.sin(12.0 * y), y, height * (1.0 - np.cos(9.0 * y))])
+    return START + beside
 
 
 def main() -> None:
@@ -51,7 +52,7 @@ def main() -> None:
         simulator.AdvanceTo(k / RATE)
         state = follower.GetOutputPort("manifold_state").Eval(context)
         furthest = max(furthest, float(np.linalg.norm(state[1:3])))
-    status, taken, left = follower.GetOutputPort("stream").Eval(context)
+    status, taken, left, _ = follower.GetOutputPort("stream").Eval(context)
     print(f"{1e3 * state[0]:.0f} mm along {taken:.0f} way points, {1e3 * left:.3f} mm left")
     print(f"{1e6 * furthest:.3f} um from the path at most, status {status:.0f}")
 

@@ -43,6 +43,7 @@ from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
 from experiments.results.teleoperation import teleoperation_metrics
+from experiments.results.streaming import stream_metrics
 from experiments.simulation import SimulationResult, measure_tick
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
@@ -227,6 +228,7 @@ def _measure(
     metrics.update(teleoperation_metrics(log, settings))
     metrics.update(mounting_metrics(log))
     metrics.update(holder_metrics(log, settings.reference.dwell))
+    metrics.update(stream_metrics(log))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)

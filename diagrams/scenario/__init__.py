@@ -26,6 +26,7 @@ from diagrams.scenario.simulation import (
     SensorFailureParameters,
     SimulationParameters,
 )
+from diagrams.scenario.streamed import Streamed
 from diagrams.scenario.surface import SurfaceParameters
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
@@ -78,6 +79,7 @@ __all__ = [
     "SimulationParameters",
     "SolidParameters",
     "StartParameters",
+    "Streamed",
     "SurfaceParameters",
     "Target",
     "Waypoints",

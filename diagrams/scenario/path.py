@@ -13,6 +13,7 @@ from diagrams.scenario.checks import (
     require_one_of,
     require_place,
 )
+from diagrams.scenario.streamed import Streamed
 from diagrams.scenario.surface import SurfaceShape, require_jacobian
 from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.yaml.reading import FILE
@@ -170,7 +171,7 @@ class Intersection:
 
 # the first is what a shape without a tag means
 PathShape = Union[  # noqa: UP007 (Drake's YAML needs it)
-    Waypoints, BentLemniscate, Circle, Line, OnSurface, Intersection
+    Waypoints, BentLemniscate, Circle, Line, OnSurface, Intersection, Streamed
 ]
 
 
@@ -235,7 +236,7 @@ class PathParameters:
 
     Attributes:
         shape: Position, one of ``!BentLemniscate``, ``!Circle``, ``!Line``, ``!Waypoints``,
-            ``!OnSurface``, ``!Intersection``.
+            ``!OnSurface``, ``!Intersection``, ``!Streamed``.
         orientation: Orientation; without keyframes the waypoint file's, or none.
     """
 

@@ -11,6 +11,7 @@ from diagrams.scenario.checks import require
 from diagrams.tasks.fastest_motion import FastestPlanner
 from diagrams.tasks.motion_demand import MotionDemand
 from diagrams.tasks.space_guidance import SpaceTask
+from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.task import DrivePlan, Task
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -49,7 +50,8 @@ def keep_drive_limits(
 ) -> None:
     """Give a task its plan, and the reference that the drives can follow, unless it has them.
 
-    Where a hand leads, or the motion is longer than any run, nobody plans it.
+    Where a hand leads, way points come while the tool moves, or the motion is longer than any run,
+    nobody plans it.
 
     Args:
         reference: The reference, and whether it may be slowed.
@@ -63,7 +65,7 @@ def keep_drive_limits(
     """
     fastest = reference.speed == "fastest"
     along = indices(task.place.coordinates, Kind.TANGENTIAL)
-    led = isinstance(task, SpaceTask) or law.stabilization.is_free[along].any()
+    led = isinstance(task, SpaceTask | StreamTask) or law.stabilization.is_free[along].any()
     if task.drive_plan is not None:
         return
     if led:

@@ -9,6 +9,7 @@ from diagrams.robots.belief import believed_robot
 from diagrams.scenario.checks import require
 from diagrams.tasks.held_frame import HeldFrame
 from diagrams.tasks.space_guidance import SpaceTask
+from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -26,10 +27,12 @@ from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.prediction import add_prediction
+from pfsc_drake.following.streamed_path import Stream, add_stream
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 
 # what guidance tells, for the log
 _GUIDANCE = {"guidance": "record", "mode": "mode"}
@@ -96,6 +99,8 @@ class ToolOnManifold:
         believed: What is believed of the robot and of how well its motion is known.
         predictor: What foretells ``joint_state``, if anything does.
         signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
+        stream: What makes the path, where its way points come while the tool moves.
+        pen: Where way points enter that a person draws, if one does.
     """
 
     projector: BlockSystem
@@ -103,6 +108,8 @@ class ToolOnManifold:
     believed: Believed
     predictor: BlockSystem | None
     signals: dict[str, OutputPort]
+    stream: Stream | None = None
+    pen: OperatorPanel | None = None
 
 
 def add_place(
@@ -133,24 +140,36 @@ def add_place(
         BlockSystem(ToolKinematics(following.robot, following.on_motors), period),
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
-    if not isinstance(task, SpaceTask):
+    m = linearization.num_outputs
+    stream: Stream | None = None
+    pen: OperatorPanel | None = None
+    if isinstance(task, StreamTask):
         order = reference_order(options.compliance, linearization)
-        timed = TimedReference(task.motion, order, linearization.num_outputs, period)
-        generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
-        if override is not None:
-            builder.Connect(override, generator.GetInputPort("override"))
-        desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
-    builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-    if following.held is None:
-        place = task.add_place(builder, tool_pose, desired, period)
+        place = task.add_place(builder, tool_pose, None, period)
+        stream = add_stream(builder, task.path, place.projector, order, m, period)
+        pen = task.add_source(builder, stream, period)
+        desired = _swung(builder, following, stream.reference, order)
     else:
-        place, tool_pose = following.held.add_place(builder, task, tool_pose, desired, period)
+        if not isinstance(task, SpaceTask):
+            order = reference_order(options.compliance, linearization)
+            timed = TimedReference(task.motion, order, m, period)
+            generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
+            if override is not None:
+                builder.Connect(override, generator.GetInputPort("override"))
+            desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
+        if following.held is None:
+            place = task.add_place(builder, tool_pose, desired, period)
+        else:
+            place, tool_pose = following.held.add_place(builder, task, tool_pose, desired, period)
+    builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     signals = {
         "joint_state": joint_state,
         "tool_pose": tool_pose,
         "manifold_point": place.manifold_point,
     }
-    return ToolOnManifold(place.projector, desired, believed, predictor, signals)
+    if stream is not None:
+        signals["stream"] = stream.stream
+    return ToolOnManifold(place.projector, desired, believed, predictor, signals, stream, pen)
 
 
 def _swung(

@@ -14,6 +14,7 @@ from diagrams.scenario import (
     OnSurface,
     OrientationParameters,
     PathParameters,
+    Streamed,
     Waypoints,
 )
 from diagrams.tasks.manifold_warnings import far_waypoints, turning_back
@@ -63,7 +64,7 @@ def make_path(
     if isinstance(shape, Waypoints):
         path = _through_waypoints(parameters, shape, smoothness, folder, progress)
     else:
-        assert not isinstance(shape, OnSurface)
+        assert not isinstance(shape, OnSurface | Streamed)
         if isinstance(shape, Intersection):
             position = make_edge(shape, law, folder, progress)
         else:

@@ -53,6 +53,7 @@ from experiments.figures.posture import (
 )
 from experiments.figures.teleoperation import draw_port_energy, draw_teleoperation
 from experiments.figures.two_arms import draw_holder_torques, draw_two_arms
+from experiments.figures.streaming import draw_stream
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from reporting.registry import FIGURES
@@ -113,6 +114,7 @@ def _is_along(log: RunLog) -> bool:
 _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] = {
     "progress": (draw_progress, _is_along),
     "pace": (draw_pace, _always),
+    "stream": (draw_stream, _always),
     "guidance": (draw_guidance, has_regions),
     "contact": (draw_contact, has_contact),
     "energy": (draw_energy, gives_energy),

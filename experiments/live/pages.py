@@ -14,7 +14,10 @@ SILENCE, _GONE = 0.3, 3.0
 TAKE, LEAVE = "take", "leave"
 _LEADS = ("", TAKE, LEAVE)
 _LONGEST_NAME = 64
-_KEYS = ("client", "hand", "set", "lead")
+_KEYS = ("client", "hand", "set", "lead", "draw")
+# numbers of each place of a pen: to the right and upwards [m], and what the pen does
+_STROKE = 3
+_LONGEST_STROKE = 400  # places in a message
 
 
 @dataclass(frozen=True)
@@ -26,12 +29,14 @@ class Message:
         hand: What the hand does now, by name of what pulls or pushes; what has no name rests.
         settings: Sliders and buttons that are set now, once, by name.
         lead: TAKE, to lead from now on whoever did; LEAVE, to lead no more; or empty.
+        drawn: Places of a pen since the last message, each ``[right, up, kind]`` [m, m, 1].
     """
 
     client: str
     hand: dict[str, float] = field(default_factory=dict)
     settings: dict[str, float] = field(default_factory=dict)
     lead: str = ""
+    drawn: list[list[float]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -42,11 +47,13 @@ class Heard:
         hand: What the hand does now; nothing if it is silent.
         settings: What was set, in its order.
         let_go: Whether the hand has to open: it is silent, or it is another one.
+        drawn: Places of a pen, in their order, see :class:`Message`.
     """
 
     hand: dict[str, float]
     settings: list[tuple[str, float]]
     let_go: bool
+    drawn: list[list[float]] = field(default_factory=list)
 
 
 class Pages:
@@ -66,6 +73,7 @@ class Pages:
         self._leader: str | None = None
         self._last, self._changed = -math.inf, False
         self._hand, self._settings = dict[str, float](), list[tuple[str, float]]()
+        self._drawn = list[list[float]]()
 
     def expect(self, hand: Collection[str], settings: Collection[str]) -> None:
         """Say which names there are.
@@ -100,6 +108,7 @@ class Pages:
             return False
         if is_new or message.lead == LEAVE:
             self._settings.clear()
+            self._drawn.clear()
             self._hand, self._changed = {}, True
         if message.lead == LEAVE:
             self._leader, self._last = None, -math.inf
@@ -107,6 +116,7 @@ class Pages:
         self._leader, self._last = message.client, now
         self._hand = message.hand
         self._settings += message.settings.items()
+        self._drawn += message.drawn
         return True
 
     def _is_free(self, now: float) -> bool:
@@ -122,8 +132,9 @@ class Pages:
         """Return what was heard since the last time."""
         with self._lock:
             silent = self._clock() - self._last > SILENCE
-            heard = Heard({} if silent else self._hand, self._settings, silent or self._changed)
-            self._settings, self._changed = [], False
+            hand, let_go = {} if silent else self._hand, silent or self._changed
+            heard = Heard(hand, self._settings, let_go, self._drawn)
+            self._settings, self._drawn, self._changed = [], [], False
         return heard
 
     def open_hand(self) -> None:
@@ -136,7 +147,7 @@ def message_of(content: bytes) -> Message:
     """Return the message that JSON holds.
 
     An object with ``client``, and where there is something to say ``hand`` and ``set``, objects of
-    names and finite numbers, and ``lead``.
+    names and finite numbers, ``lead``, and ``draw``, a list of places of a pen.
 
     Args:
         content: The JSON.
@@ -158,7 +169,19 @@ def message_of(content: bytes) -> Message:
         raise InputError(f"client; allowed: a name of 1 to {_LONGEST_NAME} characters")
     if lead not in _LEADS:
         raise InputError(f"lead = {shortened(repr(lead))}; allowed: {TAKE}, {LEAVE}, or empty")
-    return Message(client, _numbers(entries, "hand"), _numbers(entries, "set"), lead)
+    hand, settings = _numbers(entries, "hand"), _numbers(entries, "set")
+    return Message(client, hand, settings, lead, _places(entries.get("draw", [])))
+
+
+def _places(given: object) -> list[list[float]]:
+    """Return places of a pen."""
+    allowed = f"draw; allowed: a list of at most {_LONGEST_STROKE} places, {_STROKE} numbers each"
+    if not isinstance(given, list) or len(given) > _LONGEST_STROKE:
+        raise InputError(allowed)
+    for place in given:
+        if not isinstance(place, list) or len(place) != _STROKE:
+            raise InputError(allowed)
+    return [[_number("draw", value) for value in place] for place in given]
 
 
 def _numbers(entries: dict[str, object], key: str) -> dict[str, float]:

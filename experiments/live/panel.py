@@ -72,7 +72,7 @@ class Panel:
         }
         # commands wait here until they are asked for
         self._buttons, self._commands = dict(c.value for c in Command), list[Command]()
-        self._hand = dict[str, float]()
+        self._hand, self._drawn = dict[str, float](), list[list[float]]()
         self._held_from: np.ndarray | None = None
         pages.expect([*self._pull, *self._stick, *self._pushes], [*self._sliders, *self._buttons])
 
@@ -98,6 +98,12 @@ class Panel:
             elif value > 0.5:
                 self._commands += [command for command in Command if command.value[0] == name]
         self._hand = heard.hand
+        self._drawn += heard.drawn
+
+    def drawn(self) -> list[list[float]]:
+        """Return places of a pen that were drawn and not yet told, see :class:`Message`."""
+        drawn, self._drawn = self._drawn, []
+        return drawn
 
     def commands(self) -> list[Command]:
         """Return what was asked for and not yet told."""

@@ -11,6 +11,7 @@ from experiments.finished_run import RunOutcome
 from experiments.live.controls import tuned_parameters
 from experiments.live.pages import Pages
 from experiments.live.panel import Command, Panel, Scene
+from experiments.live.pen import Pen
 from experiments.live.simulation import LiveSimulation, RealTimePace
 from experiments.live.status import LiveStatus
 from experiments.live.take import ControlRecord, TakeFolders
@@ -92,7 +93,7 @@ class LiveSession:
         self._station, self._operator = station, station.operator
         self.status, self.kept = status, list[KeptTake]()
         self._simulation, self._pace = LiveSimulation(station, settings), pace or RealTimePace()
-        self._record = ControlRecord(station.operator)
+        self._record, self._pen = ControlRecord(station.operator), Pen.of(station)
         limit = settings.operator.hand.force_limit
         self._panel = Panel(
             pages, limit, tuned_parameters(settings, station), self._operator.regions
@@ -169,6 +170,9 @@ class LiveSession:
         controls = self._panel.read(self._frame.tool_pose[:3])
         self._record.note(simulation.tick, controls)
         simulation.set(controls)
+        if self._pen is not None:
+            self._pen.draw(self._panel.drawn())
+            simulation.tell_way_points(self._pen)
         simulation.step()
         self._pace.keep(simulation.time)
         self._steps += 1
@@ -185,6 +189,8 @@ class LiveSession:
         self._draw()
         self.status.observe(self._station, signals)
         self.status.controls = self._panel.content()
+        if self._pen is not None:
+            self.status.plane = self._pen.content(self._frame.tool_pose[:3], signals["stream"])
         if whole:
             self._tell_speed()
 
@@ -222,6 +228,9 @@ class LiveSession:
         self._panel.let_go()
         self._simulation.restart()
         self._record = ControlRecord(self._operator)
+        if self._pen is not None:
+            self._panel.drawn()
+            self._pen.restart()
         self.status.recording = None
         self._frame = self._simulation.frame(self._simulation.signals())
         self._draw(interrupted=True)
@@ -261,6 +270,7 @@ class LiveSession:
             attributes=attributes,
             figures=self._output.figures,
             recording=self._output.recording,
+            drawing=None if self._pen is None else self._pen.text(),
         )
         self.kept.append(KeptTake(folder, outcome))
         self.status.kept = [str(kept.folder) for kept in self.kept]

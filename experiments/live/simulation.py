@@ -13,6 +13,7 @@ from diagrams.live_view import LiveFrame
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.surroundings.operator import PULL
+from experiments.live.pen import Pen
 from experiments.simulation import SimulationResult, chunk_ticks, configure
 from pfsc_drake.physics.operator_hand import ASKED, HOLD, TARGET
 from pfsc_drake.robot.robot_model import pose_function
@@ -70,6 +71,15 @@ class LiveSimulation:
         assert self._station.operator is not None
         self._station.operator.fix(self.root, controls)
         self._pull = controls[PULL]
+
+    def tell_way_points(self, pen: Pen) -> None:
+        """Tell what a person has drawn, from this tick on.
+
+        Args:
+            pen: What makes way points of it.
+        """
+        taken = self._station.blocks.output(self.root, "waypoint_intake.stream")[1]
+        self._station.tell_way_points(self.root, pen.message(self.tick, int(taken)))
 
     def step(self) -> None:
         """Go on by a step, and look for faults."""

@@ -5,7 +5,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import Scenario, Streamed
 from experiments.live.pages import Pages
 from experiments.live.server import PageServer
 from experiments.live.session import KeptTake, LiveSession, Output, Teller
@@ -123,10 +123,13 @@ def with_operator(scenario: ScenarioFile) -> ScenarioFile:
         InputError: If it is wrong, or has nothing to guide.
     """
     settings = load_typed(Scenario, scenario.data, str(scenario.path))
-    if not settings.compliance.is_given and not settings.switched_regions:
+    shape = settings.path.shape
+    draws = isinstance(shape, Streamed) and shape.plane is not None
+    if not settings.compliance.is_given and not settings.switched_regions and not draws:
         raise InputError(
             f"{scenario.path}: compliance = not given: nothing yields to a hand; allowed in a live "
-            "session: a scenario with compliance, such as vf_soft_circle"
+            "session: a scenario with compliance, such as vf_soft_circle, or with a plane to draw "
+            "in, such as pfc_draw_6r"
         )
     data = dict(scenario.data)
     operator = dict(data.get("operator") or {})
@@ -135,4 +138,8 @@ def with_operator(scenario: ScenarioFile) -> ScenarioFile:
         LiveHandParameters(**hand)
         operator["hand"] = hand
     operator["inputs"] = ""
+    if draws:
+        path = dict(data["path"])
+        path["shape"] = dict(path["shape"]) | {"inputs": ""}
+        data["path"] = path
     return ScenarioFile(scenario.path, data | {"operator": operator, "hand": None})

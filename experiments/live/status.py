@@ -54,6 +54,7 @@ class LiveStatus:
         message: What else there is to say: why it stopped, or what comes next.
         override: Of a robot that is watched: share of the planned pace; else null.
         controls: What can be set and how it is, see :class:`Panel`.
+        plane: Where a person draws, see :meth:`Pen.content`; null where nobody does.
     """
 
     scenario: str
@@ -77,6 +78,7 @@ class LiveStatus:
     message: str = ""
     override: float | None = None
     controls: dict[str, object] = field(default_factory=dict)
+    plane: dict[str, object] | None = None
 
     @property
     def is_slow(self) -> bool:

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from diagrams.scenario import Streamed
 from diagrams.surroundings.operator import Operator, controls_text
 from experiments.finished_run import FinishedRun, RunOutcome, write_outcome
+from experiments.live.pen import DRAWING
 from experiments.preparation import PreparedRun
 from experiments.simulation import SimulationResult
 from pfsc_drake.errors import InputError
@@ -92,6 +94,7 @@ class TakeFolders:
         attributes: dict[str, str],
         figures: bool,
         recording: bool,
+        drawing: str | None = None,
     ) -> tuple[Path, RunOutcome]:
         """Keep a take: its inputs, a scenario that repeats it, and what a run leaves.
 
@@ -105,16 +108,22 @@ class TakeFolders:
             attributes: What else to note in the log.
             figures: Whether to draw figures.
             recording: Whether to record the motion.
+            drawing: What was drawn, if anybody draws.
         """
         folder = self.next()
         settings = dataclasses.replace(prepared.settings, duration=float(result.root.get_time()))
         assert settings.operator is not None
         settings.operator = dataclasses.replace(settings.operator, inputs=INPUTS)
+        if drawing is not None and isinstance(settings.path.shape, Streamed):
+            shape = dataclasses.replace(settings.path.shape, inputs=DRAWING)
+            settings.path = dataclasses.replace(settings.path, shape=shape)
         taken = dataclasses.replace(prepared, settings=settings, text=dump_typed(settings))
         run = FinishedRun(taken, name, result, attributes=attributes)
         with open_results(folder, "run", self._inputs) as results:
             results.write("scenario.yaml", taken.text)
             results.write(INPUTS, record.text())
+            if drawing is not None:
+                results.write(DRAWING, drawing)
             outcome = write_outcome(
                 run, results, progress, interrupted, figures=figures, recording=recording
             )

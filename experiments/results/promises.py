@@ -23,7 +23,12 @@ from reporting.metrics import Metric, Metrics, format_quantity
 from reporting.registry import possible_metrics
 
 # held at every instant, so that also a run that was cut short is judged by them
-_ALWAYS = ("deepest_violation", "max_unanswered_force", "least_port_tank", "energy_margin")
+_ALWAYS = (
+    *("deepest_violation", "max_unanswered_force", "past_known_way"),
+    *("least_port_tank", "energy_margin"),
+)
+# m, by which a tool may be past the end of what it knows of its path: it follows its reference
+_PAST = 1e-3
 # how far a tool is from where it should be, the first of them that a run has, and from when on
 # that is worth a word [m]
 _DISTANCES = ("max_error_from_compliant_reference", "max_path_deviation")
@@ -89,6 +94,8 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     for name in ("least_port_tank", "energy_margin"):
         if way is not None and way.passive and name in metrics:
             metrics.set_target(name, ">= 0", "teleoperation.passive")
+    if "past_known_way" in metrics:
+        metrics.set_target("past_known_way", f"<= {_PAST:g}", "room to stop")
     for name, target in settings.targets.get(settings.controller.law, {}).items():
         # what another choice of the controller would tell has been checked, and is no metric here
         if name in metrics:

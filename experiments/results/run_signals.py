@@ -14,6 +14,7 @@ from experiments.results.path import add_pressing
 from experiments.results.posture import add_link_signals, add_posture
 from experiments.results.run_log import FloatArray, RunLog
 from experiments.results.teleoperation import add_teleoperation
+from experiments.results.streaming import add_stream
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
@@ -86,7 +87,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
             log.add("tracking_error", Y[:, 0, :3])
         else:
             _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
-        points = _project(station, pose)
+        points = raw["true_place"] if "true_place" in raw else _project(station, pose)
         true_points = points if frames is None else np.hstack([points, frames])
         seen = _path_output(station, raw["joint_state"], true_points)
         # the orientation errors of trajectory tracking stay those from the moving reference
@@ -106,6 +107,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     add_holder_signals(log, station, raw)
     add_teleoperation(log, raw)
     add_link_signals(log, station, raw)
+    add_stream(log, station, raw)
     _add_drives(log, station, raw)
     _add_plan(log, station)
     for name, length in station.further_lengths(pose[:, :3]).items():

@@ -58,7 +58,9 @@ class StreamedPath:
         require(good, "start", np.round(self.start, 6).tolist(), "3 or 7 finite numbers")
         if len(self.start) == POSE:
             size = np.linalg.norm(self.start[POSITION:])
-            require(size > _NO_SIZE, "start", self.start.tolist(), "a quaternion that is not zero")
+            require(
+                bool(size > _NO_SIZE), "start", self.start.tolist(), "a quaternion that is not zero"
+            )
             self.start[POSITION:] /= size
         self.course = Course(order, len(self.start), parameters.columns)
         self.parameters, self._direction = parameters, direction

@@ -38,7 +38,7 @@ def add_path_streaming(
 
     - waypoints (input): a message of the last way points, see
       :class:`~pfsc_drake.control.streams.messages.WaypointLayout`;
-    - stream (output): ``[status, taken, way left]``, shape (3,), see
+    - stream (output): ``[status, taken, way left, largest speed]``, shape (4,), see
       :class:`~pfsc_drake.control.streams.intake.WaypointIntake`.
 
     Args:

@@ -19,7 +19,7 @@ class PacedReference(Block):
     largest from which it can still stop at the end g of the free way, and slow down to ``w_j``
     before the stretch j, ``s_j .. s_(j+1)``, of the way::
 
-        v+ = min(V, v + A T, f(c), min over j ahead of f(c_j + w_j^2 / (2 A)), w_j of those it is on)
+        v+ = min(V, v + A T, f(c), f(c_j + w_j^2 / (2 A)) of all j ahead, w_j of the one it is on)
         f(c) = A (sqrt(T^2 + 2 c / A) - T),   c = g - p - T v / 2
         p+ = p + T (v + v+) / 2
 

@@ -29,6 +29,7 @@ class Counts(NamedTuple):
     taken: Any
     begun: Any
     silence: Any
+    heard: Any
     reason: Any
 
     @classmethod
@@ -42,7 +43,7 @@ class Offer(NamedTuple):
 
     Attributes:
         waypoint: What would be accepted of it: itself, or a point on the way there.
-        open: Whether the piece takes way points.
+        dry: Whether the piece takes way points, and none is left that would make it longer.
         missed: Whether it has been missed.
         new: Whether it begins a new path, and nothing has been done about that.
         refused: Whether it is no finite number, or out of bounds.
@@ -52,7 +53,7 @@ class Offer(NamedTuple):
     """
 
     waypoint: Any
-    open: Any
+    dry: Any
     missed: Any
     new: Any
     refused: Any
@@ -83,18 +84,26 @@ class Acceptance:
         # way points that a piece needs to begin
         self.needed = course.spline.reach + 1
 
-    def row(self, message: Any, taken: Any) -> tuple[Any, Any]:
+    def row(self, message: Any, counts: Counts) -> tuple[Any, Any]:
         """Return the next row, and whether it has been missed."""
         d, M = self._layout.dimension, self._layout.length
-        waiting = message[0] - taken
+        waiting = counts.heard - counts.taken
         place = ca.fmin(ca.fmax(M - waiting, 0.0), M - 1.0)
         return picked(message, 2.0 + (d + 1) * place + ca.DM(range(d + 1))), waiting > M
 
-    def offer(self, x: Values, known: Fields, message: Any) -> Offer:
-        """Return what the next way point is to the path."""
+    def offer(self, x: Values, known: Fields, message: Any, room: Any, runs_dry: Any) -> Offer:
+        """Return what the next way point is to the path.
+
+        Args:
+            x: States of the intake.
+            known: The course.
+            message: What is told.
+            room: Whether there is room for one more control point.
+            runs_dry: Whether no more way points come for now.
+        """
         d, counts, limits = self._course.dimension, Counts.of(x.counts), self._parameters
-        row, missed = self.row(message, counts.taken)
-        waits = message[0] > counts.taken
+        row, missed = self.row(message, counts)
+        waits = counts.heard > counts.taken
         missed = ca.logic_and(waits, missed)
         waits = ca.logic_and(waits, ca.logic_not(missed))
         new = ca.logic_and(waits, ca.logic_and(row[d] == 1.0, counts.begun != counts.taken + 1.0))
@@ -104,14 +113,15 @@ class Acceptance:
             ca.logic_or(counts.phase == GROWING, ca.logic_and(rests, counts.fresh < self.needed)),
         )
         waits = ca.logic_and(waits, ca.logic_not(new))
-        looks = ca.logic_and(waits, is_open)
+        looks = ca.logic_and(ca.logic_and(waits, is_open), ca.logic_or(rests, room))
         left_out = ca.logic_and(waits, counts.reason >= StreamStatus.MISSED)
 
         before = where(rests, self._last_fresh(x, counts), x.newest)
         raw, good = self._checked(row[:d], before)
         way = raw - before
         distance = ca.norm_2(way[:POSITION])
-        final = ca.logic_and(message[1] == 1.0, message[0] == counts.taken + 1.0)
+        last = counts.heard == counts.taken + 1.0
+        final = ca.logic_and(runs_dry, last)
         near = distance < limits.spacing * where(final, _LAST, 1.0)
         parts = ca.fmax(ca.ceil(distance / (_APART * limits.spacing)), 1.0)
         waypoint = before + way / parts
@@ -124,10 +134,13 @@ class Acceptance:
         far = ca.logic_and(looks_good, ca.logic_not(near))
         accepted = ca.logic_and(far, gentle)
         whole = ca.logic_and(accepted, parts == 1.0)
-        passed = ca.logic_or(left_out, ca.logic_or(ca.logic_and(looks_good, near), whole))
+        # the last one stays, as it may become the end
+        done = ca.logic_and(near, ca.logic_or(final, ca.logic_not(last)))
+        passed = ca.logic_or(left_out, ca.logic_or(ca.logic_and(looks_good, done), whole))
+        none = ca.logic_or(ca.logic_not(waits), ca.logic_and(final, ca.logic_and(good, near)))
         return Offer(
             waypoint=waypoint,
-            open=is_open,
+            dry=ca.logic_and(ca.logic_and(runs_dry, is_open), none),
             missed=missed,
             new=new,
             refused=ca.logic_and(looks, ca.logic_not(good)),

@@ -18,7 +18,7 @@ from pfsc_drake.control.streams.acceptance import (
     Counts,
     Offer,
 )
-from pfsc_drake.control.streams.course import POSE, Course
+from pfsc_drake.control.streams.course import POSE, Course, picked
 from pfsc_drake.control.streams.growth import Growth, chosen, no_direction
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
 from pfsc_drake.control.streams.parameters import StreamParameters
@@ -57,15 +57,16 @@ class WaypointIntake(Block):
         goal (output): Arc length at which the free way ends [m], shape (1,).
         stretches (output): Arc lengths at which spans begin and the last one ends [m].
         stretch_speeds (output): Largest speeds on them [m/s].
-        stream (output): ``[status, taken, way left]``, shape (3,): a :class:`StreamStatus`, how
-            many way points have been taken or left out, and how far the free way goes on [m].
+        stream (output): ``[status, taken, way left, largest speed]``, shape (4,): a
+            :class:`StreamStatus`, how many way points have been taken or left out, how far the free
+            way goes on [m], and how fast the tool may go where its reference is [m/s].
 
     State:
         course: As told. older, newest: The last two way points taken, shape (d,); the newest one
         is no control point yet. fresh: Way points of a piece to begin. counts: ``[phase, in fresh,
         real ones in fresh, number of the last real control point, taken, number of the way point
-        that last began a path, ticks without way points, reason]``. rest: Where the last piece
-        ended, ``[goal, pose]``.
+        that last began a path, ticks without way points, how many there were, reason]``.
+        rest: Where the last piece ended, ``[goal, pose]``.
 
     Args:
         course: Layout of the path.
@@ -114,14 +115,14 @@ class WaypointIntake(Block):
             "goal": Port(1, "m"),
             "stretches": Port(course.spans + 1, "m"),
             "stretch_speeds": Port(course.spans, "m/s"),
-            "stream": Port(3, "1, 1, m"),
+            "stream": Port(4, "1, 1, m, m/s"),
         }
         self.states = {
             "course": course.size,
             "older": d,
             "newest": d,
             "fresh": d * self._fresh,
-            "counts": 8,
+            "counts": len(Counts._fields),
             "rest": 1 + d,
         }
 
@@ -144,30 +145,35 @@ class WaypointIntake(Block):
         rests = counts.phase == RESTING
         running = where(rests, float(StreamStatus.WAITING), float(StreamStatus.RUNNING))
         status = where(counts.reason > 0.0, counts.reason, running)
+        eta = u.motion[0]
+        span = ca.fmin(ca.fmax(ca.sum1(known["eta"] <= eta) - 1.0, 0.0), self._course.spans - 1.0)
+        told = ca.vertcat(status, counts.taken, goal - eta, picked(known["speed"], span))
         return {
             "course": x.course,
             "goal": goal,
             "stretches": known["eta"],
             "stretch_speeds": known["speed"],
-            "stream": ca.vertcat(status, counts.taken, goal - u.motion[0]),
+            "stream": told,
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
         counts, total = Counts.of(x.counts), u.waypoints[0]
-        waits = ca.logic_and(is_finite(total), total > counts.taken)
-        silence = where(waits, 0.0, counts.silence + 1.0)
-        ended = ca.logic_and(ca.logic_not(waits), u.waypoints[1] == 1.0)
-        runs_dry = ca.logic_or(silence > self._patience, ended)
+        total = where(is_finite(total), total, counts.heard)
+        now = counts._replace(heard=total)
+        waiting = total - counts.taken
+        silence = where(total != counts.heard, 0.0, counts.silence + 1.0)
+        runs_dry = ca.logic_or(silence > self._patience, u.waypoints[1] == 1.0)
         room = u.manifold_point[0] - x.course[0] >= _BEHIND + 1.0
-        ready = ca.logic_and(waits, ca.logic_or(room, self._is_urgent(counts, u)))
-        grows = ca.logic_and(counts.phase == GROWING, ca.logic_or(runs_dry, ready))
-        some = ca.logic_or(waits, counts.fresh > 0.0)
+        ready = ca.logic_and(waiting > 0.0, ca.logic_or(room, self._is_urgent(now, u)))
+        dries = ca.logic_and(runs_dry, waiting <= 1.0)
+        grows = ca.logic_and(counts.phase == GROWING, ca.logic_or(dries, ready))
+        some = ca.logic_or(waiting > 0.0, counts.fresh > 0.0)
         begins = ca.logic_and(counts.phase == RESTING, some)
         acts = ca.logic_or(ca.logic_or(grows, begins), counts.phase >= ENDING)
-        told = ca.vertcat(x.counts[:6], silence, counts.reason)
+        told = ca.vertcat(x.counts[:6], silence, total, counts.reason)
         remembered = [x.course, x.older, x.newest, x.fresh, told, x.rest]
-        given = [u.waypoints, u.motion[: self._watched], u.stop, runs_dry]
+        given = [u.waypoints, u.motion[: self._watched], u.stop, room, runs_dry]
         after = self._whether(acts, *remembered, *given)
         return dict(zip(self.states, after, strict=True))
 
@@ -178,14 +184,14 @@ class WaypointIntake(Block):
 
     def _is_urgent(self, counts: Counts, u: Values) -> Any:
         """Return whether the next way point begins a new path, or has been missed."""
-        row, missed = self._acceptance.row(u.waypoints, counts.taken)
+        row, missed = self._acceptance.row(u.waypoints, counts)
         new = ca.logic_and(row[-1] == 1.0, counts.begun != counts.taken + 1.0)
         return ca.logic_or(missed, new)
 
     @cached_property
     def _whether(self) -> ca.Function:
         """``(acts, states, inputs) -> states``: what becomes of them if there is anything to do."""
-        sizes = [*self.states.values(), self._layout.size, self._watched, 1, 1]
+        sizes = [*self.states.values(), self._layout.size, self._watched, 1, 1, 1]
         arguments = [ca.MX.sym(f"a{k}", size) for k, size in enumerate(sizes)]
         states = arguments[: len(self.states)]
         x = Values(**dict(zip(self.states, states, strict=True)))
@@ -196,14 +202,14 @@ class WaypointIntake(Block):
         return ca.Function.if_else("intake", acts, stays)
 
     def _advanced(
-        self, x: Values, message: Any, motion: Any, stop: Any, runs_dry: Any
+        self, x: Values, message: Any, motion: Any, stop: Any, room: Any, runs_dry: Any
     ) -> dict[str, Any]:
         """Return the states after a tick at which there is something to do."""
         known, growth, counts = self._course.split(x.course), self._growth, Counts.of(x.counts)
-        offer = self._acceptance.offer(x, known, message)
+        offer = self._acceptance.offer(x, known, message, room, runs_dry)
         rests, grows = counts.phase == RESTING, counts.phase == GROWING
         enough = ca.logic_or(grows, counts.fresh > 0.0)
-        dries = ca.logic_and(ca.logic_and(runs_dry, offer.open), enough)
+        dries = ca.logic_and(offer.dry, enough)
         reason = first_of(
             (offer.missed, float(StreamStatus.MISSED)),
             (offer.new, 0.0),
@@ -212,7 +218,7 @@ class WaypointIntake(Block):
             (dries, float(StreamStatus.ENDING)),
             otherwise=counts.reason,
         )
-        taken = where(offer.missed, message[0] - self._layout.length, counts.taken + offer.passed)
+        taken = where(offer.missed, counts.heard - self._layout.length, counts.taken + offer.passed)
         begun = where(offer.new, counts.taken + 1.0, counts.begun)
 
         # one control point more, by a way point or straight on
@@ -264,7 +270,7 @@ class WaypointIntake(Block):
         reason = where(over, 0.0, reason)
         none = ca.logic_or(ca.logic_or(starts, is_still), offer.new)
         count, real = where(none, 0.0, count), where(none, 0.0, real)
-        told = phase, count, real, last, taken, begun, counts.silence, reason
+        told = phase, count, real, last, taken, begun, counts.silence, counts.heard, reason
         return {
             "course": ca.vertcat(*course.values()),
             "older": older,

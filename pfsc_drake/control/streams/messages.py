@@ -1,9 +1,7 @@
 """How way points are told: the last of them again and again, so that none is missed."""
 
 from enum import IntEnum
-from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -37,20 +35,6 @@ _WORDS = {
 }
 
 
-class Told(NamedTuple):
-    """A message of way points, as expressions.
-
-    Attributes:
-        total: How many way points there have been.
-        ended: Whether there will be no more.
-        rows: The last of them as columns, the newest one last, shape (d + 1, M).
-    """
-
-    total: Any
-    ended: Any
-    rows: Any
-
-
 class WaypointLayout:
     """Layout of a message of the last M way points: ``[total, ended, row, row, ..]``.
 
@@ -74,11 +58,6 @@ class WaypointLayout:
         require(length >= 1, "length", length, "1 or more")
         self.dimension, self.length = dimension, length
         self.size = 2 + (dimension + 1) * length
-
-    def read(self, message: Any) -> Told:
-        """Return the parts of a message, an expression of shape (size,)."""
-        rows = ca.reshape(message[2:], self.dimension + 1, self.length)
-        return Told(message[0], message[1], rows)
 
 
 class WaypointSender:

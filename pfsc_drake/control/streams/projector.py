@@ -93,7 +93,8 @@ class StreamedProjector(Block):
         eta = picked(known["eta"], span) + self._course.spline.length(own, part)
         alpha = alpha_function(1)(y, ca.reshape(position[:9], 3, 3))
         e_par = slope / ca.norm_2(slope)
-        normal = _transported(*ca.vertsplit(x.foot[1:], 3), sigma, e_par)
+        begin, tangent, last = ca.vertsplit(x.foot[1:], 3)
+        normal = _transported(begin, tangent, last, sigma, e_par)
         least, _, beyond, ended = ca.vertsplit(state[3:])
         found = where(
             ended == GOES_ON, ca.fabs(state[2]) < _STALLED * self._course.spans, ended == MINIMUM

@@ -19,7 +19,7 @@ class UniformSpline:
 
     Control points c that lie beside way points w, ``c_k = w_k - s (w_(k-1) - 2 w_k + w_(k+1))``
     with ``s = (p + 1) / 24``, make a spline that leads by the way points with an error of the
-    fourth order of their distance, as its value at a site is ``c + s (second difference of c) + ..``
+    fourth order of their distance: its value at a site is ``c + s (second difference of c) + ..``
 
     Args:
         degree: p, from 2 on.

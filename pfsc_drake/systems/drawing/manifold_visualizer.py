@@ -14,36 +14,41 @@ from pfsc_drake.systems.drawing.tool_visualizer import draw_frame
 
 _PATH_ROOT, _SURFACE_ROOT, _REGION_ROOT = "path_following", "surface_following", "fixtures"
 _LINE = Rgba(0.15, 0.4, 0.85, 1.0)
+_PATH_POINTS = 800
 
 
-class PathVisualizer(LeafSystem):
-    """Draws the path, and the parallel transport frame at the projected point.
+class LineVisualizer(LeafSystem):
+    """Draws lines of a path, and the parallel transport frame at the projected point.
 
     The frame's axes are red ``e_par``, green ``e_perp``, blue ``e_cross``.
 
     Ports:
-        path_point (input): From :class:`Projector`.
+        path_point (input): From the path's projector.
 
     Args:
-        path: The path.
+        lines: Points of each line [m], each (points, 3).
         layout: Layout of the path point.
         meshcat: Where to draw.
         period: Time between frames [s].
     """
 
     def __init__(
-        self, path: Path, layout: PathPointLayout, meshcat: Meshcat, period: float
+        self,
+        lines: Sequence[np.ndarray],
+        layout: PathPointLayout,
+        meshcat: Meshcat,
+        period: float,
     ) -> None:
         super().__init__()
-        self._path, self._layout, self._meshcat = path, layout, meshcat
+        self._lines, self._layout, self._meshcat = lines, layout, meshcat
         self._path_point = self.DeclareVectorInputPort("path_point", layout.size)
         self.DeclareInitializationPublishEvent(self._draw_path)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
 
     def _draw_path(self, context: Context) -> EventStatus:
-        theta = np.linspace(*self._path.position.domain, 800)
-        points = self._path.position.derivatives(theta, 0)[:, 0, :]
-        self._meshcat.SetLine(f"{_PATH_ROOT}/path", points.T, 3.0, _LINE)
+        for k, points in enumerate(self._lines):
+            name = f"{_PATH_ROOT}/path_{k}" if k else f"{_PATH_ROOT}/path"
+            self._meshcat.SetLine(name, points.T, 3.0, _LINE)
         draw_frame(self._meshcat, f"{_PATH_ROOT}/frame")
         return EventStatus.Succeeded()
 
@@ -57,6 +62,24 @@ class PathVisualizer(LeafSystem):
         e_perp = point[self._layout.normal]
         R_WF = RotationMatrix(np.column_stack([e_par, e_perp, np.cross(e_par, e_perp)]))
         self._meshcat.SetTransform(f"{_PATH_ROOT}/frame", RigidTransform(R_WF, position[:3]), time)
+
+
+class PathVisualizer(LineVisualizer):
+    """Draws a path that is known, see :class:`LineVisualizer`.
+
+    Args:
+        path: The path.
+        layout: Layout of the path point.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+    """
+
+    def __init__(
+        self, path: Path, layout: PathPointLayout, meshcat: Meshcat, period: float
+    ) -> None:
+        theta = np.linspace(*path.position.domain, _PATH_POINTS)
+        line = path.position.derivatives(theta, 0)[:, 0, :]
+        super().__init__([line], layout, meshcat, period)
 
 
 _SKIN = Rgba(0.45, 0.65, 0.95, 0.35)

@@ -95,7 +95,7 @@ def test_an_end_that_comes_too_near_is_told_before_it_is_passed():
     def goal(k, stop):
         return 1.0 if k < 600 else 0.15
 
-    rows, stops, overruns = paced(goal, 3000)
+    rows, _, overruns = paced(goal, 3000)
     eta = rows[:, 0, 0]
     first = int(np.argmax(overruns > 0.0))
     assert first == 600

@@ -96,7 +96,7 @@ class Stream:
     def run(self, message, ticks, keep=50):
         """Return what was told; ``message(tick, stream) -> message``."""
         rows = {name: [] for name in ("manifold_point", "reference", "goal", "stream", "overrun")}
-        pieces, courses, stream = [], [], np.zeros(3)
+        pieces, courses, stream = [], [], np.zeros(4)
         for k in range(ticks):
             told = self.stepper.step(waypoints=message(k, stream))
             stream = told["stream"]
@@ -126,7 +126,7 @@ def sent_at(layout, waypoints, times, new=(), end=True, heard=False):
     def message(k, stream):
         while state["next"] < len(times) and times[state["next"]] <= PERIOD * k:
             row = [*waypoints[state["next"]], float(state["next"] in new)]
-            sender._rows.append(row)  # noqa: SLF001 (what no sender would tell)
+            sender._rows.append(row)  # what no sender would tell, too
             state["next"] += 1
         if end and state["next"] == len(times):
             sender.end()

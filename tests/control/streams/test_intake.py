@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import BSpline
-from tests.control.streams.streaming import PERIOD, Stream, sent_at
 
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
 from pfsc_drake.control.streams.parameters import StreamParameters
 from pfsc_drake.errors import InputError
+from tests.control.streams.streaming import PERIOD, Stream, sent_at
 
 BEND = StreamParameters(spacing=0.012, velocity=0.5)
 
@@ -136,7 +136,7 @@ def test_a_stream_that_runs_dry_is_followed_to_its_last_point_and_goes_on_later(
 
 
 def zigzag():
-    """Return way points with a corner of 120 deg, one of 180 deg, and the numbers of the corners."""
+    """Return way points with corners of 120 deg and 180 deg, and the numbers of these."""
     legs = [np.array([1.0, 0.0, 0.0]), np.array([-0.5, 0.8, 0.0]), np.array([0.5, -0.8, 0.0])]
     points, corners = [np.array([0.8, 0.0, 1.0])], []
     for leg in legs:

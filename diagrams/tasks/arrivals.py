@@ -1,0 +1,168 @@
+"""When the way points of a scenario's stream come."""
+
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import NamedTuple
+
+import numpy as np
+
+from diagrams.scenario.streamed import Streamed
+from pfsc_drake.control.streams.course import POSE, POSITION
+from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import read_waypoints
+from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
+from pfsc_drake.physics.waypoint_source import Arrivals
+
+_POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+# of what a person has drawn: a way point, the first one of a new path, the end of a line
+WAY_POINT, NEW_PATH, END = range(3)
+_SOON = 1  # tick
+
+
+def columns(dimension: int) -> list[str]:
+    """Return the columns of a file of what was drawn.
+
+    Args:
+        dimension: 3 or 7.
+    """
+    return ["tick", "kind", *_POSITION, *(_QUATERNION if dimension == POSE else ())]
+
+
+def read_poses(file: FilePath, key: str) -> np.ndarray:
+    """Return the way points of a file, with their quaternions if there are any, shape (n, d).
+
+    Args:
+        file: The file.
+        key: Key of the scenario, for messages.
+
+    Raises:
+        InputError: If it cannot be read, or has fewer than two.
+    """
+    try:
+        table = read_waypoints(file)
+    except InputError as error:
+        raise InputError(f"{key}: {error}") from None
+    if len(table.positions) < 2:
+        raise InputError(f"{key}: {file.name} has {len(table.positions)} way points; 2 or more")
+    if table.quaternions is None:
+        return table.positions
+    return np.hstack([table.positions, table.quaternions])
+
+
+def made_arrivals(shape: Streamed, folder: FilePath, period: float) -> tuple[np.ndarray, Arrivals]:
+    """Return where a stream of files begins, shape (d,), and when its way points come.
+
+    Args:
+        shape: What the scenario says.
+        folder: Where relative file names start.
+        period: Sampling time [s].
+
+    Raises:
+        InputError: If a file cannot be read, or they do not go together.
+    """
+    random = np.random.default_rng(shape.seed)
+    poses = read_poses(folder / shape.file, "path.shape.file")
+    start, rows, times = poses[0], poses[1:], shape.begin + np.arange(len(poses) - 1) / shape.rate
+    new = np.zeros(len(rows))
+    for i, path in enumerate(shape.new_paths):
+        key = f"path.shape.new_paths[{i}]"
+        further = read_poses(folder / path.file, f"{key}.file")
+        if further.shape[1] != len(start):
+            raise InputError(f"{key}.file: {path.file} has an orientation, or the first file has")
+        kept = times < path.at
+        if not kept.any():
+            raise InputError(f"{key}.at = {path.at} s: must be later than the way points before")
+        begun = np.arange(len(further)) == 0
+        rows, new = np.vstack([rows[kept], further]), np.concatenate([new[kept], begun])
+        times = np.concatenate([times[kept], path.at + np.arange(len(further)) / shape.rate])
+    late = shape.delay + shape.jitter * random.random(len(times))
+    # one behind the other
+    come = np.maximum.accumulate(times + late)
+    noisy = rows.copy()
+    noisy[:, :POSITION] += shape.noise * random.standard_normal((len(rows), POSITION))
+    ticks = np.ceil(come / period - 1e-9).astype(int)
+    return start, Arrivals(ticks, np.column_stack([noisy, new]), int(ticks[-1]) + _SOON)
+
+
+class Event(NamedTuple):
+    """Something that a person does with a pen.
+
+    Attributes:
+        tick: Sampling interval from which on it is told.
+        kind: ``WAY_POINT``, ``NEW_PATH`` or ``END``.
+        pose: Way point, shape (d,).
+    """
+
+    tick: int
+    kind: int
+    pose: np.ndarray
+
+
+def tell(sender: WaypointSender, event: Event) -> None:
+    """Let a sender tell an event.
+
+    Args:
+        sender: The sender.
+        event: The event.
+    """
+    if event.kind == END:
+        sender.end()
+    else:
+        sender.add(event.pose, new_path=event.kind == NEW_PATH)
+
+
+def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.ndarray, np.ndarray]:
+    """Return when messages change, shape (k,), and what they become, shape (k, size).
+
+    Args:
+        events: What a person did.
+        layout: Layout of the messages.
+    """
+    sender = WaypointSender(layout)
+    ticks, rows = [0], [sender.message]
+    for event in events:
+        tell(sender, event)
+        if event.tick == ticks[-1]:
+            rows[-1] = sender.message
+        else:
+            ticks.append(event.tick)
+            rows.append(sender.message)
+    return np.array(ticks), np.array(rows)
+
+
+def drawn_text(events: Sequence[Event], dimension: int) -> str:
+    """Return what :func:`read_drawn` reads back, to the last bit.
+
+    Args:
+        events: What a person did.
+        dimension: 3 or 7.
+    """
+    lines = [",".join(columns(dimension))]
+    for tick, kind, pose in events:
+        lines.append(",".join([str(tick), str(kind), *(repr(float(x)) for x in pose)]))
+    return "\n".join(lines) + "\n"
+
+
+def read_drawn(name: str, dimension: int) -> list[Event]:
+    """Return what a person has drawn.
+
+    Args:
+        name: The file.
+        dimension: 3 or 7.
+
+    Raises:
+        InputError: If it cannot be read, or its ticks decrease.
+    """
+    known = columns(dimension)
+
+    def check_header(place: str, header: list[str]) -> None:
+        check_columns(place, header, known=known, required=known)
+
+    table = read_numbers(name, "events of a drawing", check_header)
+    rows = table.rows[:, [table.header.index(label) for label in known]]
+    ticks, kinds = rows[:, 0], rows[:, 1]
+    whole = np.all(ticks == np.round(ticks)) and np.all(np.isin(kinds, (WAY_POINT, NEW_PATH, END)))
+    if not whole or np.any(np.diff(ticks) < 0.0):
+        raise InputError(f"{name}: ticks and kinds; whole numbers, ticks not decreasing")
+    return [Event(int(row[0]), int(row[1]), row[2:]) for row in rows]

@@ -1,0 +1,301 @@
+"""Following a path whose way points come while the tool moves."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
+
+from diagrams.scenario import ControllerParameters, PathParameters, StartParameters, Streamed
+from diagrams.scenario.checks import require
+from diagrams.scenario.streamed import DrawnPlane
+from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, told_messages
+from diagrams.tasks.surface import followed_angles
+from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.manifold import PlaceEvaluator, ToolKinematics
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.streams.course import POSE, POSITION
+from pfsc_drake.errors import InputError
+from pfsc_drake.following.streamed_path import Stream, StreamedPath
+from pfsc_drake.geometry import PathPointLayout, PiecewisePolynomialCurve, zyx_to_quaternion
+from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.physics.waypoint_source import Arrivals, WaypointSource
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.drawing.manifold_visualizer import LineVisualizer
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
+
+_SETTLES = 3.0  # s, after the last way point has come, of a run that tells no duration
+_SLOWEST = 0.3  # of the largest speed, to tell how long a run may take
+_PARALLEL = 2e-3  # rad
+_OF_SIDE = 20  # points of each side of a plane that is drawn
+
+
+class StreamTask(Task):
+    """Path following along way points that come while the tool moves.
+
+    Args:
+        parameters: The path; its shape is a stream.
+        controller: The controller; its law decides how smooth the path is made.
+        start: Where the tool starts.
+        duration: Simulated time [s]; 0 for as long as it may take.
+        folder: Where relative file names start.
+
+    Attributes:
+        path: The path.
+        arrivals: When way points come; None where a person draws them.
+        drawn: What a person has drawn, of a session that is repeated.
+
+    Raises:
+        InputError: If a file cannot be read, or the start is not where the path begins.
+    """
+
+    projector_name = "path_projector"
+    place: PathManifold
+    shape = None
+
+    def __init__(
+        self,
+        parameters: PathParameters,
+        controller: ControllerParameters,
+        start: StartParameters,
+        duration: float,
+        folder: FilePath,
+    ) -> None:
+        shape, said = parameters.shape, parameters.orientation
+        assert isinstance(shape, Streamed)
+        try:
+            shape.check()
+        except InputError as error:
+            raise InputError(f"path.shape.{error}") from None
+        keyframes = f"{len(said.keyframes)} given"
+        require(not said.keyframes, "path.orientation.keyframes", keyframes, "none of a stream")
+        period, order = controller.sampling_time, RELATIVE_DEGREE[controller.law]
+        self.plane, self._period = shape.plane, period
+        self.arrivals: Arrivals | None = None
+        self.drawn: list[Event] | None = None
+        if shape.plane is None:
+            begin, self.arrivals = made_arrivals(shape, folder, period)
+            ahead = self.arrivals.rows[0, :POSITION] - begin[:POSITION]
+        else:
+            begin = np.array(shape.plane.origin)
+            if shape.plane.zyx_deg:
+                q = zyx_to_quaternion(np.deg2rad(shape.plane.zyx_deg))
+                begin = np.concatenate([begin, q])
+            ahead = np.array(shape.plane.right)
+        if said.task == "none":
+            begin = begin[:POSITION]
+            self.arrivals = without_orientation(self.arrivals)
+        if shape.inputs:
+            try:
+                self.drawn = read_drawn(str(folder / shape.inputs), len(begin))
+            except InputError as error:
+                raise InputError(f"path.shape.inputs: {error}") from None
+        require(any(ahead), "path.shape.file", shape.file, "way points that differ")
+        self.path = StreamedPath(begin, shape.follow, order, direction=ahead, length=shape.length)
+        angles = followed_angles(said)
+        self.place = PathManifold(order, oriented=self.path.is_oriented, **angles)
+        self.manifold, self._start, self.warnings = self.place, start, []
+        self._duration = duration or self._longest(shape)
+        self.motion = PiecewisePolynomialCurve([0.0, self._duration], np.zeros((1, 1, 1)))
+        placed = not any(start.offset)
+        require(placed, "start.offset", start.offset, "0 where way points come while it moves")
+
+    def _longest(self, shape: Streamed) -> float:
+        """Return how long a run may take [s]."""
+        if self.arrivals is None:
+            raise InputError("duration = 0: must be a positive number [s] where a person draws")
+        places = np.vstack([self.path.start, self.arrivals.rows[:, :-1]])[:, :POSITION]
+        way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+        come = self.arrivals.ends * self._period
+        return float(np.ceil(max(come, way / (_SLOWEST * shape.follow.velocity)) + _SETTLES))
+
+    @property
+    def length(self) -> float:
+        """Length of the manifold [m] if it is known; else 0."""
+        return 0.0
+
+    def require_joints(self, num_joints: int) -> None:
+        """Refuse a robot that cannot follow, or would lose its orientation by oversight."""
+        names = [coordinate.name for coordinate in self.place.coordinates]
+        few = f"{num_joints} joints for {len(names)} outputs ({', '.join(names)})"
+        require(num_joints >= len(names), "path", few, "path.orientation.task: tool_axis or none")
+
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Return the point where the path begins: nobody knows the rest beforehand."""
+        return self.path.point
+
+    @property
+    def evaluator(self) -> PlaceEvaluator:
+        """What finds places; none, as the path is told tick by tick."""
+        raise InputError("path.shape = !Streamed: its path is not known beforehand")
+
+    @property
+    def drawing(self) -> "StreamDrawing":
+        """How the manifold is drawn."""
+        return StreamDrawing(self._lines(), self.place.layout)
+
+    def _lines(self) -> list[np.ndarray]:
+        """Return lines through the way points that will come, or the border of the plane [m]."""
+        if self.plane is not None:
+            return [border(self.plane)]
+        assert self.arrivals is not None
+        rows = np.vstack([[*self.path.start, 0.0], self.arrivals.rows])
+        breaks = np.flatnonzero(rows[:, -1] > 0.0)
+        return [part[:, :POSITION] for part in np.split(rows, breaks) if len(part) > 1]
+
+    def add_place(
+        self,
+        builder: DiagramBuilder,
+        tool_pose: OutputPort,
+        reference: OutputPort | None,
+        period: float,
+    ) -> ManifoldProjector:
+        """Add what finds the place on the manifold."""
+        projector = builder.AddNamedSystem(
+            self.projector_name, BlockSystem(self.path.projector, period)
+        )
+        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
+
+    def add_source(
+        self, builder: DiagramBuilder, stream: Stream, period: float
+    ) -> OperatorPanel | None:
+        """Add what way points come from.
+
+        Args:
+            builder: Builder of the diagram.
+            stream: What takes them.
+            period: Sampling time [s].
+
+        Returns:
+            Where the messages of a person who draws enter, port ``controls``; None if nobody does.
+        """
+        messages = self.path.messages
+        if self.arrivals is not None:
+            block = WaypointSource(self.arrivals, messages)
+            source = builder.AddNamedSystem("waypoint_source", BlockSystem(block, period))
+            builder.Connect(source.GetOutputPort("waypoints"), stream.waypoints)
+            return None
+        parts = {"waypoints": np.zeros(messages.size)}
+        panel = builder.AddNamedSystem("pen_panel", OperatorPanel(parts, period))
+        builder.Connect(panel.GetOutputPort("waypoints"), stream.waypoints)
+        if self.drawn is not None:
+            told = told_messages(self.drawn, messages)
+            player = builder.AddNamedSystem("recorded_pen", RecordedControls(*told, period))
+            builder.Connect(player.get_output_port(), panel.GetInputPort("controls"))
+        return panel
+
+    def add_true_place(
+        self,
+        builder: DiagramBuilder,
+        robot: RobotModel,
+        joint_state: OutputPort,
+        stream: Stream,
+        period: float,
+    ) -> OutputPort:
+        """Add what finds where on the path the tool really is, for the log.
+
+        Args:
+            builder: Builder of the diagram.
+            robot: The robot as it is.
+            joint_state: Its state as it is.
+            stream: What makes the path.
+            period: Sampling time [s].
+        """
+        tool = builder.AddNamedSystem("true_tool", BlockSystem(ToolKinematics(robot), period))
+        builder.Connect(joint_state, tool.GetInputPort("joint_state"))
+        place = builder.AddNamedSystem("true_place", BlockSystem(self.path.projector, period))
+        builder.Connect(tool.GetOutputPort("tool_pose"), place.GetInputPort("tool_pose"))
+        builder.Connect(stream.course, place.GetInputPort("course"))
+        return place.GetOutputPort("manifold_point")
+
+    def start(self, shift: np.ndarray) -> StartPoint:
+        """Return where the tool starts."""
+        target, layout = self.path.target, self.place.layout
+        posed = self._tool_target(target.y_t + shift, target.R_e, self._start.rotation_deg)
+        return StartPoint(posed, self.path.point[layout.memory])
+
+    def point(self, start: StartPoint) -> np.ndarray:
+        """Return the point of the manifold that the law acts on at the start."""
+        return self.path.point
+
+    def way(self) -> Iterator[tuple[np.ndarray, str]]:
+        """Yield positions along the way of the tool [m], each (3,), with what to call them."""
+        if self.plane is not None:
+            for corner in border(self.plane)[::_OF_SIDE]:
+                yield corner, "plane to draw in"
+            return
+        assert self.arrivals is not None
+        for k, row in enumerate(self.arrivals.rows, start=1):
+            yield row[:POSITION], f"way point {k}"
+
+    def target(self) -> Place:
+        """Return where given coordinates of the manifold are in the world."""
+        raise InputError("path.shape = !Streamed: no frame of it is known beforehand")
+
+    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+        """Refuse coordinates off the manifold: none are known beforehand."""
+        require(False, key, coordinates.tolist(), "none on a path whose way points come")
+
+
+@dataclass(frozen=True)
+class StreamDrawing:
+    """Lines that are known beforehand, drawn, with the frame next to the tool.
+
+    Attributes:
+        lines: Points of each [m], each (points, 3).
+        layout: Layout of the path's points.
+    """
+
+    lines: Sequence[np.ndarray]
+    layout: PathPointLayout
+
+    def outline(self) -> list[np.ndarray]:
+        """Return lines that show the manifold [m], each (points, 3)."""
+        return list(self.lines)
+
+    def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
+        """Add what draws it."""
+        visualizer = LineVisualizer(self.lines, self.layout, meshcat, period)
+        drawing = builder.AddNamedSystem("path_visualizer", visualizer)
+        return drawing.GetInputPort("path_point")
+
+
+def plane_axes(plane: DrawnPlane) -> np.ndarray:
+    """Return the directions to the right and upwards, unit vectors, shape (2, 3).
+
+    Args:
+        plane: The plane.
+
+    Raises:
+        InputError: If they are parallel.
+    """
+    right, up = np.array(plane.right, dtype=float), np.array(plane.up, dtype=float)
+    right /= np.linalg.norm(right)
+    across = up - (up @ right) * right
+    slanted = np.linalg.norm(across) > _PARALLEL * np.linalg.norm(up)
+    require(bool(slanted), "path.shape.plane.up", plane.up, "a direction that is not that of right")
+    return np.stack([right, across / np.linalg.norm(across)])
+
+
+def border(plane: DrawnPlane) -> np.ndarray:
+    """Return points along the border of a plane [m], shape (points, 3)."""
+    across = plane_axes(plane) * np.array([[plane.width], [plane.height]]) / 2.0
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    places = np.array(plane.origin) + corners @ across
+    steps = np.linspace(0.0, 1.0, _OF_SIDE, endpoint=False)[:, None]
+    sides = [begin + steps * (end - begin) for begin, end in pairwise(places)]
+    return np.vstack([*sides, places[-1:]])
+
+
+def without_orientation(arrivals: Arrivals | None) -> Arrivals | None:
+    """Return arrivals of positions alone."""
+    if arrivals is None or arrivals.rows.shape[1] <= POSE:
+        return arrivals
+    rows = np.column_stack([arrivals.rows[:, :POSITION], arrivals.rows[:, -1]])
+    return Arrivals(arrivals.ticks, rows, arrivals.ends)
