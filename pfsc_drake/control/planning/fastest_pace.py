@@ -125,6 +125,11 @@ class _Program:
         self._x = ca.vertcat(ends[0], self._inner, ends[1])
         tables = _tables(theta, intervals, degree)
         self._rates = time_derivatives(*[table @ self._x for table in tables])
+        # of all samples, without the first, which is 1
+        self._monomials = [
+            prod(rate**p for rate, p in zip(self._rates, powers, strict=True) if p)
+            for powers in demand.exponents[1:]
+        ]
 
     def shares(self, pace: PaceSpline) -> np.ndarray:
         """Return shares of the limits of torques and of their rates, shape (samples, 2N)."""
@@ -164,26 +169,23 @@ class _Program:
         """Return what must be between -1 and 1."""
         limits, c, n = self._limits, self._rates[0], seen.shape[1] // 2
         rows = [c / ca.DM(np.minimum(limits.pace, _LARGEST))]
-        for i in range(n):
-            at = np.flatnonzero(seen[:, i])
-            if at.size:
-                rows.append(self._torque(at, i) / ca.DM(limits.torque[at, i]))
-            at = np.flatnonzero(seen[1:, n + i] & np.isfinite(limits.torque_rate[1:, i]))
-            if at.size:
-                slope = self._torque(at + 1, i) - self._torque(at, i)
-                mean = (c[at + 1] + c[at]) / 2.0
-                rows.append(slope * mean / ca.DM(self._theta[1] * limits.torque_rate[at + 1, i]))
+        at, axis = np.nonzero(seen[:, :n])
+        rows.append(self._torques(at, axis, 1.0 / limits.torque[at, axis]))
+        at, axis = np.nonzero(seen[1:, n:] & np.isfinite(limits.torque_rate[1:]))
+        scale = 1.0 / (2.0 * self._theta[1] * limits.torque_rate[at + 1, axis])
+        slopes = self._torques(at + 1, axis, scale) - self._torques(at, axis, scale)
+        rows.append(slopes * (c[at + 1] + c[at]))
         return rows
 
-    def _torque(self, at: np.ndarray, i: int) -> ca.MX:
-        """Return the torque of a drive at some samples."""
-        chosen = [rate[at] for rate in self._rates]
-        coefficients = self._demand.coefficients[at, :, i]
-        total = ca.MX(ca.DM(coefficients[:, 0]))
-        for a, powers in zip(coefficients.T[1:], self._demand.exponents[1:], strict=True):
-            factors = [rate**p for rate, p in zip(chosen, powers, strict=True) if p]
-            total += ca.DM(a) * prod(factors)
-        return total
+    def _torques(self, at: np.ndarray, axis: np.ndarray, scale: np.ndarray) -> ca.MX:
+        """Return scaled torques of some axes at some samples, shape (rows, 1)."""
+        table = self._demand.coefficients[at, :, axis] * scale[:, None]
+        samples, rows = len(self._theta), np.arange(len(at))
+        count = len(self._monomials)
+        columns = at[:, None] + samples * np.arange(count)
+        places = np.repeat(rows, count), columns.ravel()
+        map_of = csc_matrix((table[:, 1:].ravel(), places), shape=(len(at), samples * count))
+        return ca.DM(table[:, 0]) + ca.DM(map_of) @ ca.vertcat(*self._monomials)
 
 
 def _tables(theta: np.ndarray, intervals: int, degree: int) -> list[ca.DM]:

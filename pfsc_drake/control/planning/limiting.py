@@ -7,7 +7,7 @@ import numpy as np
 # of limits
 KINDS = ("torque", "speed", "rate", "velocity")
 # of a limit, from which on a motion is at it
-_AT = 0.98
+_AT = 0.97
 
 
 @dataclass(frozen=True)
