@@ -19,8 +19,8 @@ from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 
-# s, between the knots of a pace: at first, and at last; how many there may be for one move
-_COARSE, _FINE = 16e-3, 4e-3
+# s, between the knots of a pace: at first, and at last unless a motion has more; of one move
+_COARSE, _FINE, _KNOTS = 16e-3, 4e-3, 1000
 _FEWEST, _MOST = 24, 1500
 # samples of an interval: where limits are kept, and where that is checked
 _SAMPLES, _CHECKED = 6, 12
@@ -34,8 +34,9 @@ _FIRST_SAMPLES, _OF_RADIUS = (400, 20_000), 1.0 / 6.0
 _PACES, _SPREAD = np.geomspace(1e-3, 1e3, 241), 40.0
 # s, over which the first pace is smoothed, and in which it may double
 _SMOOTHING, _DOUBLED = 0.04, 0.05
-# what is planned of what is allowed, and by how much that may be missed
-_KEPT, _MISSED = 0.999, 2e-3
+# what is planned of what is allowed, of rates, and by how much that may be missed
+_KEPT_OF_RATES = 0.985
+_KEPT, _MISSED = 0.999, 5e-3
 _CORRECTIONS, _STEPS, _SLOWER = 3, 20, 1.002
 # parts of a way that are planned more tightly; and of what is allowed, a speed that is none
 _PARTS, _STILL = 2000, 1e-6
@@ -70,16 +71,17 @@ class FastestPlanner(MotionDemand):
             raise InputError(f"reference.speed: fastest: {error}") from None
 
     def _plan(self) -> DrivePlan:
-        moves = self._first(straight_moves(self._task.motion, self.demand.derivatives))
+        moves = self._first(straight_moves(self._task.motion, self.demand.derivatives + 1))
         tight = [np.ones((2, 2))] * len(moves)
         moves = self._faster(moves, _COARSE, tight, 0.0)
-        moves = self._faster(moves, _FINE, tight, _WATCHED)
+        fine = max(_FINE, sum(move.duration for move in moves) / _KNOTS)
+        moves = self._faster(moves, fine, tight, _WATCHED)
         checked = self._check(moves)
         for _ in range(_CORRECTIONS):
             if checked.limiting.largest.max() <= 1.0 + _MISSED:
                 break
             tight = self._tightened(tight, moves, checked)
-            moves = self._faster(moves, _FINE, tight, _WATCHED)
+            moves = self._faster(moves, fine, tight, _WATCHED)
             checked = self._check(moves)
         for _ in range(_STEPS):
             if checked.limiting.largest.max() <= 1.0 + _MISSED:
@@ -158,11 +160,13 @@ class FastestPlanner(MotionDemand):
     ) -> list[Move]:
         """Return the fastest moves on grids of a spacing [s]."""
         motion, begins = one_after_another(moves, self._reference.dwell)
-        step, course = self.course_of(
-            motion, self._step(min(spacing / _SAMPLES, 1e-3)), still=not self._is_led
-        )
-        times = step * np.arange(len(course))
-        between = make_interp_spline(times, course, k=3)
+        longest = self._step(min(spacing / _SAMPLES, self._period))
+        step, course = self.course_of(motion, longest, still=not self._is_led)
+        both = course[:, None]
+        if self._is_led:
+            # a change of pace moves what a posture leads no further than the outputs need it
+            both = np.stack([course, self.bare_course_of(motion, longest, course)], axis=1)
+        between = make_interp_spline(step * np.arange(len(course)), both, k=3)
         return [
             self._fastest(move, between, begin, spacing, part, watched)
             for move, begin, part in zip(moves, begins, tight, strict=True)
@@ -181,7 +185,7 @@ class FastestPlanner(MotionDemand):
 
         Args:
             move: As it is.
-            course_at: The joints' course over time.
+            course_at: The joints' course over time, and last the one without what a posture leads.
             begin: When the move begins [s].
             spacing: Between the knots of its pace [s].
             tight: What is planned of the torques allowed and of their rates, at even parts of the
@@ -191,8 +195,12 @@ class FastestPlanner(MotionDemand):
         n, degree = self.robot.dimension, self.demand.derivatives + 1
         intervals = int(np.clip(move.duration / spacing, _FEWEST, _MOST))
         theta = np.linspace(0.0, move.duration, _SAMPLES * intervals + 1)
-        course = course_at(begin + theta)
-        polynomial = DemandPolynomial.of(self.demand, course, _SMOOTHING)
+        courses = course_at(begin + theta)
+        course, bare = courses[:, 0], courses[:, -1]
+        polynomial = DemandPolynomial.of(self.demand, bare, _SMOOTHING)
+        if self._is_led:
+            led = self.demand.of(course) - self.demand.of(bare)
+            polynomial = polynomial.plus(led[:, :n])
         allowed = _KEPT * self.allowed(course)
         state = move.progress.derivatives(theta, 1)[:, :, 0]
         part = _along(state[:, 0] / state[-1, 0], tight)
@@ -200,7 +208,7 @@ class FastestPlanner(MotionDemand):
         speed = np.maximum(speed, state[:, 1] / (_KEPT * self._velocity))
         limits = PaceLimits(
             allowed[:, :n] * part[:, :1],
-            _KEPT * self._rates * part[:, 1:],
+            _KEPT_OF_RATES * self._rates * part[:, 1:],
             1.0 / np.maximum(speed, _STILL),
         )
         found = find_fastest_pace(polynomial, theta, limits, intervals, degree, watched)

@@ -78,16 +78,41 @@ class MotionDemand:
         Raises:
             InputError: If the joints cannot follow.
         """
+        times, reference = self._sampled(motion, step)
+        course = self._finder.find(self._start, reference, times, still=still)
+        return float(times[1]), self._continued(course, times[1])
+
+    def _sampled(
+        self, motion: PiecewisePolynomialCurve, step: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return even times and the reference of the virtual output then."""
         order, duration = self._law.linearization.relative_degree, motion.domain[1]
         times = np.linspace(0.0, duration, int(np.ceil(duration / step)) + 1)
         asked = motion.derivatives(times, order)
         reference = np.zeros((len(times), order + 1, len(self._task.place.coordinates)))
         reference[:, :, : asked.shape[2]] = asked
-        course = self._finder.find(self._start, reference, times, still=still)
+        return times, reference
+
+    def _continued(self, course: np.ndarray, step: float) -> np.ndarray:
+        """Return a course with as many derivatives as the demand depends on."""
         while course.shape[1] <= self.demand.derivatives:
-            further = np.gradient(course[:, -1:], times[1], axis=0)
+            further = np.gradient(course[:, -1:], step, axis=0)
             course = np.concatenate([course, further], axis=1)
-        return float(times[1]), course[:, : self.demand.derivatives + 1]
+        return course[:, : self.demand.derivatives + 1]
+
+    def bare_course_of(
+        self, motion: PiecewisePolynomialCurve, step: float, course: np.ndarray
+    ) -> np.ndarray:
+        """Return a motion's course without what only a posture moves.
+
+        Args:
+            motion: Tangential coordinates over time.
+            step: As it was asked for.
+            course: Its course.
+        """
+        times, reference = self._sampled(motion, step)
+        led = course[:, : reference.shape[1]]
+        return self._continued(self._finder.bare(self._start, led, reference), times[1])
 
     def allowed(self, course: np.ndarray) -> np.ndarray:
         """Return what may be asked of the drives, (samples, 2N)."""

@@ -96,6 +96,11 @@ class DrivePlan:
         return float(max(1.0, min((torques**power).min(), speeds.min())))
 
     @property
+    def speed(self) -> np.ndarray:
+        """Speed of the reference, its largest tangential coordinate's [m/s], shape (samples,)."""
+        return np.asarray(np.abs(self.motion.derivatives(self.times, 1)[:, 1]).max(axis=1))
+
+    @property
     def waiting_time(self) -> float:
         """How much longer the motion takes than was asked for [s]."""
         return float(np.sum(np.diff(self.times) * (1.0 - (self.pace[1:] + self.pace[:-1]) / 2.0)))

@@ -22,6 +22,7 @@ from experiments.figures.drives import (
     draw_virtual_input,
     has_virtual_input,
 )
+from experiments.figures.fastest import draw_fastest
 from experiments.figures.forces import (
     draw_damping,
     draw_force_map,
@@ -115,6 +116,7 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "progress": (draw_progress, _is_along),
     "pace": (draw_pace, _always),
     "stream": (draw_stream, _always),
+    "fastest": (draw_fastest, _always),
     "guidance": (draw_guidance, has_regions),
     "contact": (draw_contact, has_contact),
     "energy": (draw_energy, gives_energy),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from diagrams.scenario.checks import coordinate_text
 from diagrams.station import Station
 from diagrams.tasks.task import DrivePlan
+from experiments.results.fastest import fastest_metrics
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.estimation.momentum import drive_momentum
 from pfsc_drake.control.law.fault import Fault
@@ -228,7 +229,8 @@ def plan_metrics(plan: DrivePlan | None) -> Metrics:
     if plan is None or not len(plan.times):
         return metrics
     joints = len(plan.limits) // 2
-    shares = {"asked": plan.asked}
+    metrics.update(fastest_metrics(plan))
+    shares = {"planned" if plan.limiting else "asked": plan.asked}
     if plan.is_slowed:
         shares["planned"] = plan.demand
         metrics.add("slowest_pace", float(plan.pace.min()))

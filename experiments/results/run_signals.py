@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.station import Station
 from experiments.results.drives import add_friction
+from experiments.results.fastest import add_limits
 from experiments.results.found_links import add_found_links
 from experiments.results.guidance import add_guidance
 from experiments.results.holder import add_holder_signals, seen_poses, workpiece_motion
@@ -147,11 +148,14 @@ def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarra
 
 
 def _add_plan(log: RunLog, station: Station) -> None:
-    """Add how the reference was slowed, and what was expected of the drives, if it was."""
+    """Add how the reference was chosen for the drives, and what was expected of them."""
     plan, n = station.task.drive_plan, station.robot.dimension
-    if plan is None or not plan.is_slowed:
+    if plan is None or not (plan.is_slowed or plan.limiting):
         return
-    log.add("pace", np.interp(log.time, plan.times, plan.pace))
+    if plan.limiting is None:
+        log.add("pace", np.interp(log.time, plan.times, plan.pace))
+    else:
+        add_limits(log, plan)
     expected = [np.interp(log.time, plan.times, torque) for torque in plan.demand[:, :n].T]
     log.add("tau_planned", np.array(expected).T)
 

@@ -99,6 +99,21 @@ class CourseFinder:
             course[i] = q
         return course
 
+    @once_per_content(30)
+    def bare(self, start: CourseStart, course: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        """Return a course without what only a posture moves, of the same shape.
+
+        Args:
+            start: Where it began.
+            course: A course, from :meth:`find`; its coordinates are kept.
+            reference: That of the virtual output.
+        """
+        found, memory = np.zeros_like(course), start.memory
+        found[:, 0] = course[:, 0]
+        for q, wanted in zip(found, reference, strict=True):
+            memory = self._correct(q, None, wanted, memory)
+        return found
+
     def _correct(
         self, q: np.ndarray, q_0: np.ndarray | None, wanted: np.ndarray, memory: np.ndarray
     ) -> np.ndarray:

@@ -1,6 +1,6 @@
 """What a motion asks of the drives, as a polynomial of its pace and the pace's derivatives."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
@@ -74,6 +74,12 @@ class DemandPolynomial:
         table = _monomials(powers, paces) / size
         found = np.linalg.solve(table, values.reshape(len(powers), -1)).reshape(values.shape)
         return cls(powers, (found / size[:, None, None]).transpose(1, 0, 2))
+
+    def plus(self, torques: np.ndarray) -> "DemandPolynomial":
+        """Return the polynomials with torques more, whatever the pace, shape (samples, N)."""
+        coefficients = self.coefficients.copy()
+        coefficients[:, 0] += torques
+        return replace(self, coefficients=coefficients)
 
     def torques(self, rates: np.ndarray) -> np.ndarray:
         """Return the torques at a pace, shape (samples, N).

@@ -17,9 +17,11 @@ _SLOWEST, _LARGEST = 1e-3, 1e3
 # how much faster or slower a pace may become over the support of a spline's coefficient
 _STEEPEST = 1.3
 # of the solver: relative accuracy of the duration, and steps
-_ACCURACY, _STEPS = 1e-6, 400
-# samples around one at which a limit is watched
+_ACCURACY, _STEPS = 1e-6, 250
+# samples around one that comes near to a limit, at which that is looked at
 _AROUND = 41
+# how often limits that were left out are added, where they are passed by more than this
+_ROUNDS, _PASSED = 6, 1e-4
 # of a pace, that a demand depends on
 _DERIVATIVES = 3
 # where barriers begin, and how far from its bounds: a start that is near an optimum stays there
@@ -87,72 +89,103 @@ def find_fastest_pace(
         intervals: Number of intervals of the spline, more than its degree.
         degree: Degree of the spline, at least 3, and at least the highest derivative of the joint
             coordinates that the demand depends on: torques are continuous then.
-        watched: Of a limit, up to which a motion is thought to stay below it if it does so as it is
-            given, at the pace 1, and around that place. Limits on which this saves time should be
-            checked afterwards.
+        watched: Of a limit, up to which it is left out at first, and looked at afterwards.
     """
-    inner = ca.MX.sym("coefficients", intervals - degree)
-    x = ca.vertcat(ca.repmat(inner[0], degree), inner, ca.repmat(inner[-1], degree))
-    c, *slopes = (table @ x for table in _tables(theta, intervals, degree))
-    rates = time_derivatives(c, *slopes)
-    rows = _rows(demand, theta, limits, rates, watched)
-    # neighbours may differ by a factor; what is more, the motion at this pace could not show
-    steep = [x[1:] - _STEEPEST * x[:-1], x[:-1] - _STEEPEST * x[1:]]
-    bounded, count = ca.vertcat(*rows), 2 * (intervals + degree - 1)
-    lower = np.concatenate([-np.ones(bounded.numel()), np.full(count, -np.inf)])
-    upper = np.concatenate([np.ones(bounded.numel()), np.zeros(count)])
-    weights = np.full(len(theta), theta[1])
-    weights[[0, -1]] /= 2.0
-    problem = {
-        "x": inner,
-        "f": ca.dot(ca.DM(weights), 1.0 / c) / float(theta[-1]),
-        "g": ca.vertcat(bounded, *steep),
-    }
-    options = {f"ipopt.{key}": value for key, value in _SOLVER.items()}
-    solver = ca.nlpsol("fastest", "ipopt", problem, {**options, "print_time": False})
-    found = solver(x0=1.0, lbg=lower, ubg=upper, lbx=_SLOWEST)
-    status = str(solver.stats()["return_status"])
-    coefficients = np.pad(np.array(found["x"])[:, 0], degree, mode="edge")
-    pace = PaceSpline(float(theta[-1]), coefficients, degree)
-    return FoundPace(pace, bool(solver.stats()["success"]), status)
+    program = _Program(demand, theta, limits, intervals, degree)
+    share = program.shares(PaceSpline(float(theta[-1]), np.ones(intervals + degree), degree))
+    seen = _near(share, watched)
+    for _ in range(_ROUNDS):
+        found = program.solve(seen)
+        share = program.shares(found.pace)
+        if not np.any((share > 1.0 + _PASSED) & ~seen):
+            break
+        seen |= _near(share, watched)
+    return found
 
 
-def _rows(
-    demand: DemandPolynomial,
-    theta: np.ndarray,
-    limits: PaceLimits,
-    rates: list[ca.MX],
-    watched: float,
-) -> list[ca.MX]:
-    """Return what must be between -1 and 1."""
-    given = demand.torques(np.eye(1, 4).repeat(len(theta), axis=0))
-    slopes = np.diff(given, axis=0) / theta[1] / limits.torque_rate[1:]
-    near = {"torque": given / limits.torque, "rate": np.pad(slopes, ((1, 0), (0, 0)))}
-    seen = {
-        key: maximum_filter1d(np.abs(share), _AROUND, axis=0) >= watched
-        for key, share in near.items()
-    }
-    rows = [rates[0] / ca.DM(np.minimum(limits.pace, _LARGEST))]
-    for i in range(given.shape[1]):
-        at = np.flatnonzero(seen["torque"][:, i])
-        if at.size:
-            rows.append(_torque(demand, rates, at, i) / ca.DM(limits.torque[at, i]))
-        at = np.flatnonzero(seen["rate"][1:, i] & np.isfinite(limits.torque_rate[1:, i]))
-        if at.size:
-            slope = _torque(demand, rates, at + 1, i) - _torque(demand, rates, at, i)
-            c = (rates[0][at + 1] + rates[0][at]) / 2.0
-            rows.append(slope * c / ca.DM(theta[1] * limits.torque_rate[at + 1, i]))
-    return rows
+def _near(share: np.ndarray, watched: float) -> np.ndarray:
+    """Return which shares of limits, (samples, limits), are to be looked at."""
+    return np.asarray(maximum_filter1d(share, _AROUND, axis=0) >= watched)
 
 
-def _torque(demand: DemandPolynomial, rates: list[ca.MX], at: np.ndarray, i: int) -> ca.MX:
-    """Return the torque of a drive at some samples."""
-    chosen = [rate[at] for rate in rates]
-    total = ca.MX(ca.DM(demand.coefficients[at, 0, i]))
-    for k, powers in enumerate(demand.exponents[1:], start=1):
-        monomial = prod(rate**p for rate, p in zip(chosen, powers, strict=True) if p)
-        total += ca.DM(demand.coefficients[at, k, i]) * monomial
-    return total
+class _Program:
+    """The optimization problem, of which only some limits are looked at."""
+
+    def __init__(
+        self,
+        demand: DemandPolynomial,
+        theta: np.ndarray,
+        limits: PaceLimits,
+        intervals: int,
+        degree: int,
+    ) -> None:
+        self._demand, self._theta, self._limits, self._degree = demand, theta, limits, degree
+        self._inner = ca.MX.sym("coefficients", intervals - degree)
+        ends = ca.repmat(self._inner[0], degree), ca.repmat(self._inner[-1], degree)
+        self._x = ca.vertcat(ends[0], self._inner, ends[1])
+        tables = _tables(theta, intervals, degree)
+        self._rates = time_derivatives(*[table @ self._x for table in tables])
+        # of all samples, without the first, which is 1
+        self._monomials = [
+            prod(rate**p for rate, p in zip(self._rates, powers, strict=True) if p)
+            for powers in demand.exponents[1:]
+        ]
+
+    def shares(self, pace: PaceSpline) -> np.ndarray:
+        """Return shares of the limits of torques and of their rates, shape (samples, 2N)."""
+        rates = pace.rates(self._theta)
+        torques = self._demand.torques(rates)
+        c = (rates[1:, :1] + rates[:-1, :1]) / 2.0
+        slopes = np.diff(torques, axis=0) * c / self._theta[1] / self._limits.torque_rate[1:]
+        # that of an interval is that of its end
+        slopes = np.pad(slopes, ((1, 0), (0, 0)))
+        return np.abs(np.concatenate([torques / self._limits.torque, slopes], axis=1))
+
+    def solve(self, seen: np.ndarray) -> FoundPace:
+        """Return the fastest pace with limits of which some are seen, (samples, 2N)."""
+        x, theta = self._x, self._theta
+        rows = ca.vertcat(*self._rows(seen))
+        # neighbours may differ by a factor; what is more, the motion at this pace could not show
+        steep = ca.vertcat(x[1:] - _STEEPEST * x[:-1], x[:-1] - _STEEPEST * x[1:])
+        least = np.repeat([-1.0, -np.inf], [rows.numel(), steep.numel()])
+        most = np.repeat([1.0, 0.0], [rows.numel(), steep.numel()])
+        weights = np.full(len(theta), theta[1])
+        weights[[0, -1]] /= 2.0
+        duration = ca.dot(ca.DM(weights), 1.0 / self._rates[0])
+        problem = {
+            "x": self._inner,
+            "f": duration / float(theta[-1]),
+            "g": ca.vertcat(rows, steep),
+        }
+        options = {f"ipopt.{key}": value for key, value in _SOLVER.items()}
+        solver = ca.nlpsol("fastest", "ipopt", problem, {**options, "print_time": False})
+        found = solver(x0=1.0, lbg=least, ubg=most, lbx=_SLOWEST)
+        coefficients = np.pad(np.array(found["x"])[:, 0], self._degree, mode="edge")
+        pace = PaceSpline(float(theta[-1]), coefficients, self._degree)
+        stats = solver.stats()
+        return FoundPace(pace, bool(stats["success"]), str(stats["return_status"]))
+
+    def _rows(self, seen: np.ndarray) -> list[ca.MX]:
+        """Return what must be between -1 and 1."""
+        limits, c, n = self._limits, self._rates[0], seen.shape[1] // 2
+        rows = [c / ca.DM(np.minimum(limits.pace, _LARGEST))]
+        at, axis = np.nonzero(seen[:, :n])
+        rows.append(self._torques(at, axis, 1.0 / limits.torque[at, axis]))
+        at, axis = np.nonzero(seen[1:, n:] & np.isfinite(limits.torque_rate[1:]))
+        scale = 1.0 / (2.0 * self._theta[1] * limits.torque_rate[at + 1, axis])
+        slopes = self._torques(at + 1, axis, scale) - self._torques(at, axis, scale)
+        rows.append(slopes * (c[at + 1] + c[at]))
+        return rows
+
+    def _torques(self, at: np.ndarray, axis: np.ndarray, scale: np.ndarray) -> ca.MX:
+        """Return scaled torques of some axes at some samples, shape (rows, 1)."""
+        table = self._demand.coefficients[at, :, axis] * scale[:, None]
+        samples, rows = len(self._theta), np.arange(len(at))
+        count = len(self._monomials)
+        columns = at[:, None] + samples * np.arange(count)
+        places = np.repeat(rows, count), columns.ravel()
+        map_of = csc_matrix((table[:, 1:].ravel(), places), shape=(len(at), samples * count))
+        return ca.DM(table[:, 0]) + ca.DM(map_of) @ ca.vertcat(*self._monomials)
 
 
 def _tables(theta: np.ndarray, intervals: int, degree: int) -> list[ca.DM]:

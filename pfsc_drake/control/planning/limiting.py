@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# of limits
+KINDS = ("torque", "speed", "rate", "velocity")
 # of a limit, from which on a motion is at it
-_AT = 0.98
+_AT = 0.97
 
 
 @dataclass(frozen=True)
@@ -44,13 +46,20 @@ class Limiting:
         later = np.minimum(np.arange(len(demand)) + samples, len(demand) - 1)
         rates = np.abs(demand[later, :n] - demand[:, :n]) / period
         shares = [np.abs(demand) / allowed, rates / torque_rate, velocity[:, None]]
-        kinds = [f"{kind}_{i + 1}" for kind in ("torque", "speed", "rate") for i in range(n)]
-        return cls([*kinds, "velocity"], np.concatenate(shares, axis=1))
+        kinds = [f"{kind}_{i + 1}" for kind in KINDS[:-1] for i in range(n)]
+        return cls([*kinds, KINDS[-1]], np.concatenate(shares, axis=1))
 
     @property
     def largest(self) -> np.ndarray:
         """Share of the tightest limit, shape (samples,)."""
         return np.asarray(self.shares.max(axis=1))
+
+    @property
+    def by_kind(self) -> np.ndarray:
+        """Largest share of each of the ``KINDS``, shape (samples, 4)."""
+        n = self.shares.shape[1] // 3
+        parts = np.split(self.shares, [n, 2 * n, 3 * n], axis=1)
+        return np.stack([part.max(axis=1) for part in parts], axis=1)
 
     @property
     def active(self) -> np.ndarray:

@@ -61,7 +61,7 @@ class Move:
 
 
 def straight_moves(motion: PiecewisePolynomialCurve, order: int) -> list[Move]:
-    """Return the moves of a motion along straight lines, at 1 m/s, of class C^order.
+    """Return the moves of a motion along straight lines, at 1 m/s, of class C^order at rest.
 
     Args:
         motion: Tangential coordinates over time, at rest at the ends of every move.
@@ -73,7 +73,7 @@ def straight_moves(motion: PiecewisePolynomialCurve, order: int) -> list[Move]:
     moves = []
     for begin, end in pairwise(places):
         way = float(np.abs(end - begin).max())
-        if way > 0.0:
+        if way > _NONE * np.abs(places).max():
             moves.append(Move(begin, (end - begin) / way, _from_rest_to_rest(way, order)))
     return moves
 
