@@ -18,9 +18,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # what users import, and the modules that are loaded when they do
 _DOOR = {
+    "Commands": "experiments.replay",
+    "ExportedController": "experiments.exported_controller",
+    "FirstCommand": "experiments.hardware.driven_run",
     "Margins": "experiments.studies.margins.told",
+    "Replay": "experiments.replay",
     "Run": "experiments.kept_run",
     "Scenario": "diagrams.scenario",
+    "StaticCheck": "experiments.hardware.statics",
+    "check_robot": "experiments.hardware.calls",
+    "drive": "experiments.hardware.calls",
+    "export_controller": "experiments.exported_controller",
+    "first_command": "experiments.hardware.calls",
     "load": "experiments.kept_run",
     "margins": "experiments.api",
     "run": "experiments.api",

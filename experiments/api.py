@@ -1,30 +1,20 @@
 """Runs and margins from scripts and notebooks, as the command line makes them."""
 
-import logging
 import math
-import shutil
-import tempfile
-import warnings
-import weakref
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from diagrams.scenario import Scenario
-from experiments.kept_run import Run, load
+from experiments.calls import only_own_words, read_given, result_folder, shown_progress
+from experiments.kept_run import Run
 from experiments.preparation import naming
-from experiments.scenario_file import ScenarioFile, apply_change, expand_home, read_scenario
 from experiments.simulated_run import run_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.told import Margins
-from pfsc_drake.errors import InputError, WriteError
-from pfsc_drake.yaml.typed import load_typed, typed_data
-from reporting.notebook import NotebookProgress, in_notebook
-from reporting.progress import ProgressDisplay
+from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.typed import load_typed
 
 
 def run(
@@ -64,30 +54,19 @@ def run(
         if not good:
             allowed = "a number of seconds, 0 or more" if least else "a positive number of seconds"
             raise InputError(f"{name} = {time}; allowed: {allowed}")
-    loaded = _read(scenario, changes or {})
-    temporary = tempfile.mkdtemp(prefix="pfsc_drake_run_") if out is None else None
-    folder = expand_home(Path(out or "")) if temporary is None else Path(temporary)
-    try:
-        with _only_own_words(), _progress(loaded.name, duration, quiet) as progress:
+    loaded = read_given(scenario, changes or {})
+    with result_folder(out) as folder, only_own_words():
+        with shown_progress(loaded.name, duration, quiet) as progress:
             outcome = run_scenario(
                 loaded,
-                out=folder,
+                out=folder.path,
                 duration=duration,
                 figures=figures,
                 recording=recording,
                 progress=progress,
                 after_fault=after_fault,
             )
-        if outcome.problem is not None:
-            raise WriteError(outcome.problem)
-        result = load(folder)
-    except BaseException:
-        if temporary is not None:
-            shutil.rmtree(temporary, ignore_errors=True)
-        raise
-    if temporary is not None:
-        weakref.finalize(result, shutil.rmtree, temporary, ignore_errors=True)
-    return result
+        return folder.run_of(outcome)
 
 
 def margins(
@@ -114,60 +93,8 @@ def margins(
     Raises:
         InputError: If the scenario or an argument is wrong; one line.
     """
-    loaded, box = _read(scenario, changes or {}), ErrorBox(mass, stiffness, rotor, tool)
-    with _only_own_words(), _progress(loaded.name, None, quiet, paced=False) as progress:
+    loaded, box = read_given(scenario, changes or {}), ErrorBox(mass, stiffness, rotor, tool)
+    with only_own_words(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
         settings = load_typed(Scenario, loaded.data, str(loaded.path))
         with naming(loaded.path):
             return Margins(loaded.name, analyse(settings, loaded.path.parent, box, progress))
-
-
-def _read(scenario: str | Path | Scenario, changes: Mapping[str, Any]) -> ScenarioFile:
-    """Return a scenario with changes."""
-    if isinstance(scenario, Scenario):
-        path = Path.cwd() / f"{scenario.name or 'scenario'}.yaml"
-        loaded = ScenarioFile(path, typed_data(scenario))
-    else:
-        loaded = read_scenario(str(scenario), [])
-    for key, value in changes.items():
-        apply_change(loaded.data, key, value)
-    return loaded
-
-
-class _Silence:
-    """Shows nothing."""
-
-    def expect(self, duration: float) -> None:
-        """Leave it."""
-
-    def __call__(self, simulated_time: float, phase: str) -> None:
-        """Leave it."""
-
-
-@contextmanager
-def _silence() -> Iterator[_Silence]:
-    yield _Silence()
-
-
-def _progress(
-    title: str, duration: float | None, quiet: bool, *, paced: bool = True
-) -> AbstractContextManager[NotebookProgress | ProgressDisplay | _Silence]:
-    """Return what shows progress here."""
-    if quiet:
-        return _silence()
-    if in_notebook():
-        return NotebookProgress(title)
-    return ProgressDisplay(Console(), title, duration, paced=paced)
-
-
-@contextmanager
-def _only_own_words() -> Iterator[None]:
-    """Let libraries be silent: what matters is in the outcome, in words of its own."""
-    drake = logging.getLogger("drake")
-    level = drake.level
-    drake.setLevel(logging.CRITICAL)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        drake.setLevel(level)

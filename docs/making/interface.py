@@ -4,7 +4,11 @@ import importlib
 import inspect
 from types import ModuleType
 
-_DOORS = {"pfsc_drake": "The library", "experiments": "Runs from Python"}
+_DOORS = {
+    "pfsc_drake": "The library",
+    "experiments": "Runs, exports, robots",
+    "identification": "Models from measurements",
+}
 
 
 def interface() -> str:

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 import experiments
+import identification
 import pfsc_drake
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "tutorials"
-DOORS = {"pfsc_drake": pfsc_drake.__all__, "experiments": experiments.__all__}
-PROJECT = (*DOORS, "diagrams", "identification", "reporting")
+DOORS = {door.__name__: door.__all__ for door in (pfsc_drake, experiments, identification)}
+PROJECT = (*DOORS, "diagrams", "reporting")
 CELL = re.compile(r"```\{code-cell\} ipython3\n(?::tags:[^\n]*\n\n?)?(.*?)```", re.DOTALL)
 NOTEBOOKS = sorted(FOLDER.glob("[0-9]*.md"))
 

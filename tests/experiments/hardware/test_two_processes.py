@@ -19,7 +19,7 @@ ip link set lo up; ip route add 224.0.0.0/4 dev lo
 env --default-signal=INT {first} {python} -m experiments robot {robot} --no-meshcat --duration 160 \
     > {out}/robot.txt 2>&1 &
 for _ in $(seq 200); do grep -q joints {out}/robot.txt && break; sleep 0.2; done
-{python} -m experiments drive {drive} --no-figures > {out}/drive.txt 2>&1
+{python} {program} > {out}/drive.txt 2>&1
 STATUS=$?; kill -INT $!; wait $!; exit $STATUS
 """
 
@@ -47,7 +47,12 @@ pytestmark = [
 
 def both(tmp_path, robot, drive, first=""):
     """Return the exit status of what drives, and what both have said."""
-    given = {"robot": robot, "drive": drive, "first": first}
+    return beside(tmp_path, robot, f"-m experiments drive {drive} --no-figures", first)
+
+
+def beside(tmp_path, robot, program, first=""):
+    """Return the exit status of a program of Python beside a robot, and what both have said."""
+    given = {"robot": robot, "program": program, "first": first}
     words = _ALONE.format(python=sys.executable, out=tmp_path, **given)
     # what is compiled here is to be there soon
     environment = os.environ | {"PYTHONPATH": str(ROOT), "MAKEFLAGS": "OPTIMIZATION=-O0"}
@@ -69,6 +74,24 @@ def test_a_panda_is_driven(tmp_path):
     with h5py.File(out / "log.h5") as log:
         assert log["sent"].shape[1] == 7
         assert "panda" in log.attrs["driven"]
+
+
+def test_a_panda_is_driven_by_a_script(tmp_path):
+    script, out = tmp_path / "script.py", tmp_path / "out"
+    script.write_text(f"""
+from experiments import check_robot, drive, first_command
+
+first = first_command("pfc_panda_7r", quiet=True)
+print(first.kind, abs(first.values).max() < 1.0)
+print(check_robot("pfc_panda_7r", quiet=True).verdict)
+changes = {{"start.transition": 0.5}}
+driven = drive("pfc_panda_7r", changes, duration=1.0, out={str(out)!r}, figures=False, quiet=True)
+print(driven.log["sent"].values.shape[1], driven.fault)
+""")
+    status, _, said = beside(tmp_path, "pfc_panda_7r --low-pass 0", str(script))
+    assert status == 0, said
+    assert said.startswith("TORQUE True\nthe robot's torques at rest are those of the model\n7 ")
+    assert (out / "recording.html").is_file()
 
 
 @needs_gcc

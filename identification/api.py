@@ -1,0 +1,246 @@
+"""From measured motions to a model, from scripts and notebooks, as the command line has it."""
+
+import html
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from identification.consistency.nearest import refuse_far
+from identification.consistency.writing import WrittenModel
+from identification.estimation.least_squares import Estimate
+from identification.estimation.validation import refuse_implausible
+from identification.findings import Findings
+from identification.measurement.columns import Reading
+from identification.measurement.imperfections import shipped_imperfections
+from identification.model.subject import Subject, load_subject
+from identification.options import check_folder
+from identification.pages import write_identification
+from identification.report.page import torque_table
+from identification.steps import (
+    bounds_of,
+    consistent_set,
+    estimate_files,
+    load_excitation,
+    simulate_runs,
+    stored_findings,
+    write_consistent,
+)
+from pfsc_drake.errors import WriteError
+from reporting.progress import fraction_display
+from reporting.provenance import FIGURES, listed_results
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What measured motions tell about a robot, and the folder in which it is kept.
+
+    A notebook shows what the model leaves of the torques, beside their noise.
+
+    Attributes:
+        robot: What it was loaded by.
+        folder: With ``identification.h5``, the page and its figures.
+        findings: All that was found: runs, choice of friction, prediction.
+    """
+
+    robot: str
+    folder: Path
+    findings: Findings
+
+    @property
+    def estimate(self) -> Estimate:
+        """Base parameters of the first run: ``base_parameters``, ``covariance``, ``names``."""
+        return self.findings.estimate
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """Their standard deviations, shape (n_b,), SI units."""
+        return np.sqrt(np.diag(self.estimate.covariance))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is doubtful, one sentence each."""
+        return self.findings.notes
+
+    @property
+    def report(self) -> Path:
+        """The page to open in a browser."""
+        return self.folder / "report.html"
+
+    @property
+    def figures(self) -> dict[str, Path]:
+        """Pictures by name."""
+        names = [name for name in listed_results(self.folder) if FIGURES in name]
+        return {Path(name).stem: self.folder / name for name in names}
+
+    def _repr_html_(self) -> str:
+        """Return notes and the table of torques."""
+        table = torque_table(self.findings)
+        head = "".join(f"<th>{html.escape(title)}</th>" for title in table.head)
+        rows = "".join(
+            f"<tr>{''.join(f'<td>{_cell(value)}</td>' for value in row)}</tr>" for row in table.rows
+        )
+        notes = "".join(f"<div>⚠ {html.escape(note)}</div>" for note in self.notes)
+        return f"{notes}<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def simulate(
+    robot: str,
+    *,
+    out: str | Path,
+    excitation: str | Path | None = None,
+    runs: int = 7,
+    seed: int = 1,
+    realistic: bool = False,
+    tool: bool = False,
+    quiet: bool = False,
+) -> list[Path]:
+    """Simulate an experiment: rotors, friction, servo, encoders, noise; return a file of each run.
+
+    Args:
+        robot: Shipped robot, SDF or URDF file, or scenario with a robot.
+        out: Folder for the files.
+        excitation: ``excitation.yaml`` of the motion; None for the one that is shipped.
+        runs: How often.
+        seed: Seed of the first run.
+        realistic: Whether disturbances are coloured and friction differs from run to run.
+        tool: Whether the shipped robot carries its tool.
+        quiet: Whether to show no progress.
+
+    Raises:
+        InputError: If there is no such robot, or no motion of it.
+    """
+    subject, folder = _begin(robot, out, tool)
+    trajectory = load_excitation(subject, None if excitation is None else Path(excitation))
+    faults = shipped_imperfections(subject.family)
+    faults = faults.realistic() if realistic else faults
+    with _progress("experiment", quiet) as progress:
+        return simulate_runs(subject, robot, trajectory, faults, folder, runs, seed, progress)
+
+
+def estimate(
+    robot: str,
+    records: str | Path | Sequence[str | Path],
+    *,
+    out: str | Path,
+    validation: str | Path | None = None,
+    period: float | None = None,
+    skip: int = 1,
+    bandwidth: float | None = None,
+    plain: bool = False,
+    names: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    scales: Mapping[str, float] | None = None,
+    bounds: str | Path | None = None,
+    simulated: bool = False,
+    tool: bool = False,
+    quiet: bool = False,
+) -> Identification:
+    """Estimate base parameters from measured motions, and write ``identification.h5`` and a page.
+
+    Args:
+        robot: As of :func:`simulate`.
+        records: Runs of one excitation: CSV, HDF5 or MAT files.
+        out: Folder for the results.
+        validation: Record of another motion, to choose friction and to predict.
+        period: Period of the motion [s], if files do not state it.
+        skip: Periods at the start to leave out.
+        bandwidth: Bandwidth of the motion [Hz]; None for what torques tell.
+        plain: Whether there is Coulomb and viscous friction only.
+        names: Signals by what a file calls them.
+        units: Units that a file does not state, by signal.
+        scales: SI units per unit of the file, by signal.
+        bounds: What is known of the links (YAML); None for what is shipped, if anything.
+        simulated: Whether the robot's model is the truth, to compare with.
+        tool: As of :func:`simulate`.
+        quiet: Whether to show no progress.
+
+    Raises:
+        InputError: If a file does not tell what is needed, or tells what no such robot can do.
+        WriteError: If results could not be written.
+    """
+    subject, folder = _begin(robot, out, tool)
+    files = [Path(one) for one in ([records] if isinstance(records, str | Path) else records)]
+    other_file = None if validation is None else Path(validation)
+    reading = Reading(dict(names or {}), dict(units or {}), dict(scales or {}))
+    with _progress(subject.name, quiet) as progress:
+        findings, other = estimate_files(
+            subject,
+            files,
+            other_file,
+            reading,
+            period=period,
+            skip=skip,
+            bandwidth_hz=bandwidth,
+            choose=not plain,
+            simulated=simulated,
+            progress=progress,
+        )
+    inputs = [*files, *([other_file] if other_file else [])]
+    known = None if bounds is None else Path(bounds)
+    report = write_identification(subject, findings, other, folder, inputs, known, None)
+    if report.problem is not None:
+        raise WriteError(report.problem)
+    return Identification(robot, folder, findings)
+
+
+def consistent_model(
+    found: Identification | str | Path,
+    robot: str = "",
+    *,
+    out: str | Path,
+    bounds: str | Path | None = None,
+    direct: bool = False,
+    tool: bool = False,
+) -> WrittenModel:
+    """Find the nearest parameters that bodies can have, and write them as SDF, URDF and YAML.
+
+    Args:
+        found: What was estimated, or its folder or ``identification.h5``.
+        robot: As of :func:`simulate`; by default that of what was estimated.
+        out: Folder for the files.
+        bounds: What is known of the links (YAML); None for what is shipped.
+        direct: Whether in one step from the first run's torques.
+        tool: As of :func:`simulate`.
+
+    Raises:
+        InputError: If nothing is known of the links, or what was estimated is far from any robot.
+    """
+    place, robot = (
+        (found.folder, robot or found.robot)
+        if isinstance(found, Identification)
+        else (Path(found), robot)
+    )
+    subject, folder = _begin(robot, out, tool)
+    findings = stored_findings(subject, place, None, simulated=False)
+    refuse_implausible(findings.estimate)
+    known = bounds_of(subject, None if bounds is None else Path(bounds))
+    nearest = consistent_set(findings, known, direct)
+    refuse_far(nearest, str(place))
+    return write_consistent(subject, nearest, folder)
+
+
+def _begin(robot: str, out: str | Path, tool: bool) -> tuple[Subject, Path]:
+    """Return the robot, and the folder for results, which can take them."""
+    logging.getLogger("drake").setLevel(logging.CRITICAL)
+    folder = Path(out).expanduser()
+    subject = load_subject(robot, tool=tool)
+    check_folder(folder)
+    return subject, folder
+
+
+@contextmanager
+def _progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], None]]:
+    if quiet:
+        yield lambda _, __: None
+        return
+    with fraction_display(Console(), title) as progress:
+        yield progress
+
+
+def _cell(value: str | float) -> str:
+    return html.escape(value) if isinstance(value, str) else f"{value:.4g}"
