@@ -37,7 +37,7 @@ def run(settings, end=END, like=None):
     """Return a station, its context at the end, and its log."""
     station = build_station(settings, SCENARIO_DIRECTORY, like=like)
     simulator = Simulator(station.diagram)
-    configure(simulator, "runge_kutta3", 1e-3)
+    configure(simulator, "runge_kutta5", 1e-3)
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.AdvanceTo(end)
