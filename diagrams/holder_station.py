@@ -35,6 +35,7 @@ from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame
 from pfsc_drake.control.manifolds.moving_frame import frame_size
 from pfsc_drake.control.planning.course import CourseStart
@@ -144,7 +145,7 @@ def add_holder(
     assert holder is not None
     named, period = PrefixingBuilder(builder, HOLDER), scenario.controller.sampling_time
     with naming_holder():
-        _check(holder, period)
+        _check(holder, period, order)
         task = make_task(own, folder, progress) if like is None else like.task
         part = add_arm(named, holding(belief_source(own, folder), holder.workpiece))
         task.require_joints(part.robot.dimension)
@@ -154,9 +155,6 @@ def add_holder(
         rest = cache(lambda: find_rest(task, part, start, state))
         believed = part.belief.robot
         law = make_law(own.controller, believed, task.manifold, rest, own.faults)
-        known = law.linearization.relative_degree
-        allowed = f"a law of relative degree {order} or more, as the other robot's is"
-        require(known >= order, "controller.law", own.controller.law, allowed)
         on_motors = own.controller.law == "rigid" and not believed.is_rigid
         rubbing = friction_options(own, folder)
         friction = believed_friction(part, own.controller.friction.believed, rubbing)
@@ -244,11 +242,13 @@ def naming_holder() -> Iterator[None]:
         ) from None
 
 
-def _check(holder: HolderParameters, period: float) -> None:
+def _check(holder: HolderParameters, period: float, order: int) -> None:
     """Refuse what no holder can be."""
-    model, own = holder.robot.model, holder.controller.sampling_time
+    model, own, law = holder.robot.model, holder.controller.sampling_time, holder.controller.law
     require(not is_delta(model), "robot.model", model, "a serial arm, which turns what it holds")
     holder.workpiece.check()
+    allowed = f"a law of relative degree {order} or more, as the other robot's is"
+    require(RELATIVE_DEGREE[law] >= order, "controller.law", law, allowed)
     require(own == period, "controller.sampling_time", own, f"{period:g} s, the other robot's")
 
 

@@ -108,6 +108,7 @@ def test_only_what_builds_a_station_knows_a_scenario():
     """Robots, tasks, surroundings and warnings are given their own parameters."""
     builders = {
         "diagrams.builder",
+        "diagrams.holder_station",
         "diagrams.robot_station",
         "diagrams.station_parts",
         "diagrams.station_warnings",

@@ -72,9 +72,8 @@ class HeldWorkpieceParameters:
             allowed = "given where there is no box, and only there"
             require(one, f"workpiece.solids[{i}].cylinder", solid.cylinder, allowed)
         mass = sum(solid.mass for solid in self.solids)
-        require(
-            mass > 0.0, "workpiece.solids", f"{len(self.solids)}, {mass:g} kg", "some with mass"
-        )
+        given = f"{len(self.solids)} given, {mass:g} kg"
+        require(mass > 0.0, "workpiece.solids", given, "one or more, with mass")
 
 
 @dc.dataclass

@@ -205,7 +205,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         InputError: If it needs what only a simulation knows.
     """
     left, plain = deepcopy(scenario), Scenario()
-    for key in ("plate", "operator", "teleoperation"):
+    for key in ("plate", "operator", "teleoperation", "holder"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
     controller = scenario.controller

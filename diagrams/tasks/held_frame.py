@@ -1,16 +1,15 @@
 """What carries a task's path or surface: a frame that moves, and how the law learns of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.tasks.task import ManifoldProjector, Task
-from pfsc_drake.control.manifolds.carried import FramedPoint, SeenTool
 from pfsc_drake.control.manifolds.manifold import Manifold
-from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, FramedLayout, MovingFrameManifold
+from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
+from pfsc_drake.following.carried import add_framed_point, add_seen_tool, placed, resting_point
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.block_system import BlockSystem
 
 
 @dataclass(frozen=True)
@@ -27,11 +26,6 @@ class HeldFrame:
     order: int
     motion: OutputPort | None = None
 
-    @property
-    def rotation(self) -> np.ndarray:
-        """``R_WC`` at the start, shape (3, 3)."""
-        return self.start[3:].reshape(3, 3)
-
     def manifold(self, task: Task) -> MovingFrameManifold:
         """Return a task's manifold in the frame, as the law sees it.
 
@@ -46,10 +40,7 @@ class HeldFrame:
         Args:
             target: The pose in the frame.
         """
-        R_WC = self.rotation
-        R_e = None if target.R_e is None else R_WC @ target.R_e
-        yaw_axis = None if target.yaw_axis is None else R_WC @ target.yaw_axis
-        return replace(target, y_t=self.start[:3] + R_WC @ target.y_t, R_e=R_e, yaw_axis=yaw_axis)
+        return placed(target, self.start)
 
     def resting_point(self, point: np.ndarray) -> np.ndarray:
         """Return a manifold's point with the frame at rest where it starts.
@@ -57,7 +48,7 @@ class HeldFrame:
         Args:
             point: The manifold's point in the frame.
         """
-        return np.concatenate([point, self.start, np.zeros(POSE_SIZE * self.order)])
+        return resting_point(point, self.start, self.order)
 
     def add_place(
         self,
@@ -81,16 +72,11 @@ class HeldFrame:
             seen from the frame.
         """
         assert self.motion is not None  # of what moves in a diagram
-        seen = builder.AddNamedSystem("seen_tool", BlockSystem(SeenTool(self.order), period))
-        builder.Connect(tool_pose, seen.GetInputPort("tool_pose"))
-        builder.Connect(self.motion, seen.GetInputPort("frame_jet"))
-        place = task.add_place(builder, seen.GetOutputPort("seen"), reference, period)
-        layout = FramedLayout(task.manifold.layout)
-        framed = builder.AddNamedSystem("framed_point", BlockSystem(FramedPoint(layout), period))
-        builder.Connect(place.manifold_point, framed.GetInputPort("manifold_point"))
-        builder.Connect(self.motion, framed.GetInputPort("frame_jet"))
-        point = framed.GetOutputPort("framed_point")
-        return ManifoldProjector(place.projector, point), seen.GetOutputPort("seen")
+        seen = add_seen_tool(builder, tool_pose, self.motion, self.order, period)
+        place = task.add_place(builder, seen, reference, period)
+        own = task.manifold
+        point = add_framed_point(builder, own, place.manifold_point, self.motion, period)
+        return ManifoldProjector(place.projector, point), seen
 
 
 def law_manifold(task: Task, held: HeldFrame | None) -> Manifold:

@@ -16,12 +16,15 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
+from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
 from pfsc_drake.errors import InputError, require, require_one_of
+from pfsc_drake.following.carried import add_framed_point, add_seen_tool, carried
 from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller, add_reference
 from pfsc_drake.following.fixtures import add_fixture_guidance
 from pfsc_drake.following.followed import Followed, Wanted
 from pfsc_drake.following.law import Believed, make_law
+from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
     ControllerParameters,
     GainParameters,
@@ -30,6 +33,7 @@ from pfsc_drake.following.options.controller import (
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.prediction import add_prediction
 from pfsc_drake.following.streamed_path import StreamedPath, add_stream
+from pfsc_drake.geometry.rotation import check_rotation_matrix
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_rest
@@ -58,6 +62,8 @@ class Follower(Diagram):
             [N, Nm], the load of the tool itself taken off: where a hand leads the tool, where it
             yields by ``compliance``, and where the law or the posture is told of forces that are
             known or measured. What is no finite number is a fault.
+        frame_jet (input): With ``frame``: the motion of the frame that path or surface are in,
+            derivatives 0..r of ``[p_WC, R_WC by rows]``, shape (12 (r + 1),) [m, 1, per s, ..].
         drive_torque (output): Drive torques within their limits, shape (N,) [Nm or N]; of velocity
             servos
         velocity_reference (output): Joint velocities, shape (N,) [rad/s or m/s].
@@ -114,7 +120,11 @@ class Follower(Diagram):
         self.robot, self._coordinates = chain_from_plant(plant, plant.GetFrameByName(tool))
         self._actuation = self._coordinates.actuation_rows(plant.num_actuators())
         near = self._near(options.posture)
-        self.followed = followed = make(self.robot, near, RELATIVE_DEGREE[law])
+        followed = make(self.robot, near, RELATIVE_DEGREE[law])
+        self._own, self._moves = followed.manifold, options.frame is not None
+        if options.frame is not None:
+            followed = carried(followed, _frame_of(options.frame, options.compliance))
+        self.followed = followed
         self.start_posture = solve_pose(self.robot, followed.start, near, "start")
         chosen = _with_gains(options.controller, law, options.bandwidth)
         self.period = chosen.sampling_time
@@ -172,12 +182,8 @@ class Follower(Diagram):
         )
         kinematics = self._add("tool_kinematics", ToolKinematics(self.robot, on_motors))
         builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-        projector = self._add("projector", self.followed.projector)
-        builder.Connect(kinematics.GetOutputPort("tool_pose"), projector.GetInputPort("tool_pose"))
-        ports = {
-            "joint_state": joint_state,
-            "manifold_point": projector.GetOutputPort("manifold_point"),
-        }
+        place = self._place(kinematics.GetOutputPort("tool_pose"))
+        ports = {"joint_state": joint_state, "manifold_point": place}
         ports |= self._forces(chosen, options)
         compliance = options.compliance
         yields = compliance.is_given and compliance.source == "observed"
@@ -208,6 +214,22 @@ class Follower(Diagram):
         builder.ExportOutput(ports["manifold_point"], "manifold_point")
         for name in ("manifold_state", "status", "fault"):
             builder.ExportOutput(controller.GetOutputPort(name), name)
+
+    def _place(self, tool_pose: OutputPort) -> OutputPort:
+        """Add what finds the tool's place on the manifold, and return the point for the law."""
+        builder, r = self._builder, self.law.linearization.relative_degree
+        frame = None
+        if self._moves:
+            told = self._add("frame", Collect({"frame_jet": frame_size(r)}))
+            builder.ExportInput(told.GetInputPort("frame_jet"), "frame_jet")
+            frame = told.GetOutputPort("all")
+            tool_pose = add_seen_tool(builder, tool_pose, frame, r, self.period)
+        projector = self._add("projector", self.followed.projector)
+        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+        point = projector.GetOutputPort("manifold_point")
+        if frame is None:
+            return point
+        return add_framed_point(builder, self._own, point, frame, self.period)
 
     def _forces(self, chosen: ControllerParameters, options: FollowerOptions) -> Ports:
         """Export what is known of forces on the tool, and return it by the names of its uses."""
@@ -272,6 +294,19 @@ class Follower(Diagram):
         for name in ports:
             self._builder.ExportInput(reference.GetInputPort(name), name)
         return reference.GetOutputPort("reference"), {}
+
+
+def _frame_of(frame: np.ndarray, compliance: ComplianceParameters) -> np.ndarray:
+    """Return the pose of a frame, checked."""
+    pose = np.asarray(frame, dtype=float)
+    if pose.shape != (POSE_SIZE,):
+        raise InputError(
+            f"frame: shape {pose.shape}; must be [p_WC, R_WC by rows], shape ({POSE_SIZE},)"
+        )
+    check_rotation_matrix(pose[3:].reshape(3, 3), "frame")
+    if compliance.is_given:
+        raise InputError("frame: given; must be None where the tool yields to forces")
+    return pose
 
 
 def _with_gains(options: ControllerParameters, law: str, bandwidth: float) -> ControllerParameters:

@@ -120,6 +120,8 @@ class FollowerOptions:
             port of their own, in place of a motion over time; None for the latter.
         measures: What is measured: ``plant_state``, the state ``[q, v]`` of the plant, or
             ``joint_state``, ``[q_J, v_J, q_M, v_M]``.
+        frame: Of a path or surface that moves: the pose of its frame at the start, ``[p_WC, R_WC
+            by rows]``, shape (12,) [m, 1]; there is a port for the motion then. None if it rests.
     """
 
     bandwidth: float = BANDWIDTH
@@ -132,3 +134,4 @@ class FollowerOptions:
     override: bool = False
     stream: StreamLimits | None = None
     measures: str = "plant_state"
+    frame: np.ndarray | None = None
