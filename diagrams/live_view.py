@@ -29,8 +29,9 @@ class LiveFrame:
         positions: Positions of the plant that is drawn, shape (nq,).
         tool_pose: ``[y_t, R_e]``, shape (12,).
         manifold_point: The manifold next to the tool, shape (layout.size,).
-        force: On the tool point, world axes [N], shape (3,).
+        force: Between hand and robot, world axes [N], shape (3,), see :func:`felt_force`.
         target: Where a hand that holds the tool wants it to be [m], shape (3,), if one does.
+        led: Where a hand that is far away has the tool [m], shape (3,), if it is.
     """
 
     positions: np.ndarray
@@ -38,6 +39,21 @@ class LiveFrame:
     manifold_point: np.ndarray
     force: np.ndarray
     target: np.ndarray | None = None
+    led: np.ndarray | None = None
+
+    @property
+    def hand(self) -> np.ndarray:
+        """Where the hand is, in the world of the tool [m], shape (3,)."""
+        return self.tool_pose[:3] if self.led is None else self.led
+
+
+def felt_force(signals: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the force on the tool, or what a hand feels that is far away, shape (3,) [N].
+
+    Args:
+        signals: Values now, by signal, as of :meth:`SignalLog.now`.
+    """
+    return signals["leader_motor"] if "leader_motor" in signals else signals["wrench_ext"][:3]
 
 
 class LiveView:

@@ -55,7 +55,7 @@ class RecordedMotion:
         tool_pose: ``[y_t, R_e]``, shape (frames, 12).
         manifold_point: The manifold next to the tool, shape (frames, layout.size).
         elbow: A point of the arm whose way is drawn, too [m], shape (frames, 3).
-        pushes: What pushes its links.
+        pushes: What pushes its links, or a hand far away, where that has the tool.
         distance: What the colour of the tool's way tells; of one colour without.
         tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
         trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.

@@ -213,7 +213,7 @@ def _add_hand(
     assert hand is not None
     target, is_open = task.target(), isinstance(task, PathTask) and not task.path.closed
     if hand.frame == "manifold":
-        for i, (eta, *beside) in enumerate(hand.places()[1]):
+        for i, (eta, *beside) in enumerate(hand.places()[1].tolist()):
             # a hand that presses the tool on at an end of its path is beyond it
             past = max(-eta, eta - task.length, 0.0) if is_open else 0.0
             key = f"hand.waypoints[{i}].position"

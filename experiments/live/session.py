@@ -167,7 +167,7 @@ class LiveSession:
     def _step(self) -> None:
         """Read the controls, go on, wait for the clock, show what is there."""
         simulation = self._simulation
-        controls = self._panel.read(self._frame.tool_pose[:3])
+        controls = self._panel.read(self._frame.hand)
         self._record.note(simulation.tick, controls)
         simulation.set(controls)
         if self._pen is not None:

@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from diagrams.fault_description import FoundFault
-from diagrams.live_view import LiveFrame
+from diagrams.live_view import LiveFrame, felt_force
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.surroundings.operator import PULL
@@ -109,8 +109,8 @@ class LiveSimulation:
         positions = coordinates.plant_state(state)[: coordinates.num_states // 2]
         pose = np.array(self._pose(state[: self._station.robot.dimension])).ravel()
         target = self._pull[TARGET] if self._pull[HOLD] > 0.5 else None
-        force = signals["wrench_ext"][:3]
-        return LiveFrame(positions, pose, signals["manifold_point"], force, target)
+        point, force = signals["manifold_point"], felt_force(signals)
+        return LiveFrame(positions, pose, point, force, target, signals.get("led_point"))
 
     def result(self) -> SimulationResult:
         """Return what came of it so far, in a context of its own."""

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from diagrams.live_view import felt_force
 from diagrams.station import Station
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
@@ -43,7 +44,7 @@ class LiveStatus:
             region, if one is near.
         progress: Tangential coordinates, by name [m].
         angles: Rotational coordinates, by name [rad].
-        force: On the tool, world axes [N].
+        force: On the tool, or what a hand feels that is far away, world axes [N].
         measured: What the sensor makes of it along the coordinates, by name [N, Nm].
         stiffness: By coordinate [N/m, Nm/rad]; null where rigid.
         damping: By coordinate [N s/m, Nm s/rad].
@@ -106,7 +107,7 @@ class LiveStatus:
 
         self.deviation, self.progress = of(Kind.TRANSVERSAL, y), of(Kind.TANGENTIAL, y)
         self.angles = of(Kind.ROTATIONAL, y)
-        self.force = signals["wrench_ext"][:3].tolist()
+        self.force = felt_force(signals).tolist()
         if "manifold_force" in signals:
             forces = signals["manifold_force"].tolist()
             self.measured = dict(zip(names, forces, strict=True))

@@ -46,6 +46,10 @@ def collect_motion(
     pushes = None
     if "push_force" in log:
         pushes = RecordedPushes(log["push_point"].values[frames], log["push_force"].values[frames])
+    elif "led_point" in log:
+        # the hand far away, where it has the tool
+        hand = log["leader_hand"].values[frames]
+        pushes = RecordedPushes(log["led_point"].values[frames], hand)
     points = raw["manifold_point"][frames, : station.task.place.layout.size]
     return RecordedMotion(
         log.time[frames],

@@ -169,6 +169,30 @@ def test_in_space_a_person_changes_the_damping_and_switches_regions(tmp_path):
     assert_same(log, datasets(again)[0])
 
 
+def test_a_person_afar_leads_the_tool_a_channel_later(tmp_path):
+    """Pulled sideways from 0.6 s on; 100 ms later the tool follows, and the hand feels it."""
+    rehearsal = Rehearsal(
+        tmp_path / "takes",
+        "teleop_region",
+        "teleoperation.channel.jitter=0",
+        "teleoperation.channel.loss=0",
+    )
+    rehearsal.play(at(0.6, **{"pull y [N]": 8.0}), at(1.6, **{END: True}))
+    folder = rehearsal.session.kept[0].folder
+    log, _ = datasets(folder)
+    y = log["y_t"][:, 1]
+    assert np.ptp(y[400:700]) < 1e-4
+    assert y[-1] - y[700] > 0.02
+    assert log["leader_force"][-1, 1] < -4.0
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["audit_ports"]["value"] < 1e-12
+    assert metrics["least_port_tank"]["value"] > 0.0
+    assert rehearsal.status.force[1] < -4.0
+    again = tmp_path / "again"
+    assert main(["run", str(folder / "scenario.yaml"), "--out", str(again), *BARE]) == 0
+    assert_same(log, datasets(again)[0])
+
+
 def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
     """A force sensor that fails at 0.3 s."""
     failing = "simulation.force_sensor_failure={time: 0.3, component: 0}"

@@ -1,0 +1,136 @@
+"""A station whose tool is led from afar: what it needs, where it goes, what it keeps."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams.builder import build_station
+from diagrams.scenario import HandParameters, HandWaypoint
+from diagrams.scenario.schema import Scenario, driven
+from diagrams.scenario.teleoperation import TeleoperationParameters
+from experiments.results.run_signals import collect_log
+from experiments.results.teleoperation import teleoperation_metrics
+from experiments.simulation import simulate
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.leader_device import ClutchParameters
+from pfsc_drake.yaml.typed import load_typed
+from tests.scenarios import shipped_scenario
+
+SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"
+
+
+def run(settings, duration):
+    station = build_station(settings, SCENARIOS)
+    result = simulate(station, settings.simulation, duration, lambda *_: None)
+    assert result.fault is None
+    return station, collect_log(station, result.root)
+
+
+def region(**teleoperation) -> Scenario:
+    """A hand that pulls the tool down by 4 cm within half a second."""
+    settings = shipped_scenario("teleop_region")
+    for key, value in ({"smoothing": 0.004} | teleoperation).items():
+        setattr(settings.teleoperation, key, value)
+    start = np.array(settings.start.position)
+    settings.hand.waypoints = [
+        HandWaypoint(0.5, start), HandWaypoint(1.0, start - [0.0, 0.0, 0.04])
+    ]  # fmt: skip
+    settings.hand.tremor = 0.0
+    return settings
+
+
+def test_the_tool_goes_where_the_hand_is_a_channel_later():
+    settings = region()
+    settings.teleoperation.channel.jitter = settings.teleoperation.channel.loss = 0.0
+    settings.teleoperation.channel.delay = 0.05
+    station, log = run(settings, 1.8)
+    still = log.time < 0.55
+    assert np.ptp(log["y_t"].values[still, 2]) < 1e-4
+    low = log["y_t"].values[-1, 2] - station.start.target.y_t[2]
+    assert low == pytest.approx(-0.04, abs=3e-3)
+    metrics = teleoperation_metrics(log, settings)
+    assert 0.04 <= metrics["following_delay"].value <= 0.1
+    assert metrics["audit_ports"].value < 1e-12
+    assert metrics["least_port_tank"].value > 0.1
+    assert metrics["energy_margin"].value >= 0.0
+
+
+def test_along_a_path_the_follower_moves_farther_by_the_scale():
+    """And not while the clutch is open."""
+    settings = shipped_scenario("teleop_path")
+    settings.teleoperation.channel.delay = 0.02
+    settings.teleoperation.channel.jitter = settings.teleoperation.channel.loss = 0.0
+    settings.teleoperation.clutch = [ClutchParameters(1.2, 5.0)]
+    settings.hand.waypoints = [
+        HandWaypoint(0.4, [0.05, 0, 0]), HandWaypoint(1.0, [0.08, 0, 0]),
+        HandWaypoint(1.3, [0.08, 0, 0]), HandWaypoint(1.6, [0.2, 0, 0]),
+    ]  # fmt: skip
+    _, log = run(settings, 1.8)
+    led = log["led_point"].values
+    opened = log.time >= 1.202
+    assert np.ptp(led[opened], axis=0).max() < 1e-12
+    before = np.linalg.norm(led[1100] - led[0])
+    assert before > 0.02
+    handle = np.linalg.norm(log["leader_position"].values[1100])
+    assert before == pytest.approx(2.0 * handle, abs=5e-5)
+    np.testing.assert_array_equal(log["leader_force"].values[opened], 0.0)
+
+
+@pytest.mark.parametrize("coupling", ["position_force", "four_channel"])
+def test_other_couplings_lead_the_tool_too(coupling):
+    settings = region(coupling=coupling)
+    settings.teleoperation.channel.delay = 0.002
+    settings.teleoperation.channel.jitter = settings.teleoperation.channel.loss = 0.0
+    settings.teleoperation.tank.initial = 1.0
+    _, log = run(settings, 1.3)
+    assert log["y_t"].values[-1, 2] - log["y_t"].values[0, 2] < -0.02
+
+
+def test_what_leads_needs_a_tool_that_yields():
+    settings = shipped_scenario("vf_forbidden_region")
+    text = {"teleoperation": {}, "name": "x"}
+    with pytest.raises(InputError, match="teleoperation = given"):
+        load_typed(Scenario, text, "made up")
+    assert settings.teleoperation is None
+
+
+def test_somebody_holds_the_leader():
+    settings = region()
+    settings.hand = None
+    with pytest.raises(InputError, match="hand = null"):
+        build_station(settings, SCENARIOS)
+
+
+def test_tanks_hold_what_forces_take_in_a_tick():
+    settings = region()
+    settings.teleoperation.tank.initial = 0.05
+    with pytest.raises(InputError, match=r"teleoperation.tank.initial = 0.05"):
+        build_station(settings, SCENARIOS)
+
+
+def test_a_hand_may_be_a_little_beyond_the_ends_of_a_path():
+    settings = shipped_scenario("teleop_path")
+    settings.hand = HandParameters([HandWaypoint(0.0, [-0.4, 0, 0])], frame="manifold")
+    build_station(settings, SCENARIOS)
+    settings.hand = HandParameters([HandWaypoint(0.0, [-0.6, 0, 0])], frame="manifold")
+    with pytest.raises(InputError, match=r"hand.waypoints\[0\].position = \[-0.6"):
+        build_station(settings, SCENARIOS)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "key"),
+    [
+        ({"follower_force": 0.0}, "follower_force"),
+        ({"clutch": [ClutchParameters(1.0, 3.0), ClutchParameters(2.0, 4.0)]}, "clutch"),
+        ({"coupling": "wave"}, "waves"),
+    ],
+)
+def test_wrong_teleoperations_are_refused(wrong, key):
+    with pytest.raises(InputError, match=key):
+        TeleoperationParameters(**wrong)
+
+
+def test_a_robot_elsewhere_is_not_led_from_a_third_place():
+    with pytest.raises(InputError, match="teleoperation"):
+        driven(shipped_scenario("teleop_region"))

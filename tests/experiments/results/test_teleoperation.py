@@ -1,0 +1,129 @@
+"""Signals, metrics and audit of a tool that is led from afar, from a made-up log."""
+
+import numpy as np
+import pytest
+
+from diagrams.scenario.teleoperation import TeleoperationParameters
+from experiments.figures.all import draw_figures
+from experiments.results.run_log import RunLog
+from experiments.results.teleoperation import (
+    add_teleoperation,
+    energy_above_bound,
+    stored_in_channel,
+    tank_residual,
+    teleoperation_metrics,
+)
+from pfsc_drake.control.teleoperation.port import RECORD
+from tests.experiments.results.registry_names import names_about
+from tests.scenarios import shipped_scenario
+
+TIME = np.arange(2000) * 1e-3
+LATE = 120  # ticks
+FORCE, START = np.array([3.0, 0.0, 0.0]), np.array([0.5, 0.0, 1.0])
+
+
+def records(position, force, tank, sent, received):
+    parts = {
+        "force": force, "position": position, "tank": tank, "sent": sent,
+        "received": received, "share": np.ones(len(TIME)),
+    }  # fmt: skip
+    return np.column_stack([parts[name] for name in RECORD])
+
+
+@pytest.fixture(name="log")
+def fixture_log():
+    """The leader moves along x; the tool does so later; the leader's work is all sent."""
+    way = np.zeros((len(TIME), 3))
+    way[:, 0] = 0.1 * np.sin(0.7 * TIME) ** 2
+    late = np.vstack([np.zeros((LATE, 3)), way[:-LATE]])
+    force = np.tile(FORCE, (len(TIME), 1))
+    # against the hand: the tank gets it and sends it on
+    taken = np.concatenate([[0.0], np.cumsum(3.0 * np.diff(way[:, 0]))])
+    arrived = np.concatenate([np.zeros(LATE), taken[:-LATE]])
+    tank = np.full(len(TIME), 0.5)
+    raw = {
+        "leader_record": records(way, -force, tank, taken, np.zeros(len(TIME))),
+        "follower_record": records(late, 0 * force, tank + arrived, 0 * taken, arrived),
+        "leader_state": np.hstack([way, way]),
+        "leader_hand": np.hstack([force, force]),
+        "leader_motor": -force,
+        "led_point": way + START,
+    }
+    log = RunLog(TIME)
+    add_teleoperation(log, raw)
+    log.add("y_t", late + START)
+    return log
+
+
+@pytest.fixture(name="settings")
+def fixture_settings():
+    settings = shipped_scenario("teleop_region")
+    settings.teleoperation = TeleoperationParameters()
+    return settings
+
+
+def test_the_delay_is_found(log, settings):
+    metrics = teleoperation_metrics(log, settings)
+    assert metrics["following_delay"].value == pytest.approx(LATE * 1e-3)
+    assert metrics["following_error"].value == pytest.approx(0.0, abs=1e-12)
+    apart = abs(log["led_point"].values[-1, 0] - log["y_t"].values[-1, 0])
+    assert metrics["led_distance_end"].value == pytest.approx(apart)
+    assert metrics["largest_felt_force"].value == pytest.approx(3.0)
+
+
+def test_an_honest_log_passes_the_audit(log, settings):
+    metrics = teleoperation_metrics(log, settings)
+    assert metrics["audit_ports"].value < 1e-12
+    assert metrics["audit_channel"].value == 0.0
+    assert metrics["least_port_tank"].value == 0.5
+    assert metrics["energy_margin"].value == pytest.approx(1.0)
+
+
+def test_energy_from_nowhere_is_found(log, settings):
+    log["port_received"].values[1999:, 1] += 0.3
+    metrics = teleoperation_metrics(log, settings)
+    assert metrics["audit_ports"].value == pytest.approx(0.3)
+    assert metrics["audit_channel"].value > 0.2
+
+
+def test_a_full_tank_loses_what_does_not_fit(log):
+    capacity = 0.55
+    tank = log["port_tank"].values
+    tank[:, 1] = np.minimum(tank[:, 1], capacity)
+    assert tank_residual(log, capacity) < 1e-12
+    assert tank_residual(log, 1.0) > 1e-6
+
+
+def test_the_bound_counts_the_true_work_on_both_ends(log):
+    """A hand that is pushed back: 3 N over the way, twice where the scale says so."""
+    back = RunLog(TIME)
+    for name, signal in log.signals.items():
+        back.add(name, signal.values.copy(), signal.unit, signal.labels)
+    back["leader_hand"].values[:] *= -1.0
+    way = 0.1 * np.sin(0.7 * TIME) ** 2
+    np.testing.assert_allclose(energy_above_bound(back, 1.0), 1.0 - 3.0 * way, atol=1e-12)
+    np.testing.assert_allclose(energy_above_bound(back, 2.0), 1.0 - 6.0 * way, atol=1e-12)
+    back.add("wrench_ext", np.tile([0.0, 0.0, 2.0, 0.0, 0.0, 0.0], (len(TIME), 1)))
+    back.add("R_e", np.tile(np.eye(3).ravel(), (len(TIME), 1)))
+    back["y_t"].values[:, 2] = 1.0 + 0.05 * TIME
+    expected = 1.0 - 3.0 * way + 2.0 * 0.05 * TIME
+    np.testing.assert_allclose(energy_above_bound(back, 1.0), expected, atol=1e-12)
+
+
+def test_the_channel_stores_what_is_under_way(log):
+    stored = stored_in_channel(log)
+    way = 0.1 * np.sin(0.7 * TIME) ** 2
+    expected = 3.0 * (way[LATE:] - way[:-LATE])
+    np.testing.assert_allclose(stored[LATE:, 0], expected, atol=1e-12)
+    np.testing.assert_array_equal(stored[:, 1], 0.0)
+
+
+def test_metrics_are_those_of_the_registry(log, settings):
+    found = set(teleoperation_metrics(log, settings))
+    assert found == set(names_about(log, "port_force"))
+
+
+def test_its_figures_are_drawn(log):
+    log.add("eta", log["y_t"].values, "m")
+    names = [drawing.name for drawing in draw_figures(log, [])]
+    assert {"teleoperation", "port_energy"} <= set(names)
