@@ -269,7 +269,7 @@ def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
     slope, second = (run.points[:, run.layout.position].reshape(-1, 6, 3)[:, k] for k in (1, 2))
     speed = np.linalg.norm(slope, axis=1)
     curvature = np.linalg.norm(np.cross(slope, second), axis=1) / speed**3
-    assert speed.min() > 0.15 * parameters.spacing
+    assert speed.min() > 0.1 * parameters.spacing
     assert curvature.max() < 1.15 / parameters.least_radius
     # bends are gone through slowly
     across = curvature * run.eta[:, 1] ** 2
