@@ -205,7 +205,7 @@ class Growth:
             own = positions[s : s + degree + 1]
             way = own[-1] - own[0]
             forward = ca.vertcat(*[ca.dot(way, after - c) for c, after in pairwise(own)])
-            _, curvature, _ = ca.vertsplit(self._course.spline.shape(ca.vertcat(*own)))
+            curvature, _ = ca.vertsplit(self._course.spline.shape(ca.vertcat(*own)))
             regular = ca.mmin(forward) > least * ca.norm_2(way)
             good = ca.logic_and(good, ca.logic_and(regular, curvature < sharpest))
         return good
@@ -213,7 +213,7 @@ class Growth:
     def speed(self, shape: Any) -> Any:
         """Return the largest speed on a span [m/s], from what `UniformSpline.shape` tells."""
         limits = self._parameters
-        _, curvature, jerk = ca.vertsplit(shape)
+        curvature, jerk = ca.vertsplit(shape)
         bent = ca.sqrt(limits.normal_acceleration / ca.fmax(curvature, 1e-9))
         jerky = ca.fmax(limits.jerk / ca.fmax(jerk, 1e-9), 0.0) ** (1.0 / 3.0)
         return ca.fmin(limits.velocity, ca.fmin(bent, jerky))
