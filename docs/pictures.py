@@ -41,6 +41,8 @@ MOMENTS = {
     "pfc_compliant_6r": 2.8,
     "pfc_elbow_7r": 5.4,
     "pfc_two_arms": 1.9,
+    "pfc_new_path_6r": 3.0,
+    "pfc_stream_6r": 2.4,
     "plate_mounting": 9.5,
     "plate_return": 7.0,
     "sfc_comau_paraboloid": 7.2,

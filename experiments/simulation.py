@@ -11,6 +11,7 @@ from pydrake.systems.framework import Context
 from diagrams.scenario import SimulationParameters
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
+from diagrams.tasks.streaming import StreamTask
 from experiments.results.run_log import RunLog
 from reporting.progress import ProgressListener
 
@@ -127,6 +128,7 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
     states = np.hstack([log[name].values for name in names])
     finite = np.isfinite(states).all(axis=1) & np.isfinite(log["theta"].values[:, 0])
+    finite &= log["theta"].values[:, 0] >= _known_from(station, root)
     usable = np.flatnonzero(finite[1:] & finite[:-1]) + 1
     chosen = usable[:: max(1, len(usable) // _SAMPLES)]
     plant_states = [station.part.coordinates.plant_state(x) for x in states[chosen]]
@@ -146,6 +148,13 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
         controller.drive(blocks, root)
         elapsed.append(time.perf_counter() - begin)
     return np.array(elapsed)
+
+
+def _known_from(station: Station, root: Context) -> float:
+    """Return the parameter from which on the path is still known, of one whose way points came."""
+    if not isinstance(station.task, StreamTask):
+        return -np.inf
+    return float(station.blocks.output(root, "waypoint_intake.course")[0]) + 1.0
 
 
 def _sensor(station: Station, root: Context) -> Callable[[], object]:

@@ -131,6 +131,21 @@ def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.n
     return np.array(ticks), np.array(rows)
 
 
+def strokes(events: Sequence[Event]) -> list[np.ndarray]:
+    """Return lines through what was drawn [m], each (points, 3).
+
+    Args:
+        events: What a person did.
+    """
+    lines: list[list[np.ndarray]] = [[]]
+    for event in events:
+        if event.kind != WAY_POINT and lines[-1]:
+            lines.append([])
+        if event.kind != END:
+            lines[-1].append(event.pose[:POSITION])
+    return [np.array(line) for line in lines if len(line) > 1]
+
+
 def drawn_text(events: Sequence[Event], dimension: int) -> str:
     """Return what :func:`read_drawn` reads back, to the last bit.
 

@@ -12,7 +12,7 @@ from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 from diagrams.scenario import ControllerParameters, PathParameters, StartParameters, Streamed
 from diagrams.scenario.checks import require
 from diagrams.scenario.streamed import DrawnPlane
-from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, told_messages
+from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, strokes, told_messages
 from diagrams.tasks.surface import followed_angles
 from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -142,7 +142,7 @@ class StreamTask(Task):
     def _lines(self) -> list[np.ndarray]:
         """Return lines through the way points that will come, or the border of the plane [m]."""
         if self.plane is not None:
-            return [border(self.plane)]
+            return [border(self.plane), *strokes(self.drawn or [])]
         assert self.arrivals is not None
         rows = np.vstack([[*self.path.start, 0.0], self.arrivals.rows])
         breaks = np.flatnonzero(rows[:, -1] > 0.0)

@@ -33,10 +33,13 @@ def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> Drawing:
     output = output[np.all(np.isfinite(output), axis=1)]
     lines = [np.asarray(line, dtype=float).reshape(-1, 3) for line in outline]
     floor = _set_equal_scales(axes, np.vstack([*lines, output]))
-    if len(lines) == 1:
-        axes.plot(*lines[0][:, :2].T, floor, color="#D1D5DB", linewidth=1.0, zorder=1)
-        axes.plot(*lines[0].T, label="path $\\gamma$", zorder=2, **BROAD)
-    for i, line in enumerate(lines[1:] and lines):
+    comes = "way_left" in log  # its way points do
+    if len(lines) == 1 or comes:
+        for i, line in enumerate(lines):
+            axes.plot(*line[:, :2].T, floor, color="#D1D5DB", linewidth=1.0, zorder=1)
+            name = "way points" if comes else "path $\\gamma$"
+            axes.plot(*line.T, label=None if i else name, zorder=2, **BROAD)
+    for i, line in enumerate([] if comes else lines[1:] and lines):
         label = None if i else r"surface $\mathcal{S}$"
         axes.plot(*line.T, color=REFERENCE, linewidth=0.7, label=label, zorder=2)
     axes.plot(*output.T, color=COLOURS[0], linewidth=1.6, label="tool point $y_t$", zorder=3)
@@ -68,6 +71,11 @@ def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> Drawing:
     axes.set_ylabel("y in m", labelpad=8)
     axes.set_zlabel("z in m", labelpad=4)
     canvas.legend(loc="outside upper left", ncols=4, handlelength=1.6, columnspacing=1.4)
+    if comes:
+        caption = (
+            "Way points, joined by lines, their shadow on the floor, and the tool point's way."
+        )
+        return Drawing("path", "Way points and driven output", caption, canvas)
     if len(lines) > 1:
         caption = "The surface, by lines of its parameters, and the tool point's way."
         return Drawing("path", "Surface and driven output", caption, canvas)

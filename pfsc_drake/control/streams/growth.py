@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -11,10 +12,11 @@ from pfsc_drake.blocks.cases import where
 from pfsc_drake.control.streams.course import POSE, POSITION, Course, picked
 from pfsc_drake.control.streams.parameters import StreamParameters
 
-# of the spacing of way points, the least |sigma'| of a path that is regular
-_SLOWEST = 0.2
+# of the spacing of way points, by which every step of control points goes forward
+_FORWARD = 0.1
 # spans beyond the one in which a tool would rest that are not taken back
 _KEPT = 1
+_PLACES = 4  # at which a course may be cut
 
 Fields = dict[str, Any]
 
@@ -106,11 +108,8 @@ class Growth:
             newest: The last way point, which is its own control point.
             further: How many control points it would be beyond the last one.
         """
-        d, columns = self._course.dimension, self._course.columns
-        far, part = ca.fmax(further, 1.0), ca.DM(range(d))
-        middle, other = (
-            picked(known["points"], d * (columns - k * far) + part) for k in (1.0, 2.0)
-        )
+        columns, far = self._course.columns, ca.fmax(further, 1.0)
+        middle, other = (self._column(known, columns - k * far) for k in (1.0, 2.0))
         return where(further > 0.0, 2.0 * middle - other, newest)
 
     def begun(self, known: Fields, controls: Sequence[Any], eta: Any) -> Fields:
@@ -146,51 +145,75 @@ class Growth:
     def cut_back(self, known: Fields, stop: Any) -> tuple[Fields, Any, Any]:
         """Return a course without control points that a tool does not need to stop.
 
+        What is left can be ended: of the first few places from there on it is cut at the first one
+        at which the piece would end gently.
+
         Args:
             known: The course.
             stop: Arc length at which it can stop [m].
 
         Returns:
-            The course, what became of its control point after the last one, and how many have
-            gone; not less than one, or nothing has changed.
+            The course, its control point after the last one, and how many have gone; not less than
+            one, or nothing has changed.
         """
-        course, d = self._course, self._course.dimension
+        course, count = self._course, self._course.spline.degree + 1
         span = ca.sum1(known["eta"] <= stop) - 1.0
-        last = span + _KEPT + course.spline.degree
-        gone = ca.fmax(course.columns - 1.0 - last, 0.0)
-        columns = ca.fmax(ca.DM(range(course.columns)) - gone, 0.0)
-        which = ca.vec(
-            ca.repmat(d * columns.T, d, 1) + ca.repmat(ca.DM(range(d)), 1, len_(columns))
-        )
-        next_one = d * ca.fmin(last + 1.0, course.columns - 1.0) + ca.DM(range(d))
-        after = picked(known["points"], next_one)
+        first = span + _KEPT + course.spline.degree
+        last = ca.DM(course.columns - 1.0)
+        for place in reversed(range(_PLACES)):
+            ends = first + place
+            there = [self._column(known, ends + 1.0 - k) for k in reversed(range(count))]
+            gentle = self.admissible(self.ended_at(there, count - 1))
+            last = where(ca.logic_and(gentle, ends + 1.0 < course.columns), ends, last)
+        gone = course.columns - 1.0 - last
+        after = self._column(known, last + 1.0)
+
+        def kept(name: str, size: int, width: int = 1) -> Any:
+            rows = ca.fmax(ca.DM(range(size)) - gone, 0.0)
+            parts = ca.repmat(ca.DM(range(width)), 1, size)
+            return picked(known[name], ca.vec(ca.repmat(width * rows.T, width, 1) + parts))
+
         cut = known | {
             "first": known["first"] - gone,
-            "points": picked(known["points"], which),
-            "eta": picked(known["eta"], ca.fmax(ca.DM(range(course.spans + 1)) - gone, 0.0)),
-            "speed": picked(known["speed"], ca.fmax(ca.DM(range(course.spans)) - gone, 0.0)),
+            "points": kept("points", course.columns, course.dimension),
+            "eta": kept("eta", course.spans + 1),
+            "speed": kept("speed", course.spans),
         }
         return cut, after, gone
 
+    def _column(self, known: Fields, number: Any) -> Any:
+        """Return the control point in a column, the last one from beyond, shape (d,)."""
+        d, inside = self._course.dimension, ca.fmin(number, self._course.columns - 1.0)
+        return picked(known["points"], d * inside + ca.DM(range(d)))
+
     def admissible(self, controls: Sequence[Any]) -> Any:
         """Return whether all spans on control points are regular and bend gently enough.
+
+        ``sigma'`` on a span is a mean of the p steps between its control points, with weights that
+        are positive. It is regular if all steps go forward in one direction, which here is that
+        from the first control point to the last one: then ``|sigma'|`` is not less than the
+        smallest of their components along it.
 
         Args:
             controls: Control points, one after the other, each of shape (d,).
         """
         degree, good = self._course.spline.degree, ca.DM(1.0)
         sharpest = 1.0 / self._parameters.least_radius
-        for s in range(len(controls) - degree):
-            own = ca.vertcat(*[c[:POSITION] for c in controls[s : s + degree + 1]])
-            slowest, curvature, _ = ca.vertsplit(self._course.spline.shape(own))
-            regular = slowest > _SLOWEST * self._parameters.spacing
+        least = _FORWARD * self._parameters.spacing
+        positions = [c[:POSITION] for c in controls]
+        for s in range(len(positions) - degree):
+            own = positions[s : s + degree + 1]
+            way = own[-1] - own[0]
+            forward = ca.vertcat(*[ca.dot(way, after - c) for c, after in pairwise(own)])
+            curvature, _ = ca.vertsplit(self._course.spline.shape(ca.vertcat(*own)))
+            regular = ca.mmin(forward) > least * ca.norm_2(way)
             good = ca.logic_and(good, ca.logic_and(regular, curvature < sharpest))
         return good
 
     def speed(self, shape: Any) -> Any:
         """Return the largest speed on a span [m/s], from what `UniformSpline.shape` tells."""
         limits = self._parameters
-        _, curvature, jerk = ca.vertsplit(shape)
+        curvature, jerk = ca.vertsplit(shape)
         bent = ca.sqrt(limits.normal_acceleration / ca.fmax(curvature, 1e-9))
         jerky = ca.fmax(limits.jerk / ca.fmax(jerk, 1e-9), 0.0) ** (1.0 / 3.0)
         return ca.fmin(limits.velocity, ca.fmin(bent, jerky))
@@ -233,11 +256,6 @@ class Growth:
         return ca.vertsplit(
             known["points"][-self._course.dimension * count :], self._course.dimension
         )
-
-
-def len_(column: Any) -> int:
-    """Return the length of a column."""
-    return int(column.size1())
 
 
 def chosen(condition: Any, fields: Fields, otherwise: Fields) -> Fields:

@@ -102,19 +102,18 @@ class UniformSpline:
 
     @cached_property
     def shape(self) -> ca.Function:
-        """``points -> [slowest, curvature, jerk]`` of a span, of points (3 (p + 1),).
+        """``points -> [curvature, jerk]`` of a span, of points (3 (p + 1),).
 
-        The smallest ``|sigma'|``, the largest curvature [1/m], and the largest third derivative by
-        the arc length, ``|sigma'''| / |sigma'|^3`` [1/m^2], of several places of the span.
+        The largest curvature [1/m], and the largest third derivative by theta over the third power
+        of the first one [1/m^2], of several places of the span.
         """
         points = ca.SX.sym("points", 3 * (self.degree + 1))
         columns = ca.reshape(points, 3, self.degree + 1)
-        slowest, curvature, jerk = ca.SX(math.inf), ca.SX(0.0), ca.SX(0.0)
+        curvature, jerk = ca.SX(0.0), ca.SX(0.0)
         for u in np.linspace(0.0, 1.0, _BENDS):
             _, slope, bend, third = self.derivatives(columns, ca.SX(u), 3)
             speed = ca.norm_2(slope)
-            slowest = ca.fmin(slowest, speed)
             curvature = ca.fmax(curvature, ca.norm_2(ca.cross(slope, bend)) / speed**3)
             jerk = ca.fmax(jerk, ca.norm_2(third) / speed**3)
-        found = ca.vertcat(slowest, curvature, jerk)
+        found = ca.vertcat(curvature, jerk)
         return ca.Function("span_shape", [points], [found], {"cse": True})

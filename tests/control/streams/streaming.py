@@ -95,6 +95,7 @@ class Stream:
 
     def run(self, message, ticks, keep=50):
         """Return what was told; ``message(tick, stream) -> message``."""
+        self.stepper.states, self.stepper.tick = None, 0
         rows = {name: [] for name in ("manifold_point", "reference", "goal", "stream", "overrun")}
         pieces, courses, stream = [], [], np.zeros(4)
         for k in range(ticks):
@@ -117,6 +118,17 @@ class Stream:
             self.course,
             courses,
         )
+
+
+_MADE = {}
+
+
+def make_stream(parameters, start, **options):
+    """Return a stream; made once of the same content."""
+    key = repr((parameters, np.asarray(start).tolist(), options))
+    if key not in _MADE:
+        _MADE[key] = Stream(parameters, start, **options)
+    return _MADE[key]
 
 
 def sent_at(layout, waypoints, times, new=(), end=True, heard=False):
