@@ -21,7 +21,7 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 
 # s, between the knots of a pace: at first, and at last unless a motion has more; of one move
 _COARSE, _FINE, _KNOTS = 16e-3, 4e-3, 1000
-_FEWEST, _MOST = 24, 1500
+_FEWEST, _MOST = 24, 4000
 # samples of an interval: where limits are kept, and where that is checked
 _SAMPLES, _CHECKED = 6, 12
 # of a limit, below which it is not looked at where a motion is made faster for the last time
@@ -57,22 +57,25 @@ class FastestPlanner(MotionDemand):
     """Plans the fastest motion of one robot along what one task follows."""
 
     @once_per_content()
-    def plan(self) -> DrivePlan:
+    def plan(self, finer: int = 1) -> DrivePlan:
         """Return the plan of the fastest motion.
+
+        Args:
+            finer: By how much finer the grid is to be than what is worth the time.
 
         Raises:
             InputError: If there is none.
         """
         try:
-            return self._plan()
+            return self._plan(finer)
         except InputError as error:
             raise InputError(f"reference.speed: fastest: {error}") from None
 
-    def _plan(self) -> DrivePlan:
+    def _plan(self, finer: int) -> DrivePlan:
         moves = self._first(straight_moves(self._task.motion, self.demand.derivatives + 1))
         tight = [np.ones((2, 2))] * len(moves)
         moves = self._faster(moves, _COARSE, tight, 0.0)
-        fine = max(_FINE, sum(move.duration for move in moves) / _KNOTS)
+        fine = max(_FINE, sum(move.duration for move in moves) / _KNOTS) / finer
         moves = self._faster(moves, fine, tight, _WATCHED)
         checked = self._check(moves)
         for _ in range(_CORRECTIONS):
