@@ -119,7 +119,14 @@ def build_station(
     )
     begun = CourseStart(rest().q_J, start.place)
     keep_drive_limits(
-        scenario.reference, scenario.controller, scenario.duration, task, law, begun, friction
+        scenario.reference,
+        scenario.controller,
+        scenario.duration,
+        task,
+        law,
+        begun,
+        friction,
+        progress,
     )
 
     true_state = part.joint_state(builder)

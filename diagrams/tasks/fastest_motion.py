@@ -18,6 +18,7 @@ from pfsc_drake.control.planning.pace_spline import PaceSpline
 from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry.progress import Progress
 
 # s, between the knots of a pace: at first, and at last unless a motion has more; of one move
 _COARSE, _FINE, _KNOTS = 16e-3, 4e-3, 1000
@@ -53,32 +54,51 @@ class _Checked:
     limiting: Limiting
 
 
+@dataclass(frozen=True)
+class _Listener:
+    """Whoever is told how far planning is, which changes nothing of it."""
+
+    progress: Progress | None
+
+    def __content__(self) -> object:
+        return None
+
+    def __call__(self, fraction: float) -> None:
+        if self.progress is not None:
+            self.progress(fraction, "planning the fastest motion")
+
+
 class FastestPlanner(MotionDemand):
     """Plans the fastest motion of one robot along what one task follows."""
 
-    @once_per_content()
-    def plan(self, finer: int = 1) -> DrivePlan:
+    def plan(self, finer: int = 1, progress: Progress | None = None) -> DrivePlan:
         """Return the plan of the fastest motion.
 
         Args:
             finer: By how much finer the grid is to be than what is worth the time.
+            progress: Told the fraction done and what is done.
 
         Raises:
             InputError: If there is none.
         """
         try:
-            return self._plan(finer)
+            return self._plan(finer, _Listener(progress))
         except InputError as error:
             raise InputError(f"reference.speed: fastest: {error}") from None
 
-    def _plan(self, finer: int) -> DrivePlan:
+    @once_per_content()
+    def _plan(self, finer: int, tell: _Listener) -> DrivePlan:
+        tell(0.0)
         moves = self._first(straight_moves(self._task.motion, self.demand.derivatives + 1))
         tight = [np.ones((2, 2))] * len(moves)
+        tell(0.05)
         moves = self._faster(moves, _COARSE, tight, 0.0)
+        tell(0.25)
         fine = max(_FINE, sum(move.duration for move in moves) / _KNOTS) / finer
         moves = self._faster(moves, fine, tight, _WATCHED)
         checked = self._check(moves)
-        for _ in range(_CORRECTIONS):
+        for k in range(_CORRECTIONS):
+            tell(0.6 + 0.1 * k)
             if checked.limiting.largest.max() <= 1.0 + _MISSED:
                 break
             tight = self._tightened(tight, moves, checked)
