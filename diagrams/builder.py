@@ -132,9 +132,8 @@ def build_station(
     )
     if held is None:
         begun = CourseStart(rest().q_J, start.place)
-        keep_drive_limits(
-            scenario.reference, scenario.controller, scenario.duration, task, law, begun, friction
-        )
+        chosen = scenario.reference, scenario.controller, scenario.duration
+        keep_drive_limits(*chosen, task, law, begun, friction, progress)
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation

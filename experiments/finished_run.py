@@ -26,6 +26,7 @@ from experiments.results.drives import (
     plan_metrics,
     saturation_warnings,
 )
+from experiments.results.fastest import given_metrics
 from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
 from experiments.results.holder import holder_metrics
@@ -236,6 +237,7 @@ def _measure(
     metrics.update(found_links_metrics(log))
     metrics.update(link_metrics(log))
     metrics.update(plan_metrics(station.task.drive_plan))
+    metrics.update(given_metrics(log))
     metrics.update(posture_metrics(log, station.task.lap))
     metrics.add("real_time_factor", result.real_time_factor)
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)

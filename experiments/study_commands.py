@@ -38,6 +38,7 @@ _STUDIES = {
     "joint_sides": "elastic joints of which both sides, torques, or motors alone are measured",
     "fixture_rules": "printed rules of forbidden regions against the program at an acute edge",
     "teleoperation": "couplings of leader and follower over a channel: felt, stable, passive",
+    "fastest": "the fastest motion on ten paths, and how near it is to the best",
     "peers": "path following beside impedance control and Toppra",
     IDENTIFICATION: "from robots to their models and back",
     TEACH_IN: "a path taught by hand, and followed",
@@ -64,6 +65,7 @@ def study_command(
     if name not in _STUDIES:
         allowed = ", ".join(_STUDIES)
         raise InputError(f"study {shortened(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
+    from experiments.studies.fastest import write_fastest
     from experiments.studies.fixture_rules import write_fixture_rules
     from experiments.studies.identify import write_identification
     from experiments.studies.joint_sides import write_joint_sides
@@ -81,6 +83,7 @@ def study_command(
         "joint_sides": write_joint_sides,
         "fixture_rules": write_fixture_rules,
         "teleoperation": write_teleoperation,
+        "fastest": write_fastest,
         "peers": write_peers,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,

@@ -22,6 +22,7 @@ from pfsc_drake.control.planning.drive_demand import Clock, find_pace, with_pace
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry.progress import Progress
 
 # s, between the samples of a course: at a glance, while it is checked, and while it is slowed
 _GLANCED, _CHECKED, _SLOWED, _FINEST = 16e-3, 4e-3, 1e-3, 2.5e-4
@@ -47,6 +48,7 @@ def keep_drive_limits(
     law: FollowingLaw,
     start: CourseStart,
     friction: tuple[np.ndarray, np.ndarray] | None,
+    progress: Progress | None = None,
 ) -> None:
     """Give a task its plan, and the reference that the drives can follow, unless it has them.
 
@@ -62,6 +64,10 @@ def keep_drive_limits(
         start: Where the robot starts, near the first place of the reference.
         friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
             are believed.
+        progress: Told the fraction done and what is done, where that takes its time.
+
+    Raises:
+        InputError: If the fastest motion is asked for, and there is none.
     """
     fastest = reference.speed == "fastest"
     along = indices(task.place.coordinates, Kind.TANGENTIAL)
@@ -73,7 +79,7 @@ def keep_drive_limits(
         return
     if fastest:
         known = reference, controller, task, law, start, friction
-        task.drive_plan = FastestPlanner(*known).plan()
+        task.drive_plan = FastestPlanner(*known).plan(progress=progress)
     elif task.motion.domain[1] <= _LONGEST:
         planner = _Planner(reference, controller, duration, task, law, start, friction)
         task.drive_plan = planner.plan()

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import maximum_filter1d
 
 from diagrams.tasks.motion_demand import MotionDemand
@@ -14,20 +14,19 @@ from pfsc_drake.control.planning.drive_demand import find_pace
 from pfsc_drake.control.planning.fastest_pace import PaceLimits, find_fastest_pace
 from pfsc_drake.control.planning.limiting import Limiting
 from pfsc_drake.control.planning.moves import Move, one_after_another, straight_moves
-from pfsc_drake.control.planning.pace_spline import PaceSpline, knots_of
+from pfsc_drake.control.planning.pace_spline import PaceSpline
 from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry.progress import Progress
 
 # s, between the knots of a pace: at first, and at last unless a motion has more; of one move
 _COARSE, _FINE, _KNOTS = 16e-3, 4e-3, 1000
-_FEWEST, _MOST = 24, 1500
+_FEWEST, _MOST = 24, 4000
 # samples of an interval: where limits are kept, and where that is checked
 _SAMPLES, _CHECKED = 6, 12
 # of a limit, below which it is not looked at where a motion is made faster for the last time
 _WATCHED = 0.7
-# s, of the pieces of a motion
-_PIECE = 2e-3
 # samples of a move of which nothing is known yet, and of its smallest radius between them
 _FIRST_SAMPLES, _OF_RADIUS = (400, 20_000), 1.0 / 6.0
 # even paces that are tried for it, and how far the fastest may be from the slowest
@@ -55,29 +54,51 @@ class _Checked:
     limiting: Limiting
 
 
+@dataclass(frozen=True)
+class _Listener:
+    """Whoever is told how far planning is, which changes nothing of it."""
+
+    progress: Progress | None
+
+    def __content__(self) -> object:
+        return None
+
+    def __call__(self, fraction: float) -> None:
+        if self.progress is not None:
+            self.progress(fraction, "planning the fastest motion")
+
+
 class FastestPlanner(MotionDemand):
     """Plans the fastest motion of one robot along what one task follows."""
 
-    @once_per_content()
-    def plan(self) -> DrivePlan:
+    def plan(self, finer: int = 1, progress: Progress | None = None) -> DrivePlan:
         """Return the plan of the fastest motion.
+
+        Args:
+            finer: By how much finer the grid is to be than what is worth the time.
+            progress: Told the fraction done and what is done.
 
         Raises:
             InputError: If there is none.
         """
         try:
-            return self._plan()
+            return self._plan(finer, _Listener(progress))
         except InputError as error:
             raise InputError(f"reference.speed: fastest: {error}") from None
 
-    def _plan(self) -> DrivePlan:
+    @once_per_content()
+    def _plan(self, finer: int, tell: _Listener) -> DrivePlan:
+        tell(0.0)
         moves = self._first(straight_moves(self._task.motion, self.demand.derivatives + 1))
         tight = [np.ones((2, 2))] * len(moves)
+        tell(0.05)
         moves = self._faster(moves, _COARSE, tight, 0.0)
-        fine = max(_FINE, sum(move.duration for move in moves) / _KNOTS)
+        tell(0.25)
+        fine = max(_FINE, sum(move.duration for move in moves) / _KNOTS) / finer
         moves = self._faster(moves, fine, tight, _WATCHED)
         checked = self._check(moves)
-        for _ in range(_CORRECTIONS):
+        for k in range(_CORRECTIONS):
+            tell(0.6 + 0.1 * k)
             if checked.limiting.largest.max() <= 1.0 + _MISSED:
                 break
             tight = self._tightened(tight, moves, checked)
@@ -135,14 +156,10 @@ class FastestPlanner(MotionDemand):
             ).rates[:, 0]
         except InputError:
             pace = np.full(len(course), 0.9 * slowest / fast)
-        degree = order + 1
         time = float(np.sum(step / pace))
         intervals = int(np.clip(min(time / _COARSE, len(course) / 4), _FEWEST, _MOST))
-        knots = knots_of(duration, intervals, degree)
-        places = np.linspace(0.0, duration, len(pace))
-        fitted = make_lsq_spline(places, pace, knots, degree).c
-        floor = 0.5 * pace.min()
-        return move.at_pace(PaceSpline(duration, np.maximum(fitted, floor), degree), order, _PIECE)
+        fitted = PaceSpline.through(duration, pace, intervals, order + 1)
+        return move.at_pace(fitted, order, _COARSE / 2.0)
 
     def _even_paces(self, course: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         """Return the largest even pace below which everything is allowed, shape (samples,)."""
@@ -212,7 +229,7 @@ class FastestPlanner(MotionDemand):
             1.0 / np.maximum(speed, _STILL),
         )
         found = find_fastest_pace(polynomial, theta, limits, intervals, degree, watched)
-        return move.at_pace(found.pace, self.demand.derivatives, _PIECE)
+        return move.at_pace(found.pace, self.demand.derivatives, spacing / 2.0)
 
     def _check(self, moves: list[Move]) -> _Checked:
         """Return what the moves ask for, between the samples that they were planned on."""

@@ -37,3 +37,20 @@ def fastest_metrics(plan: DrivePlan) -> Metrics:
     for name, part in limiting.of_the_way(plan.speed * steps).items():
         metrics.add(f"limited_by_{name}", part)
     return metrics
+
+
+def given_metrics(log: RunLog) -> Metrics:
+    """Return what drives gave for the fastest motion, to be compared with what was planned.
+
+    Args:
+        log: Log of a run.
+    """
+    metrics = Metrics()
+    if "speed_planned" not in log or "tau_d" not in log:
+        return metrics
+    torque = log["tau_d"]
+    if torque.limits is not None and len(torque.values):
+        share = np.max(np.abs(torque.values) / torque.limits, axis=1)
+        k = int(share.argmax())
+        metrics.add("given_torque_share", float(share[k]), source=f"at t = {log.time[k]:.3f} s")
+    return metrics

@@ -3,12 +3,14 @@
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_lsq_spline
 
 from pfsc_drake.control.planning.drive_demand import with_pace
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.hermite import hermite_curve
 
+# of the least value that is fitted, what the least coefficient is
+_LEAST = 0.5
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
@@ -65,6 +67,20 @@ class PaceSpline:
         half = (theta - knots[i]) / 2.0
         slowness = 1.0 / self._derivatives[0]((knots[i] + half)[:, None] + half[:, None] * _NODES)
         return times[i] + half * (slowness @ _WEIGHTS)
+
+    @classmethod
+    def through(cls, end: float, values: np.ndarray, intervals: int, degree: int) -> "PaceSpline":
+        """Return the pace next to values on an even grid from 0 to the end.
+
+        Args:
+            end: Where theta ends [s].
+            values: The values, positive, shape (samples,).
+            intervals: Number of intervals of the spline, fewer than samples.
+            degree: Its degree.
+        """
+        places = np.linspace(0.0, end, len(values))
+        fitted = make_lsq_spline(places, values, knots_of(end, intervals, degree), degree).c
+        return cls(end, np.maximum(fitted, _LEAST * values.min()), degree)
 
     def applied_to(
         self, motion: PiecewisePolynomialCurve, order: int, longest: float

@@ -1,0 +1,241 @@
+"""The fastest motion on ten paths: against motions that are slowed down, and a finer grid."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure as Canvas
+
+from diagrams.builder import build_station, find_rest
+from diagrams.scenario import Scenario
+from diagrams.station import Station
+from diagrams.station_parts import make_task
+from diagrams.tasks.fastest_motion import FastestPlanner
+from diagrams.tasks.task import DrivePlan
+from experiments.scenario_file import find_scenario, read_scenario
+from experiments.studies.study_page import write_study_page
+from experiments.sweep.many import run_side_by_side
+from experiments.sweep.worker import RunRow
+from pfsc_drake.control.planning.course import CourseStart
+from pfsc_drake.geometry import FourierCurve
+from pfsc_drake.yaml.typed import load_typed
+from reporting.folder import open_results
+from reporting.metrics import Metrics
+from reporting.page import Report
+from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
+
+_LEMNISCATE = "pfc_elastic_6r"
+# the lemniscate bent at random: seeds, and how far its waypoints are moved [m]
+_SEEDS, _BENT, _WAYPOINTS = (1, 2, 3), 0.06, 14
+PATHS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "lemniscate, six elastic axes": (_LEMNISCATE, ("reference.points=[0.96, 0.31, 1.99]",)),
+    "tilted circle, seven elastic axes": ("pfc_elastic_7r", ("reference.points=[0.0, 1.25]",)),
+    "circle, seven rigid axes": ("pfc_panda_7r", ("reference.points=[0.0, 1.0]",)),
+    "lemniscate, visco-elastic": ("pfc_viscoelastic_3r", ()),
+    "DELTA": ("pfc_delta", ()),
+    "SCARA": ("pfc_scara_4r", ()),
+    "line on a surface": ("pfc_on_surface_6r", ()),
+}
+# on the path from the start, and nothing but the motion to be told of
+_COMMON = (
+    *("reference.speed=fastest", "reference.velocity=null", "reference.dwell=0.2"),
+    *("start.offset=[0, 0]", "start.rotation_deg=[0, 0, 0]", "start.transition=0", "targets={}"),
+)
+_ROBOTS: Mapping[str, tuple[str, ...]] = {
+    "as believed": ("encoders={}", "friction={}", "model_error={}", "driver={}"),
+    "masses believed 5 % too low": (
+        *("encoders={}", "friction={}", "driver={}"),
+        "model_error={mass: 0.95}",
+    ),
+}
+# what a motion that is slowed down was asked for [m/s, m/s^2]
+_ASKED = ((0.5, 5.0), (1.0, 10.0), (2.0, 20.0), (4.0, 40.0))
+_FINER = 4
+_DESCRIPTION = (
+    "Paths of shipped scenarios and the lemniscate bent at random, gone along from rest to rest in "
+    "the least time that 70 % of the believed drives' torques and of their rates allow. Beside "
+    "it: the shortest of the motions that are slowed down where they do not fit, asked for at "
+    "0.5 to 4 m/s, which know no rates; the fastest when rates are left alone; and the fastest on "
+    "a grid four times as fine. Then the closed loop: distance from the path, and the largest "
+    "torque by what was allowed, on the robot that is believed and on one that is heavier."
+)
+
+
+@dataclass(frozen=True)
+class Times:
+    """How long motions along one path take [s].
+
+    Attributes:
+        fastest: The fastest.
+        any_rate: The fastest if rates of torques are not limited.
+        finer: The fastest on a finer grid.
+        slowed: The shortest that is slowed down where it does not fit.
+        preparation: What planning the fastest took [s].
+    """
+
+    fastest: float
+    any_rate: float
+    finer: float
+    slowed: float
+    preparation: float
+
+
+def write_fastest(out: Path, progress: Callable[[str], None]) -> Report:
+    """Plan and run the fastest motion along ten paths, and write a page.
+
+    Args:
+        out: Folder for the page.
+        progress: Told one line for each path and run.
+
+    Returns:
+        The page.
+
+    Raises:
+        InputError: If ``out`` cannot take the page (see
+            :func:`reporting.folder.open_results`); nothing has been run then.
+    """
+    with open_results(out, "study") as results, TemporaryDirectory() as folder:
+        paths = {**PATHS, **_random_paths(Path(folder))}
+        times = {}
+        for name, (scenario, overrides) in paths.items():
+            times[name] = found = _times(scenario, overrides)
+            progress(
+                f"{name:34s} {found.fastest:6.3f} s, slowed {found.slowed:6.3f} s, "
+                f"finer {found.finer:6.3f} s, planned in {found.preparation:4.1f} s"
+            )
+        cases = {
+            (name, robot): read_scenario(scenario, [*_COMMON, *overrides, *changes])
+            for name, (scenario, overrides) in paths.items()
+            for robot, changes in _ROBOTS.items()
+        }
+        rows = run_side_by_side(cases, lambda case, row: progress(_said(case, row)))
+        return write_study_page(
+            results,
+            title="As fast as the drives allow",
+            description=_DESCRIPTION,
+            overrides=[" ".join(_COMMON), *(" ".join(changes) for changes in _ROBOTS.values())],
+            metrics=_metrics(times, rows),
+            figures=[_picture(times)],
+        )
+
+
+def _random_paths(folder: Path) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Return the lemniscate bent at random."""
+    curve = FourierCurve.bent_lemniscate()
+    found: dict[str, tuple[str, tuple[str, ...]]] = {}
+    theta = np.linspace(*curve.domain, _WAYPOINTS + 1)[:-1]
+    for seed in _SEEDS:
+        moved = np.random.default_rng(seed).uniform(-_BENT, _BENT, (_WAYPOINTS, 3))
+        file = folder / f"bent_{seed}.csv"
+        points = curve.derivatives(theta, 0)[:, 0] + moved
+        np.savetxt(file, points, delimiter=",", header="x,y,z", comments="")
+        shape = f"path.shape=!Waypoints {{file: {file}, closed: true}}"
+        found[f"lemniscate bent at random, {seed}"] = (
+            _LEMNISCATE,
+            (shape, "reference.points=[0.2, 1.4]"),
+        )
+    return found
+
+
+def _times(scenario: str, overrides: tuple[str, ...]) -> Times:
+    """Return how long motions along a path take."""
+    begin = time.perf_counter()
+    settings, station = _built(scenario, *overrides)
+    preparation = time.perf_counter() - begin
+    finer = _planner(settings, station, find_scenario(scenario).parent).plan(_FINER)
+    any_rate = _built(scenario, *overrides, "reference.torque_rate=.inf")[1]
+    slowed = [
+        _built(
+            scenario,
+            *overrides,
+            "reference.speed=asked",
+            f"reference.velocity={velocity}",
+            f"reference.acceleration={acceleration}",
+        )[1]
+        for velocity, acceleration in _ASKED
+    ]
+    # one that could not be planned is as it was asked for
+    planned = [_moving(one.task.drive_plan) for one in slowed if _fits(one.task.drive_plan)]
+    return Times(
+        _moving(station.task.drive_plan),
+        _moving(any_rate.task.drive_plan),
+        _moving(finer),
+        min(planned, default=np.nan),
+        preparation,
+    )
+
+
+def _built(scenario: str, *overrides: str) -> tuple[Scenario, Station]:
+    """Return the settings of a scenario, and its station."""
+    found = read_scenario(scenario, [*_COMMON, *overrides, *_ROBOTS["as believed"]])
+    settings = load_typed(Scenario, found.data, str(found.path))
+    return settings, build_station(settings, found.path.parent)
+
+
+def _planner(settings: Scenario, station: Station, folder: Path) -> FastestPlanner:
+    """Return what plans the motion of a station anew."""
+    task = make_task(settings, folder)
+    rest = find_rest(task, station.part, station.start, station.initial_state)
+    start = CourseStart(rest.q_J, station.start.place)
+    return FastestPlanner(settings.reference, settings.controller, task, station.law, start, None)
+
+
+def _moving(plan: DrivePlan | None) -> float:
+    """Return how long a planned reference moves [s]."""
+    assert plan is not None  # no hand leads here
+    times = plan.times
+    moves = np.abs(plan.motion.derivatives(times, 1)[:, 1]).max(axis=1) > 0.0
+    return float(np.diff(times, append=times[-1])[moves].sum())
+
+
+def _fits(plan: DrivePlan | None) -> bool:
+    """Return whether the drives can follow a plan."""
+    assert plan is not None  # no hand leads here
+    return len(plan.times) > 0 and (plan.is_slowed or not plan.said)
+
+
+def _said(case: tuple[str, str], row: RunRow) -> str:
+    result = row.reason or f"{row.value('max_path_deviation') * 1e6:8.1f} um"
+    return f"{case[0]:34s} {case[1]:30s} {result}"
+
+
+def _metrics(times: Mapping[str, Times], rows: Mapping[tuple[str, str], RunRow]) -> Metrics:
+    metrics = Metrics()
+    for name, found in times.items():
+        metrics.add(f"{name}: time", found.fastest, "s")
+        metrics.add(f"{name}: time, rates left alone", found.any_rate, "s")
+        metrics.add(f"{name}: time, slowed", found.slowed, "s")
+        metrics.add(f"{name}: time, finer grid", found.finer, "s")
+        metrics.add(f"{name}: preparation", found.preparation, "s")
+    for (name, robot), row in rows.items():
+        key, source = f"{name}, {robot}", row.reason or None
+        metrics.add(f"{key}: deviation", row.value("max_path_deviation"), "m", source=source)
+        metrics.add(f"{key}: torque by limit", row.value("given_torque_share"), source=source)
+    return metrics
+
+
+def _picture(times: Mapping[str, Times]) -> Figure:
+    with plt.rc_context(STYLE):
+        canvas = Canvas(figsize=(WIDTH, 5.0))
+        panel = canvas.subplots()
+        places = np.arange(len(times))[::-1].astype(float)
+        columns = {
+            "slowed down where it does not fit": "slowed",
+            "fastest": "fastest",
+            "fastest, grid four times as fine": "finer",
+            "fastest, rates of torques left alone": "any_rate",
+        }
+        for k, (label, key) in enumerate(columns.items()):
+            values = [getattr(found, key) for found in times.values()]
+            at = places + 0.2 * (1.5 - k)
+            panel.barh(at, values, height=0.18, color=COLOURS[k], label=label)
+        panel.set_yticks(places, list(times))
+        panel.set(xlabel="time from rest to rest in s")
+        handles, labels = panel.get_legend_handles_labels()
+        canvas.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+        caption = "Time of all moves together, at 70 % of the drives' torques."
+        return render(Drawing("fastest", "Times of motions along ten paths", caption, canvas))
