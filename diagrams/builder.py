@@ -41,10 +41,12 @@ from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_parts import add_payload
+from diagrams.surroundings.obstacles import add_obstacles
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.waiting import plan_waiting
 from diagrams.warnings.law_warnings import MODES
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
@@ -121,6 +123,11 @@ def build_station(
     keep_drive_limits(
         scenario.reference, scenario.controller, scenario.duration, task, law, begun, friction
     )
+    crossing = scenario.obstacles
+    if crossing is not None:
+        chosen = scenario.reference, scenario.controller
+        waiting = plan_waiting(crossing, *chosen, task, law, begun, friction)
+        following = replace(following, waiting=waiting)
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation
@@ -145,7 +152,10 @@ def build_station(
     )
     joint_state = links.joint_state
     override = part.override.get_output_port() if isinstance(part, RemoteArm) else None
-    place = add_place(builder, following, joint_state, override)
+    obstacles = {} if crossing is None else add_obstacles(builder, crossing, period)
+    place = add_place(
+        builder, following, joint_state, override, obstacles.get("obstacles_measured")
+    )
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
@@ -165,7 +175,7 @@ def build_station(
             forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
     requests = {} if operator is None else operator.requests
     controller, made = add_law(builder, following, place, forces | requests)
-    signals = place.signals | forces | made | links.signals
+    signals = place.signals | obstacles | forces | made | links.signals
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     if links.drive_torque is not None:
         builder.Connect(drive["drive"], links.drive_torque)

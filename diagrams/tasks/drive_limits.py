@@ -73,11 +73,11 @@ def keep_drive_limits(
     led = isinstance(task, SpaceTask) or law.stabilization.is_free[along].any()
     if task.drive_plan is not None or led or task.motion.domain[1] > _LONGEST:
         return
-    task.drive_plan = _Planner(reference, controller, duration, task, law, start, friction).plan()
+    task.drive_plan = DrivePlanner(reference, controller, duration, task, law, start, friction).plan()
     task.motion = task.drive_plan.motion
 
 
-class _Planner:
+class DrivePlanner:
     """Plans one reference of one robot."""
 
     def __init__(
@@ -174,10 +174,18 @@ class _Planner:
         step = min(max(bend, min(_FINEST, longest)), ramp, longest)
         return max(float(step), self._task.motion.domain[1] / _MOST)
 
-    def allowed(self, course: np.ndarray) -> np.ndarray:
-        """Return what may be asked of the drives, (samples, 2N)."""
+    def allowed(self, course: np.ndarray, reserve: float | None = None) -> np.ndarray:
+        """Return what may be asked of the drives, (samples, 2N).
+
+        Args:
+            course: The course, see :meth:`course`.
+            reserve: Share of the torques that is left; that of the reference by default.
+        """
         at_rest = self.demand.of(with_pace(course, np.zeros((len(course), 4))))
-        return allowed_demand(at_rest, self.limits, self._reserve)
+        left = self._reserve.copy()
+        if reserve is not None:
+            left[: self.robot.dimension] = reserve
+        return allowed_demand(at_rest, self.limits, left)
 
     def fits(self, course: np.ndarray, share: float) -> bool:
         """Return whether a course asks for no more than a share of what it may."""

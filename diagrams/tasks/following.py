@@ -9,6 +9,7 @@ from diagrams.robots.belief import believed_robot
 from diagrams.scenario.checks import require
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
+from diagrams.tasks.waiting import Waiting, add_waiting_reference
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.swing import Swing, SwingingManifold, SwingingReference
@@ -69,6 +70,7 @@ class Following:
         start: Joint coordinates at the start, shape (N,).
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
+        waiting: How its progress waits for obstacles, if it does.
     """
 
     options: FollowingOptions
@@ -78,6 +80,7 @@ class Following:
     start: np.ndarray
     on_motors: bool = False
     friction: Coefficients | None = None
+    waiting: Waiting | None = None
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,8 @@ class ToolOnManifold:
             forces alone lead the tool.
         believed: What is believed of the robot and of how well its motion is known.
         predictor: What foretells ``joint_state``, if anything does.
-        signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
+        signals: ``joint_state``, ``tool_pose``, ``manifold_point``; of progress that waits
+            ``clock`` and ``watch``.
     """
 
     projector: BlockSystem
@@ -105,6 +109,7 @@ def add_place(
     following: Following,
     joint_state: OutputPort,
     override: OutputPort | None = None,
+    obstacles: OutputPort | None = None,
 ) -> ToolOnManifold:
     """Add what finds the tool's place on the manifold.
 
@@ -113,6 +118,7 @@ def add_place(
         following: What the robot is to do.
         joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
         override: Share of its planned pace at which the reference moves, if that may change.
+        obstacles: What is measured of obstacles, if progress waits for them.
 
     Raises:
         InputError: If compliance and law do not go together.
@@ -128,19 +134,28 @@ def add_place(
         BlockSystem(ToolKinematics(following.robot, following.on_motors), period),
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
+    waits: dict[str, OutputPort] = {}
     if not isinstance(task, SpaceTask):
         order = reference_order(options.compliance, linearization)
-        timed = TimedReference(task.motion, order, linearization.num_outputs, period)
-        generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
-        if override is not None:
-            builder.Connect(override, generator.GetInputPort("override"))
-        desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
+        if following.waiting is not None and obstacles is not None:
+            told = {"joint_state": joint_state, "obstacles_measured": obstacles}
+            waits = add_waiting_reference(
+                builder, following.waiting, task, linearization.num_outputs, period, told
+            )
+            desired = waits.pop("reference")
+        else:
+            timed = TimedReference(task.motion, order, linearization.num_outputs, period)
+            generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
+            if override is not None:
+                builder.Connect(override, generator.GetInputPort("override"))
+            desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     place = task.add_place(builder, tool_pose, desired, period)
     signals = {
         "joint_state": joint_state,
         "tool_pose": tool_pose,
         "manifold_point": place.manifold_point,
+        **waits,
     }
     return ToolOnManifold(place.projector, desired, believed, predictor, signals)
 
