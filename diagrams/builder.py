@@ -9,7 +9,8 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.drawing.mounting_look import mounting_look
-from diagrams.drawing.replay import RecordedMotion, build_delta_replay, build_replay
+from diagrams.drawing.recorded import RecordedMotion
+from diagrams.drawing.replay import build_delta_replay, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.robots.arm import Arm
 from diagrams.robots.delta import DeltaPart
@@ -238,6 +239,7 @@ def build_station(
         MODES if "mode" in signals else (),
         mounting,
         0 if remote else scenario.driver.ticks(period),
+        following.waiting,
     )
 
 

@@ -15,6 +15,7 @@ from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.waiting import Waiting
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
@@ -65,6 +66,7 @@ class Station:
         mode_labels: What the values of a logged signal ``mode`` are called, if there is one.
         mounting: Where plates come from and go, if there are any.
         ticks_late: After how many ticks torques act that are told.
+        waiting: How progress waits for obstacles, if it does.
     """
 
     diagram: Diagram
@@ -85,6 +87,7 @@ class Station:
     mode_labels: Sequence[str] = ()
     mounting: Mounting | None = None
     ticks_late: int = 0
+    waiting: Waiting | None = None
 
     @property
     def robot(self) -> RobotModel:

@@ -12,7 +12,8 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.mounting_look import mounting_stages
-from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.drawing.recorded import RecordedMotion
+from diagrams.drawing.replay import record
 from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import posture_text
@@ -28,6 +29,7 @@ from experiments.results.drives import (
 from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
 from experiments.results.mounting import mounting_metrics
+from experiments.results.obstacles import obstacle_metrics
 from experiments.results.path import path_following_metrics, press_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
 from experiments.results.promises import (
@@ -222,6 +224,7 @@ def _measure(
     metrics.update(limit_metrics(log))
     metrics.update(_guidance_audit(log, settings))
     metrics.update(mounting_metrics(log))
+    metrics.update(obstacle_metrics(log, settings.obstacles))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)

@@ -1,7 +1,6 @@
 """A logged run in Meshcat: robot, path, moving frame and trail of the tool; a DELTA robot hangs."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -15,11 +14,13 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.drawing.mounting_look import MountingLook, add_mounting_drawing
+from diagrams.drawing.recorded import RecordedMotion, RecordedPushes
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.manifold_visualizer import signed_color
+from pfsc_drake.systems.drawing.obstacle_visualizer import ObstacleVisualizer
 from pfsc_drake.systems.drawing.robot_visualizer import (
     DeltaVisualizer,
     RobotVisualizer,
@@ -33,65 +34,6 @@ _DISTANCE = 0.95
 _TOOL, _ELBOW = Rgba(0.9, 0.25, 0.1, 1.0), Rgba(0.45, 0.2, 0.75, 1.0)
 # m, between the path's lowest point and the grid
 _CLEARANCE = 0.15
-
-
-@dataclass(frozen=True)
-class RecordedPushes:
-    """What pushes K points of a robot, at the recording's frames.
-
-    Attributes:
-        points: Where [m], shape (frames, 3K).
-        forces: World axes [N], shape (frames, 3K).
-    """
-
-    points: np.ndarray
-    forces: np.ndarray
-
-
-@dataclass(frozen=True)
-class RecordedDistance:
-    """The tool's distance from a surface, at the recording's frames.
-
-    Attributes:
-        values: Signed [m], shape (frames,).
-        largest: Magnitude that has full colour [m], positive.
-    """
-
-    values: np.ndarray
-    largest: float
-
-
-@dataclass(frozen=True)
-class RecordedMotion:
-    """What a log holds of a motion, at the recording's frames.
-
-    Attributes:
-        times: Times of the frames [s], shape (frames,), increasing from 0.
-        positions: The plant's positions, shape (frames, nq).
-        tool_pose: ``[y_t, R_e]``, shape (frames, 12).
-        manifold_point: The manifold next to the tool, shape (frames, layout.size).
-        elbow: A point of the arm whose way is drawn, too [m], shape (frames, 3).
-        pushes: What pushes its links.
-        distance: What the colour of the tool's way tells; of one colour without.
-        tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
-        trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
-        region_clock: Region clock of regions that move [s], shape (frames,).
-        plates: ``[p, R by rows]`` of K plates, shape (frames, 12 K).
-        phases: When which phase of their mounting begins [s].
-    """
-
-    times: np.ndarray
-    positions: np.ndarray
-    tool_pose: np.ndarray
-    manifold_point: np.ndarray
-    elbow: np.ndarray | None = None
-    pushes: RecordedPushes | None = None
-    distance: RecordedDistance | None = None
-    tool_force: np.ndarray | None = None
-    trail: np.ndarray | None = None
-    region_clock: np.ndarray | None = None
-    plates: np.ndarray | None = None
-    phases: Sequence[tuple[float, str]] = ()
 
 
 def build_replay(
@@ -224,6 +166,12 @@ def add_motion(
         add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
     _add_tool(builder, motion, meshcat, period)
     _add_links(builder, motion, meshcat, period)
+    if motion.obstacles is not None:
+        seen = motion.obstacles
+        places = add_source(builder, "obstacles", motion.times, seen.positions)
+        drawn = ObstacleVisualizer(seen.shapes, seen.margin, meshcat, period)
+        look = builder.AddNamedSystem("obstacle_visualizer", drawn)
+        builder.Connect(places, look.GetInputPort("positions"))
     return sources["positions"]
 
 

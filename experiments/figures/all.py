@@ -42,6 +42,7 @@ from experiments.figures.guidance import (
 )
 from experiments.figures.links import draw_found_links
 from experiments.figures.mounting import draw_mounting, draw_use_case
+from experiments.figures.obstacles import draw_obstacles
 from experiments.figures.path import draw_notch_position, draw_path, draw_surface_fit
 from experiments.figures.posture import (
     draw_conditioning,
@@ -111,6 +112,7 @@ def _is_along(log: RunLog) -> bool:
 _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] = {
     "progress": (draw_progress, _is_along),
     "pace": (draw_pace, _always),
+    "obstacles": (draw_obstacles, _always),
     "guidance": (draw_guidance, has_regions),
     "contact": (draw_contact, has_contact),
     "energy": (draw_energy, gives_energy),

@@ -23,7 +23,7 @@ from reporting.metrics import Metric, Metrics, format_quantity
 from reporting.registry import possible_metrics
 
 # held at every instant, so that also a run that was cut short is judged by them
-_ALWAYS = ("deepest_violation", "max_unanswered_force")
+_ALWAYS = ("deepest_violation", "max_unanswered_force", "least_distance_while_moving")
 # how far a tool is from where it should be, the first of them that a run has, and from when on
 # that is worth a word [m]
 _DISTANCES = ("max_error_from_compliant_reference", "max_path_deviation")
@@ -81,6 +81,9 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     if settings.fixtures is not None and "deepest_violation" in metrics:
         bound = f"<= {settings.fixtures.bound:g}"
         metrics.set_target("deepest_violation", bound, "fixtures.bound")
+    if settings.obstacles is not None and "least_distance_while_moving" in metrics:
+        bound = f">= {settings.obstacles.watch.margin:g}"
+        metrics.set_target("least_distance_while_moving", bound, "obstacles.watch.margin")
     if settings.compliance.needs_sensor and "max_unanswered_force" in metrics:
         # what is less would be taken for a bias
         bound = f"<= {settings.sensor.taring_spread[:3].max():g}"

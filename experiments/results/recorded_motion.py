@@ -4,7 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
-from diagrams.drawing.replay import RecordedDistance, RecordedMotion, RecordedPushes
+from diagrams.drawing.recorded import (
+    RecordedDistance,
+    RecordedMotion,
+    RecordedObstacles,
+    RecordedPushes,
+)
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.guidance import region_times
@@ -54,7 +59,18 @@ def collect_motion(
         _region_times(station, log, frames),
         log["plate_pose"].values[frames] if "plate_pose" in log else None,
         mounting_phases(log),
+        _obstacles(station, log, frames),
     )
+
+
+def _obstacles(station: Station, log: RunLog, frames: NDArray[np.int_]) -> RecordedObstacles | None:
+    """Return what moves across the path, if anything does."""
+    if station.waiting is None:
+        return None
+    crossing = station.waiting.crossing
+    shapes = [obstacle.shape for obstacle in crossing.moving]
+    positions = log["obstacle_position"].values[frames]
+    return RecordedObstacles(positions, shapes, crossing.watch.margin)
 
 
 def _region_times(station: Station, log: RunLog, frames: NDArray[np.int_]) -> FloatArray | None:

@@ -10,6 +10,7 @@ from experiments.results.found_links import add_found_links
 from experiments.results.guidance import add_guidance
 from experiments.results.mounting import add_mounting_signals
 from experiments.results.path import add_pressing
+from experiments.results.obstacles import add_obstacles
 from experiments.results.posture import add_link_signals, add_posture
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
@@ -96,6 +97,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     add_pressing(log, station, raw, points)
     add_guidance(log, station, raw, pose[:, :3])
     add_mounting_signals(log, station, raw)
+    add_obstacles(log, station, raw)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     _add_plan(log, station)
