@@ -26,21 +26,24 @@ COUNT, SEED = 300, 1
 _DESCRIPTION = (
     "Persons walk across the path of pfc_crossing_6r at random: where they cross it, in which "
     "direction, how fast, when, whether they slow down, hurry or stand still on the way for a "
-    "while. Robot, model errors, friction, encoders, noise and delay of the obstacle's sensor are "
+    "while; they walk when the run begins. Robot, model errors, friction, encoders, noise and delay of the obstacle's sensor are "
     "those of the scenario; the seed of the sensor is another one each time. Left out are only "
     "those who would walk into the arm where it stands at the start. Distances are the true ones, "
     "between the surfaces of person and arm."
 )
 # of what is random: place on the path [m], direction [deg], speed [m/s], when [s]
 _PLACES, _DIRECTIONS, _SPEEDS, _TIMES = (-0.2, 0.6), (35.0, 80.0), (0.4, 1.4), (0.8, 3.4)
-# m, of the way before and after the path; s, for which some stand still; the share of these
-_BEFORE, _AFTER, _STILL, _STANDING = 1.8, 1.6, (0.3, 1.2), 0.25
+# m, of the way around the path on which the speed changes, and after the path
+_AROUND, _AFTER = 0.4, 1.6
+# s, for which some stand still; the share of these
+_STILL, _STANDING = (0.3, 1.2), 0.25
 # times the mean speed, on each of the three parts of a way
 _CHANGES = (0.75, 1.15)
 # least distance from the arm at the start [m], and where that is in the plane
 _FREE = 0.3
 _START = np.array([[0.1, -0.11], [0.8, -0.7]])
-_DURATION = 6.5  # s
+# s; and since when they walk
+_DURATION, _BEGIN = 6.0, -0.2
 
 
 def random_way(rng: np.random.Generator, radius: float, arm: float) -> list[dict[str, Any]]:
@@ -58,26 +61,25 @@ def random_way(rng: np.random.Generator, radius: float, arm: float) -> list[dict
         across = np.array([0.8, rng.uniform(*_PLACES)])
         angle = np.deg2rad(rng.uniform(*_DIRECTIONS))
         ahead = np.array([-np.cos(angle), np.sin(angle)])
-        begin, end = across - _BEFORE * ahead, across + _AFTER * ahead
-        if _distance(begin, end, *_START) < radius + arm + _FREE:
-            continue
-        stops = [begin, across - 0.4 * ahead, across + 0.4 * ahead, end]
-        if rng.random() < 0.5:
-            stops = stops[::-1]
+        ahead *= rng.choice([-1.0, 1.0])
         speeds = rng.uniform(*_SPEEDS) * rng.uniform(*_CHANGES, size=3)
-        pauses = [0.0, 0.0]
+        pauses = np.zeros(2)
         if rng.random() < _STANDING:
             pauses[rng.integers(2)] = rng.uniform(*_STILL)
-        return _timed(stops, speeds, pauses, rng.uniform(*_TIMES))
+        near = rng.uniform(*_TIMES) - _AROUND / speeds[1] - pauses[0]
+        before = _AROUND + max(near - _BEGIN, 0.5) * speeds[0]
+        stops = [across + way * ahead for way in (-before, -_AROUND, _AROUND, _AFTER)]
+        if _distance(stops[0], stops[-1], *_START) >= radius + arm + _FREE:
+            return _timed(stops, speeds, pauses, near)
 
 
 def _timed(
-    stops: Sequence[np.ndarray], speeds: np.ndarray, pauses: Sequence[float], middle: float
+    stops: Sequence[np.ndarray], speeds: np.ndarray, pauses: np.ndarray, near: float
 ) -> list[dict[str, Any]]:
-    """Return places with times, that of the path in the middle of the second part."""
+    """Return places with times, of which the one at the second place is given."""
     ways = [float(np.linalg.norm(b - a)) for a, b in zip(stops[:-1], stops[1:], strict=True)]
     lasts = np.array(ways) / speeds
-    times, time = [], middle - lasts[1] / 2.0 - pauses[0] - lasts[0]
+    times, time = [], near - lasts[0]
     for k, stop in enumerate(stops):
         times.append((time, stop))
         if k in (1, 2) and pauses[k - 1] > 0.0:
