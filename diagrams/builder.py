@@ -45,11 +45,13 @@ from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.mounting_parts import add_payload
+from diagrams.surroundings.obstacles import add_obstacles
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import law_manifold
 from diagrams.tasks.streaming import StreamTask
+from diagrams.tasks.waiting import plan_waiting
 from diagrams.warnings.law_warnings import MODES
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.following.law import make_law
@@ -130,10 +132,14 @@ def build_station(
     following = Following(
         following_options(scenario), believed, task, law, start_posture, on_motors, friction, held
     )
+    crossing = scenario.obstacles
     if held is None:
         begun = CourseStart(rest().q_J, start.place)
-        chosen = scenario.reference, scenario.controller, scenario.duration
-        keep_drive_limits(*chosen, task, law, begun, friction, progress)
+        asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
+        keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress)
+        if crossing is not None:
+            waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
+            following = replace(following, waiting=waiting)
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation
@@ -158,7 +164,10 @@ def build_station(
     )
     joint_state = links.joint_state
     override = part.override.get_output_port() if isinstance(part, RemoteArm) else None
-    place = add_place(builder, following, joint_state, override)
+    obstacles = {} if crossing is None else add_obstacles(builder, crossing, period)
+    place = add_place(
+        builder, following, joint_state, override, obstacles.get("obstacles_measured")
+    )
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
@@ -182,7 +191,7 @@ def build_station(
     if afar is not None:
         led = led | {"wrench_led": afar.lead(builder, forces)}
     controller, made = add_law(builder, following, place, forces | led)
-    signals = place.signals | forces | made | links.signals
+    signals = place.signals | obstacles | forces | made | links.signals
     if afar is not None:
         signals |= afar.connect(builder, task, believed, servo_lag(scenario), signals)
     if isinstance(task, StreamTask) and place.stream is not None:
@@ -256,6 +265,7 @@ def build_station(
         0 if remote else scenario.driver.ticks(period),
         holder,
         place.pen,
+        following.waiting,
     )
 
 

@@ -16,6 +16,7 @@ from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.waiting import Waiting
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
@@ -56,6 +57,7 @@ class Station:
         ticks_late: After how many ticks torques act that are told.
         holder: The robot that holds the workpiece which the path is on, if one does.
         pen: Where way points enter that a person draws, if one does.
+        waiting: How progress waits for obstacles, if it does.
     """
 
     diagram: Diagram
@@ -78,6 +80,7 @@ class Station:
     ticks_late: int = 0
     holder: Holder | None = None
     pen: OperatorPanel | None = None
+    waiting: Waiting | None = None
 
     @property
     def robot(self) -> RobotModel:

@@ -31,6 +31,7 @@ from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
 from experiments.results.holder import holder_metrics
 from experiments.results.mounting import mounting_metrics
+from experiments.results.obstacles import obstacle_metrics
 from experiments.results.path import path_following_metrics, press_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
 from experiments.results.promises import (
@@ -43,8 +44,8 @@ from experiments.results.promises import (
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
-from experiments.results.teleoperation import teleoperation_metrics
 from experiments.results.streaming import stream_metrics
+from experiments.results.teleoperation import teleoperation_metrics
 from experiments.simulation import SimulationResult, measure_tick
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
@@ -230,6 +231,7 @@ def _measure(
     metrics.update(mounting_metrics(log))
     metrics.update(holder_metrics(log, settings.reference.dwell))
     metrics.update(stream_metrics(log))
+    metrics.update(obstacle_metrics(log, settings.obstacles))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pfsc_drake.control.obstacles.clearance import ObstacleShape
+
 
 @dataclass(frozen=True)
 class RecordedPushes:
@@ -46,6 +48,21 @@ class RecordedHolder:
 
 
 @dataclass(frozen=True)
+class RecordedObstacles:
+    """Obstacles, at the recording's frames.
+
+    Attributes:
+        positions: Of K obstacles [m], shape (frames, 3K).
+        shapes: What they are.
+        margin: Distance that is kept from them [m].
+    """
+
+    positions: np.ndarray
+    shapes: Sequence[ObstacleShape]
+    margin: float
+
+
+@dataclass(frozen=True)
 class RecordedMotion:
     """What a log holds of a motion, at the recording's frames.
 
@@ -64,6 +81,7 @@ class RecordedMotion:
         phases: When which phase of their mounting begins [s].
         held: What a robot does that holds the workpiece; ``tool_pose``, ``manifold_point`` and
             ``trail`` are then seen from the workpiece's frame.
+        obstacles: What moves across the path.
     """
 
     times: np.ndarray
@@ -79,3 +97,4 @@ class RecordedMotion:
     plates: np.ndarray | None = None
     phases: Sequence[tuple[float, str]] = ()
     held: RecordedHolder | None = None
+    obstacles: RecordedObstacles | None = None

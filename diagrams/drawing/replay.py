@@ -21,6 +21,7 @@ from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.manifold_visualizer import signed_color
+from pfsc_drake.systems.drawing.obstacle_visualizer import ObstacleVisualizer
 from pfsc_drake.systems.drawing.robot_visualizer import (
     DeltaVisualizer,
     RobotVisualizer,
@@ -176,6 +177,12 @@ def add_motion(
         add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
     _add_tool(builder, motion, meshcat, period)
     _add_links(builder, motion, meshcat, period)
+    if motion.obstacles is not None:
+        seen = motion.obstacles
+        places = add_source(builder, "obstacles", motion.times, seen.positions)
+        drawn = ObstacleVisualizer(seen.shapes, seen.margin, meshcat, period)
+        look = builder.AddNamedSystem("obstacle_visualizer", drawn)
+        builder.Connect(places, look.GetInputPort("positions"))
     return sources["positions"]
 
 

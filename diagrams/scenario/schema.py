@@ -16,6 +16,7 @@ from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.holder import HolderParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
+from diagrams.scenario.obstacles import CrossingParameters
 from diagrams.scenario.path import PathParameters
 from diagrams.scenario.plate import PlateParameters
 from diagrams.scenario.robot import (
@@ -98,6 +99,7 @@ class Scenario:
         holder: Second robot, which holds the workpiece that the path is on. None without the block.
         plate: Plate with pins that a gripper takes from a magazine and mounts into a frame. None
             without the block.
+        obstacles: What moves across the path, for which progress waits. None without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
         judged_after: Simulated time after which targets count, which a run that was cut short does
             not reach [s]; 0 for ``duration``.
@@ -135,6 +137,7 @@ class Scenario:
     workpiece: WorkpieceParameters | None = None
     holder: HolderParameters | None = None
     plate: PlateParameters | None = None
+    obstacles: CrossingParameters | None = None
     duration: float = 0.0
     judged_after: float = 0.0
     settling_tolerance: float = 1e-4
@@ -205,7 +208,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         InputError: If it needs what only a simulation knows.
     """
     left, plain = deepcopy(scenario), Scenario()
-    for key in ("plate", "operator", "teleoperation", "holder"):
+    for key in ("plate", "operator", "teleoperation", "holder", "obstacles"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
     controller = scenario.controller

@@ -81,14 +81,14 @@ def keep_drive_limits(
         known = reference, controller, task, law, start, friction
         task.drive_plan = FastestPlanner(*known).plan(progress=progress)
     elif task.motion.domain[1] <= _LONGEST:
-        planner = _Planner(reference, controller, duration, task, law, start, friction)
+        planner = DrivePlanner(reference, controller, duration, task, law, start, friction)
         task.drive_plan = planner.plan()
     else:
         return
     task.motion = task.drive_plan.motion
 
 
-class _Planner(MotionDemand):
+class DrivePlanner(MotionDemand):
     """Plans one reference of one robot."""
 
     def __init__(

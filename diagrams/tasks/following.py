@@ -11,6 +11,7 @@ from diagrams.tasks.held_frame import HeldFrame
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.task import Task
+from diagrams.tasks.waiting import Waiting, add_waiting_reference
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.swing import Swing, SwingingManifold, SwingingReference
@@ -75,6 +76,7 @@ class Following:
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
         held: What carries the task's manifold, if anything does.
         carries: Whether the robot carries something that moves with it.
+        waiting: How its progress waits for obstacles, if it does.
     """
 
     options: FollowingOptions
@@ -86,6 +88,7 @@ class Following:
     friction: Coefficients | None = None
     held: HeldFrame | None = None
     carries: bool = False
+    waiting: Waiting | None = None
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,8 @@ class ToolOnManifold:
             forces alone lead the tool.
         believed: What is believed of the robot and of how well its motion is known.
         predictor: What foretells ``joint_state``, if anything does.
-        signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
+        signals: ``joint_state``, ``tool_pose``, ``manifold_point``; of progress that waits
+            ``clock`` and ``watch``.
         stream: What makes the path, where its way points come while the tool moves.
         pen: Where way points enter that a person draws, if one does.
     """
@@ -117,6 +121,7 @@ def add_place(
     following: Following,
     joint_state: OutputPort,
     override: OutputPort | None = None,
+    obstacles: OutputPort | None = None,
 ) -> ToolOnManifold:
     """Add what finds the tool's place on the manifold.
 
@@ -125,6 +130,7 @@ def add_place(
         following: What the robot is to do.
         joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
         override: Share of its planned pace at which the reference moves, if that may change.
+        obstacles: What is measured of obstacles, if progress waits for them.
 
     Raises:
         InputError: If compliance and law do not go together.
@@ -140,7 +146,7 @@ def add_place(
         BlockSystem(ToolKinematics(following.robot, following.on_motors), period),
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
-    m = linearization.num_outputs
+    m, waits = linearization.num_outputs, dict[str, OutputPort]()
     stream: Stream | None = None
     pen: OperatorPanel | None = None
     if isinstance(task, StreamTask):
@@ -150,7 +156,11 @@ def add_place(
         pen = task.add_source(builder, stream, period)
         desired = _swung(builder, following, stream.reference, order)
     else:
-        if not isinstance(task, SpaceTask):
+        if following.waiting is not None and obstacles is not None:
+            told = {"joint_state": joint_state, "obstacles_measured": obstacles}
+            waits = add_waiting_reference(builder, following.waiting, task, m, period, told)
+            desired = waits.pop("reference")
+        elif not isinstance(task, SpaceTask):
             order = reference_order(options.compliance, linearization)
             timed = TimedReference(task.motion, order, m, period)
             generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
@@ -166,6 +176,7 @@ def add_place(
         "joint_state": joint_state,
         "tool_pose": tool_pose,
         "manifold_point": place.manifold_point,
+        **waits,
     }
     if stream is not None:
         signals["stream"] = stream.stream

@@ -114,9 +114,17 @@ class MotionDemand:
         led = course[:, : reference.shape[1]]
         return self._continued(self._finder.bare(self._start, led, reference), times[1])
 
-    def allowed(self, course: np.ndarray) -> np.ndarray:
-        """Return what may be asked of the drives, (samples, 2N)."""
-        return allowed_demand(self.at_rest(course), self.limits, self._reserve)
+    def allowed(self, course: np.ndarray, reserve: float | None = None) -> np.ndarray:
+        """Return what may be asked of the drives, (samples, 2N).
+
+        Args:
+            course: The joints' course, see :meth:`course_of`.
+            reserve: Share of the torques that is left; that of the reference by default.
+        """
+        left = self._reserve.copy()
+        if reserve is not None:
+            left[: self.robot.dimension] = reserve
+        return allowed_demand(self.at_rest(course), self.limits, left)
 
     def at_rest(self, course: np.ndarray) -> np.ndarray:
         """Return what the places of a course ask for at rest, (samples, 2N)."""

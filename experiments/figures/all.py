@@ -43,6 +43,7 @@ from experiments.figures.guidance import (
 )
 from experiments.figures.links import draw_found_links
 from experiments.figures.mounting import draw_mounting, draw_use_case
+from experiments.figures.obstacles import draw_obstacles
 from experiments.figures.path import draw_notch_position, draw_path, draw_surface_fit
 from experiments.figures.posture import (
     draw_conditioning,
@@ -52,9 +53,9 @@ from experiments.figures.posture import (
     has_conditioning,
     has_pushes,
 )
+from experiments.figures.streaming import draw_stream
 from experiments.figures.teleoperation import draw_port_energy, draw_teleoperation
 from experiments.figures.two_arms import draw_holder_torques, draw_two_arms
-from experiments.figures.streaming import draw_stream
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from reporting.registry import FIGURES
@@ -117,6 +118,7 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "pace": (draw_pace, _always),
     "stream": (draw_stream, _always),
     "fastest": (draw_fastest, _always),
+    "obstacles": (draw_obstacles, _always),
     "guidance": (draw_guidance, has_regions),
     "contact": (draw_contact, has_contact),
     "energy": (draw_energy, gives_energy),

@@ -25,7 +25,7 @@ from reporting.registry import possible_metrics
 # held at every instant, so that also a run that was cut short is judged by them
 _ALWAYS = (
     *("deepest_violation", "max_unanswered_force", "past_known_way"),
-    *("least_port_tank", "energy_margin"),
+    *("least_port_tank", "energy_margin", "least_distance_while_moving"),
 )
 # m, by which a tool may be past the end of what it knows of its path: it follows its reference
 _PAST = 1e-3
@@ -86,6 +86,9 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     if settings.fixtures is not None and "deepest_violation" in metrics:
         bound = f"<= {settings.fixtures.bound:g}"
         metrics.set_target("deepest_violation", bound, "fixtures.bound")
+    if settings.obstacles is not None and "least_distance_while_moving" in metrics:
+        bound = f">= {settings.obstacles.watch.margin:g}"
+        metrics.set_target("least_distance_while_moving", bound, "obstacles.watch.margin")
     if settings.compliance.needs_sensor and "max_unanswered_force" in metrics:
         # what is less would be taken for a bias
         bound = f"<= {settings.sensor.taring_spread[:3].max():g}"

@@ -8,6 +8,7 @@ from diagrams.drawing.recorded import (
     RecordedDistance,
     RecordedHolder,
     RecordedMotion,
+    RecordedObstacles,
     RecordedPushes,
 )
 from diagrams.holder_station import HOLDER
@@ -65,6 +66,7 @@ def collect_motion(
         log["plate_pose"].values[frames] if "plate_pose" in log else None,
         mounting_phases(log),
         _holder(station, raw, log, frames),
+        _obstacles(station, log, frames),
     )
 
 
@@ -79,6 +81,16 @@ def _holder(
     half = coordinates.num_states // 2
     positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
     return RecordedHolder(positions, log["workpiece_pose"].values[frames])
+
+
+def _obstacles(station: Station, log: RunLog, frames: NDArray[np.int_]) -> RecordedObstacles | None:
+    """Return what moves across the path, if anything does."""
+    if station.waiting is None:
+        return None
+    crossing = station.waiting.crossing
+    shapes = [obstacle.shape for obstacle in crossing.moving]
+    positions = log["obstacle_position"].values[frames]
+    return RecordedObstacles(positions, shapes, crossing.watch.margin)
 
 
 def _region_times(station: Station, log: RunLog, frames: NDArray[np.int_]) -> FloatArray | None:

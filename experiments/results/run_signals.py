@@ -11,11 +11,12 @@ from experiments.results.found_links import add_found_links
 from experiments.results.guidance import add_guidance
 from experiments.results.holder import add_holder_signals, seen_poses, workpiece_motion
 from experiments.results.mounting import add_mounting_signals
+from experiments.results.obstacles import add_obstacles
 from experiments.results.path import add_pressing
 from experiments.results.posture import add_link_signals, add_posture
 from experiments.results.run_log import FloatArray, RunLog
-from experiments.results.teleoperation import add_teleoperation
 from experiments.results.streaming import add_stream
+from experiments.results.teleoperation import add_teleoperation
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
@@ -107,6 +108,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     add_mounting_signals(log, station, raw)
     add_holder_signals(log, station, raw)
     add_teleoperation(log, raw)
+    add_obstacles(log, station, raw)
     add_link_signals(log, station, raw)
     add_stream(log, station, raw)
     _add_drives(log, station, raw)

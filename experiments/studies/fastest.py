@@ -10,10 +10,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
-from diagrams.builder import build_station, find_rest
+from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.station_parts import make_task
+from diagrams.station_start import find_rest
 from diagrams.tasks.fastest_motion import FastestPlanner
 from diagrams.tasks.task import DrivePlan
 from experiments.scenario_file import find_scenario, read_scenario

@@ -182,7 +182,7 @@ class Follower(Diagram):
         )
         kinematics = self._add("tool_kinematics", ToolKinematics(self.robot, on_motors))
         builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-        place = self._place(kinematics.GetOutputPort("tool_pose"))
+        projector, place = self._place(kinematics.GetOutputPort("tool_pose"))
         ports = {"joint_state": joint_state, "manifold_point": place}
         ports |= self._forces(chosen, options)
         compliance = options.compliance
@@ -215,8 +215,8 @@ class Follower(Diagram):
         for name in ("manifold_state", "status", "fault"):
             builder.ExportOutput(controller.GetOutputPort(name), name)
 
-    def _place(self, tool_pose: OutputPort) -> OutputPort:
-        """Add what finds the tool's place on the manifold, and return the point for the law."""
+    def _place(self, tool_pose: OutputPort) -> tuple[BlockSystem, OutputPort]:
+        """Add what finds the tool's place on the manifold; return it, and the law's point."""
         builder, r = self._builder, self.law.linearization.relative_degree
         frame = None
         if self._moves:
@@ -227,9 +227,9 @@ class Follower(Diagram):
         projector = self._add("projector", self.followed.projector)
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         point = projector.GetOutputPort("manifold_point")
-        if frame is None:
-            return point
-        return add_framed_point(builder, self._own, point, frame, self.period)
+        if frame is not None:
+            point = add_framed_point(builder, self._own, point, frame, self.period)
+        return projector, point
 
     def _forces(self, chosen: ControllerParameters, options: FollowerOptions) -> Ports:
         """Export what is known of forces on the tool, and return it by the names of its uses."""

@@ -1,0 +1,95 @@
+"""Obstacles that cross a path: their distance from the arm, and what waiting for them costs.
+
+Signals used, as in the log: ``obstacle_position`` [samples, 3K] m, ``obstacle_distance``
+[samples, K] m, ``time_lost`` [samples, 1] s, ``eta`` [samples, k] m.
+"""
+
+import numpy as np
+
+from diagrams.scenario.obstacles import CrossingParameters
+from diagrams.station import Station
+from experiments.results.run_log import FloatArray, RunLog, peak
+from pfsc_drake.control.obstacles.clearance import least_distances
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.outline import arm_outline, outline_points
+from reporting.metrics import Metrics
+
+
+def add_obstacles(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> None:
+    """Add where obstacles are, how far the true arm is from them, and how progress waits.
+
+    Args:
+        log: To add to; nothing without obstacles.
+        station: The station that was simulated.
+        raw: Its logged signals.
+    """
+    if station.waiting is None:
+        return
+    crossing = station.waiting.crossing
+    count = len(crossing.moving)
+    labels = [f"obstacle_{k + 1} {axis}" for k in range(count) for axis in "xyz"]
+    for name, source in (("position", "obstacles"), ("measured", "obstacles_measured")):
+        log.add(f"obstacle_{name}", _positions(raw[source], count), labels=labels)
+    chain, radius = station.part.robot, crossing.watch.arm_radius
+    assert isinstance(chain, SerialChain)  # else nothing waits
+    q_J = raw["joint_state"][:, : chain.dimension]
+    outline = arm_outline(chain, radius)
+    arm = np.zeros((0, 3 * len(outline.points)))
+    if len(q_J):
+        arm = outline_points(chain, outline).map(len(q_J))(q_J.T).full().T
+    shapes = [obstacle.shape for obstacle in crossing.moving]
+    distance = least_distances(arm, log["obstacle_position"].values, shapes, radius)
+    margin = np.array([[crossing.watch.margin, np.inf]])
+    names = [f"obstacle_{k + 1}" for k in range(count)]
+    log.add("obstacle_distance", distance, labels=names, limits=margin)
+    own_time, pace = raw["clock"][:, 0], raw["clock"][:, 1]
+    end = station.reference_duration
+    log.add("waiting_pace", np.where(own_time < end, pace, 0.0))
+    log.add("permitted_pace", raw["watch"][:, 1])
+    log.add("passing", raw["watch"][:, 2])
+    late = log.time - own_time
+    # where the motion has ended nothing is lost
+    running = np.flatnonzero(own_time < end)
+    if running.size:
+        late[running[-1] + 1 :] = late[running[-1]]
+    log.add("time_lost", late)
+
+
+def _positions(states: FloatArray, count: int) -> FloatArray:
+    return states.reshape(len(states), count, 6)[:, :, :3].reshape(len(states), 3 * count)
+
+
+def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metrics:
+    """Return how near obstacles came, and what waiting for them cost, if there were any.
+
+    Args:
+        log: Log of a run.
+        crossing: The obstacles.
+    """
+    metrics = Metrics()
+    if crossing is None or "obstacle_distance" not in log or not log.time.size:
+        return metrics
+    least = log["obstacle_distance"].values.min(axis=1)
+    metrics.add("least_distance", float(least.min()))
+    moving = moves(log, crossing.watch.resting_speed)
+    metrics.add(
+        "least_distance_while_moving", float(least[moving].min()) if moving.any() else np.nan
+    )
+    metrics.add("waited_time", float(log["time_lost"].values[-1, 0]))
+    position = log["obstacle_position"].values.reshape(len(log.time), -1, 3)
+    speed = np.linalg.norm(np.gradient(position, log.time, axis=0), axis=2)
+    metrics.add("largest_obstacle_speed", peak(speed))
+    return metrics
+
+
+def moves(log: RunLog, resting_speed: float) -> np.ndarray:
+    """Return when the tool is faster along its path than what counts as rest, shape (samples,).
+
+    Args:
+        log: With ``eta``.
+        resting_speed: [m/s].
+    """
+    if log.time.size < 2:
+        return np.zeros(log.time.size, dtype=bool)
+    speed = np.linalg.norm(np.gradient(log["eta"].values, log.time, axis=0), axis=1)
+    return np.asarray(speed > resting_speed)

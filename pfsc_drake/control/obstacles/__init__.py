@@ -1,0 +1,1 @@
+"""Obstacles that move: progress along a path waits for them, and elbows give way."""

@@ -1,0 +1,69 @@
+"""Obstacles in Meshcat: spheres, and columns as persons in the room that they may need."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.geometry import Capsule, Cylinder, Meshcat, Rgba, Sphere
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
+
+from pfsc_drake.control.obstacles.clearance import ObstacleShape
+
+_ROOT = "/drake/obstacles"
+# m, of a person who stands on the floor z = 0
+_HEIGHT, _BODY, _HEAD, _RIM = 1.75, 0.17, 0.11, 0.005
+_SOLID, _ROOM, _MARGIN = (
+    Rgba(0.12, 0.32, 0.52, 1.0),
+    Rgba(0.2, 0.5, 0.8, 0.18),
+    Rgba(0.85, 0.2, 0.15, 0.28),
+)
+
+
+class ObstacleVisualizer(LeafSystem):
+    """Draws obstacles, and around them the distance that is kept.
+
+    Ports:
+        positions (input): Of K obstacles [m], shape (3K,).
+
+    Args:
+        shapes: What they are.
+        margin: Distance that is kept from them [m].
+        meshcat: Where to draw, axes of the world.
+        period: Time between frames [s].
+    """
+
+    def __init__(
+        self, shapes: Sequence[ObstacleShape], margin: float, meshcat: Meshcat, period: float
+    ) -> None:
+        super().__init__()
+        self._shapes, self._margin, self._meshcat = shapes, margin, meshcat
+        self._positions = self.DeclareVectorInputPort("positions", 3 * len(shapes))
+        self.DeclareInitializationPublishEvent(self._begin)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
+
+    def _begin(self, context: Context) -> EventStatus:
+        for k, shape in enumerate(self._shapes):
+            path, r = f"{_ROOT}/{k}", shape.radius
+            if shape.kind == "sphere":
+                self._meshcat.SetObject(f"{path}/body", Sphere(r), _SOLID)
+                self._meshcat.SetObject(f"{path}/margin", Sphere(r + self._margin), _MARGIN)
+                continue
+            body = min(_BODY, r)
+            length = _HEIGHT - 2.0 * _HEAD - 2.0 * body
+            parts = {
+                "body": (Capsule(body, length), _SOLID, body + length / 2.0),
+                "head": (Sphere(_HEAD), _SOLID, _HEIGHT - _HEAD),
+                "room": (Cylinder(r, _HEIGHT), _ROOM, _HEIGHT / 2.0),
+                "margin": (Cylinder(r + self._margin, _RIM), _MARGIN, _RIM / 2.0),
+            }
+            for name, (form, colour, height) in parts.items():
+                self._meshcat.SetObject(f"{path}/{name}", form, colour)
+                self._meshcat.SetTransform(f"{path}/{name}", RigidTransform([0.0, 0.0, height]))
+        self._draw(context)
+        return EventStatus.Succeeded()
+
+    def _draw(self, context: Context) -> None:
+        places = np.array(self._positions.Eval(context)).reshape(-1, 3)
+        for k, (shape, place) in enumerate(zip(self._shapes, places, strict=True)):
+            there = place * shape.axes.full().ravel()
+            self._meshcat.SetTransform(f"{_ROOT}/{k}", RigidTransform(there), context.get_time())
