@@ -239,7 +239,7 @@ def build_station(
             + planned
             + part.start_warnings(scenario.start, start_posture, start.target)
             + controller_warnings(scenario, task, part, law, link_state, rest())
-            + ([] if holder is None else holder.warnings)
+            + ([] if holder is None else holder.warn())
         )
 
     diagram = builder.Build()

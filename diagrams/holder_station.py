@@ -1,8 +1,8 @@
 """The robot of a station that holds the workpiece, with its controller, and what it tells."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path as FilePath
 
@@ -66,7 +66,7 @@ class Holder:
         on_motors: Whether its law acts on the pose of the motors.
         frame: The workpiece's frame, and its motion as the other controller knows it.
         signals: What to log, by names with the prefix.
-        warnings: What there is to say, one sentence each.
+        warn: Tells what there is to say, one sentence each.
         projector: Name of what finds the workpiece's place on its path.
         measured: System and port that the measured joint state comes from, by name.
     """
@@ -81,9 +81,9 @@ class Holder:
     on_motors: bool
     frame: HeldFrame
     signals: dict[str, OutputPort]
-    warnings: list[str] = field(default_factory=list)
-    projector: str = ""
-    measured: tuple[str, str] = ("", "")
+    warn: Callable[[], list[str]]
+    projector: str
+    measured: tuple[str, str]
 
     def set_start(self, blocks: BlockAccess, root: Context) -> None:
         """Put the robot at its start.
@@ -189,9 +189,13 @@ def add_holder(
     source = measured.get_system().get_name(), measured.get_name()
     planned = [] if task.drive_plan is None else task.drive_plan.said
     link_state = part.coordinates.link_rows @ state
-    said = task.warnings + own.model_error.warnings + planned
-    said += part.start_warnings(own.start, q_J, start.target)
-    said += controller_warnings(own, task, part, law, link_state, rest())
+
+    def warn() -> list[str]:
+        said = task.warnings + own.model_error.warnings + planned
+        said += part.start_warnings(own.start, q_J, start.target)
+        said += controller_warnings(own, task, part, law, link_state, rest())
+        return [f"the robot that holds the workpiece: {line}" for line in said]
+
     made_holder = Holder(
         holder,
         part,
@@ -203,7 +207,7 @@ def add_holder(
         on_motors,
         HeldFrame(pose, order, motion),
         {f"{HOLDER}{name}": port for name, port in logged.items()},
-        [f"the robot that holds the workpiece: {line}" for line in said],
+        warn,
         place.projector.get_name(),
         source,
     )

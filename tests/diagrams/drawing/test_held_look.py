@@ -1,0 +1,78 @@
+"""Two arms in Meshcat: what is on the workpiece moves with it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.systems.analysis import Simulator
+
+from diagrams.drawing.held_look import held_look, held_points
+from diagrams.drawing.recorded import RecordedHolder, RecordedMotion
+from diagrams.drawing.replay import build_replay
+from diagrams.drawing.robot_geometry import draw_robot
+from diagrams.scenario import (
+    HeldWorkpieceParameters,
+    Line,
+    PathParameters,
+    RobotParameters,
+    SolidParameters,
+)
+from diagrams.scenario.robot import PoseParameters
+from diagrams.tasks.drawing import PathDrawing
+from diagrams.tasks.path import make_path
+from pfsc_drake.geometry import PathPointLayout, zyx_to_matrix
+
+MODEL, PERIOD = "comau_racer_1_4_elastic_3r", 0.04
+WORKPIECE = HeldWorkpieceParameters(
+    solids=[
+        SolidParameters(box=[0.2, 0.1, 0.05]),
+        SolidParameters(cylinder=[0.03, 0.3], pose=PoseParameters(position=[0.0, 0.0, 0.2])),
+    ]
+)
+
+
+@pytest.fixture
+def held():
+    """Three frames: the workpiece rises and turns about z."""
+    turned = [zyx_to_matrix([0.2 * k, 0.0, 0.0]).ravel() for k in range(3)]
+    poses = [np.append([0.9, 0.1, 0.5 + 0.1 * k], R) for k, R in enumerate(turned)]
+    return RecordedHolder(np.zeros((3, 6)), np.array(poses))
+
+
+def test_points_are_placed_where_the_workpiece_begins(held):
+    held.workpiece_pose[0, 3:] = zyx_to_matrix([0.5 * np.pi, 0.0, 0.0]).ravel()
+    (placed,) = held_points(np.array([[0.1, 0.0, 0.02]]), held)
+    assert np.allclose(placed, [0.9, 0.2, 0.52], rtol=0, atol=1e-15)
+
+
+def test_everything_on_the_workpiece_moves_with_it(held, load_arm):
+    path = make_path(PathParameters(Line([0.0, 0.0, 0.1], [0.0, 0.1, 0.1])), "rigid", None)
+    arm, other = load_arm(MODEL), load_arm(MODEL)
+    drawing = draw_robot(arm.plant, arm.tool, RobotParameters(MODEL), Path())
+    look = held_look(WORKPIECE, draw_robot(other.plant, other.tool, RobotParameters(MODEL), Path()))
+    evaluator = path.evaluator(2)
+    points = np.array([evaluator([0.0, 0.04 * k, 0.1], 0.0) for k in range(3)])
+    tool = np.array([np.append([0.0, 0.04 * k, 0.1], np.eye(3)) for k in range(3)])
+    motion = RecordedMotion(PERIOD * np.arange(3), np.zeros((3, 6)), tool, points, held=held)
+    meshcat = Meshcat(MeshcatParams(host="localhost"))
+    layout = PathPointLayout(2, oriented=False)
+    diagram = build_replay(drawing, PathDrawing(path, layout), motion, meshcat, PERIOD, held=look)
+    simulator = Simulator(diagram)
+    simulator.AdvanceTo(2 * PERIOD)
+    root = "/drake/path_following"
+    for drawn in ("solid_0", "solid_1", "path", "frame", "trail"):
+        assert meshcat.HasPath(f"{root}/{drawn}")
+    assert meshcat.HasPath(f"/drake/visualizer/{MODEL}/link_3")
+    assert meshcat.HasPath(f"/drake/holder/{MODEL}/link_3")
+    # what a browser is told last
+    X_WC = system_pose(diagram, simulator)
+    assert np.allclose(X_WC[:3], [0.9, 0.1, 0.7], rtol=0, atol=1e-12)
+
+
+def system_pose(diagram, simulator):
+    """Return the pose that the workpiece is drawn at."""
+    system = diagram.GetSubsystemByName("path_following_carried")
+    return system.GetInputPort("tool_pose").Eval(
+        system.GetMyContextFromRoot(simulator.get_context())
+    )
