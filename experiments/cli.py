@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.hardware_commands import drive_command, robot_command
+from experiments.hardware_commands import drive_command, lead_command, robot_command
 from experiments.run_commands import (
     compare_command,
     list_command,
@@ -47,6 +47,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "replay": replay_command,
     "robot": robot_command,
     "drive": drive_command,
+    "lead": lead_command,
 }
 
 

@@ -104,6 +104,33 @@ def robot_command(
         )
 
 
+def lead_command(
+    scenario: ScenarioName,
+    lcm: Lcm = "",
+    overrides: Overrides = None,
+    duration: Duration = None,
+) -> None:
+    """Be the operator of a scenario that is led from afar, its follower in another process."""
+    from experiments.hardware.lead import lead_scenario
+
+    seconds = None if duration is None else read_duration(duration)
+    with interruptible():
+        console = Console()
+        led = lead_scenario(
+            read_scenario(scenario, overrides or []),
+            open_bus(lcm),
+            duration=seconds,
+            tell=lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False),
+        )
+        console.print(
+            f"led for {led.duration:g} s, up to {led.way:.3g} m away; {led.received} messages of "
+            f"the follower; up to {led.largest_force:.3g} N felt; never less than "
+            f"{led.least_tank:.3g} J in the tank",
+            soft_wrap=True,
+            highlight=False,
+        )
+
+
 def drive_command(
     scenario: ScenarioName,
     lcm: Lcm = "",

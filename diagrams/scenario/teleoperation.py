@@ -9,6 +9,7 @@ from pfsc_drake.physics.leader_device import ClutchParameters, LeaderParameters
 
 # the way back draws its own delays and losses
 _OTHER_SEED = 1000
+_BUSES = ("udpm", "memq")
 
 
 @dc.dataclass
@@ -21,6 +22,9 @@ class TeleoperationParameters(CouplingParameters):
         channel: Between the two, each way.
         leader: The device in the operator's hand.
         clutch: When the operator lets it loose, to take hold of it elsewhere.
+        lcm: LCM bus on which a leader in another process leads (``lead``), such as
+            ``udpm://239.255.76.67:7667?ttl=0``; the run waits for the clock then, and channel and
+            leader are those of the other process. Empty where both are simulated here.
         follower_force: Largest force by which the tool is led [N].
         follower_speed: Largest speed that the tool is led with, which the follower's reserve of
             energy is for [m/s]; within regions it is at least that of ``fixtures.guidance``.
@@ -29,6 +33,7 @@ class TeleoperationParameters(CouplingParameters):
     channel: ChannelParameters = dc.field(default_factory=ChannelParameters)
     leader: LeaderParameters = dc.field(default_factory=LeaderParameters)
     clutch: list[ClutchParameters] = dc.field(default_factory=list)
+    lcm: str = ""
     follower_force: float = 60.0
     follower_speed: float = 1.0
 
@@ -36,6 +41,8 @@ class TeleoperationParameters(CouplingParameters):
         super().__post_init__()
         for key in ("follower_force", "follower_speed"):
             require_positive(key, getattr(self, key))
+        known = not self.lcm or self.lcm.partition("://")[0] in _BUSES
+        require(known, "lcm", self.lcm, f"empty, or a bus: {', '.join(_BUSES)}://..")
         ends = [time for at in self.clutch for time in (at.begin, at.end)]
         allowed = "times that follow each other"
         require(ends == sorted(ends), "clutch", ends, allowed)

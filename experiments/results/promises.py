@@ -40,6 +40,9 @@ _OF_ORIENTATIONS = {"phi"}
 # signals of an observer, which may be left out
 _OF_OBSERVERS = {"tau_f", "friction_estimate", "f_c", "f_c_estimate", "f_v", "f_v_estimate"}
 
+# signals of a leader, which may be in another process
+_OF_LEADERS = {"led_point"}
+
 
 def check_targets(settings: Scenario, station: Station) -> None:
     """Refuse targets for metrics that a run with their law would not have.
@@ -57,6 +60,8 @@ def check_targets(settings: Scenario, station: Station) -> None:
     signals = expected_signals(station) | _OF_OBSERVERS
     if settings.path.orientation.task == "none" or (surface and surface.orientation.kind == "none"):
         signals |= _OF_ORIENTATIONS
+    if settings.teleoperation is not None:
+        signals |= _OF_LEADERS
     properties = {"redundant": is_redundant(station), "closed": task.lap is not None}
     known = {
         *signals,

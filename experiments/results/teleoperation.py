@@ -19,17 +19,19 @@ def add_teleoperation(log: RunLog, raw: dict[str, FloatArray]) -> None:
         log: To add to.
         raw: What the station logged.
     """
-    if "leader_record" not in raw:
+    here = [side for side in SIDES if f"{side}_record" in raw]
+    if not here:
         return
-    log.add("leader_position", raw["leader_state"][:, :3])
-    log.add("leader_hand", raw["leader_hand"][:, :3])
-    log.add("leader_force", raw["leader_motor"])
-    log.add("led_point", raw["led_point"])
+    if "leader" in here:
+        log.add("leader_position", raw["leader_state"][:, :3])
+        log.add("leader_hand", raw["leader_hand"][:, :3])
+        log.add("leader_force", raw["leader_motor"])
+        log.add("led_point", raw["led_point"])
     for name, rows in RECORD.items():
         size = rows.stop - rows.start
-        sides = [raw[f"{side}_record"][:, rows] for side in SIDES]
+        sides = [raw[f"{side}_record"][:, rows] for side in here]
         axes = _AXES if size > 1 else ("",)
-        labels = [f"{side} {axis}".strip() for side in SIDES for axis in axes]
+        labels = [f"{side} {axis}".strip() for side in here for axis in axes]
         log.add(f"port_{name}", np.hstack(sides), labels=labels)
 
 
@@ -46,11 +48,16 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
         over; ``largest_felt_force`` [N]; ``least_port_tank`` [J]; ``energy_margin`` [J]: how far
         the work of the hand and of what the tool touches, as it truly was, stayed above what was
         stored at the start; ``audit_ports`` [J]: beside the law of the tanks; ``audit_channel``
-        [J]: what arrived beyond what was sent.
+        [J]: what arrived beyond what was sent. Of a follower alone, whose leader is in another
+        process, what its own tank tells.
     """
     metrics = Metrics()
     way = settings.teleoperation
     if way is None or "port_force" not in log or log.time.size < 2:
+        return metrics
+    metrics.add("least_port_tank", float(log["port_tank"].values.min()))
+    metrics.add("audit_ports", tank_residual(log, way.tank.capacity if way.passive else np.inf))
+    if "led_point" not in log:
         return metrics
     delay, error = _following(log)
     metrics.add("following_delay", delay)
@@ -59,10 +66,8 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     metrics.add("led_distance_end", float(np.linalg.norm(apart)))
     felt = np.linalg.norm(log["leader_force"].values, axis=1)
     metrics.add("largest_felt_force", float(felt.max()))
-    metrics.add("least_port_tank", float(log["port_tank"].values.min()))
     scale = way.motion_scale / way.force_scale
     metrics.add("energy_margin", float(energy_above_bound(log, scale).min()))
-    metrics.add("audit_ports", tank_residual(log, way.tank.capacity if way.passive else np.inf))
     metrics.add("audit_channel", float(np.max(-stored_in_channel(log), initial=0.0)))
     return metrics
 
@@ -82,15 +87,15 @@ def _following(log: RunLog) -> tuple[float, float]:
 
 
 def works(log: RunLog) -> FloatArray:
-    """Return the work that each port's force did by each tick [J], shape (samples, 2).
+    """Return the work that each port's force did by each tick [J], shape (samples, sides).
 
     Args:
         log: Log of a run.
     """
     force, position = (log[f"port_{name}"].values for name in ("force", "position"))
     steps = force[:-1] * np.diff(position, axis=0)
-    done = np.stack([steps[:, :3].sum(axis=1), steps[:, 3:].sum(axis=1)], axis=1)
-    return np.vstack([np.zeros(2), np.cumsum(done, axis=0)])
+    done = steps.reshape(len(steps), -1, 3).sum(axis=2)
+    return np.vstack([np.zeros(done.shape[1]), np.cumsum(done, axis=0)])
 
 
 def energy_above_bound(log: RunLog, scale: float) -> FloatArray:

@@ -1,6 +1,7 @@
 """Pictures of couplings over a channel: what is felt, a wall, energy."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ def draw_felt(
     canvas, (free, wall, apart) = make_panels(3, common_time=False)
     late = 1e3 * np.array(delays)
     for (name, rows), colour in zip(felt.items(), COLOURS, strict=False):
-        style = {"color": colour, "marker": "o", "markersize": 4}
+        style: dict[str, Any] = {"color": colour, "marker": "o", "markersize": 4}
         steady = [np.nan if np.isnan(row.stiffness) else row.impedance for row in rows]
         free.plot(late, steady, label=name, **style)
         wall.plot(late, [row.stiffness for row in rows], label=name, **style)

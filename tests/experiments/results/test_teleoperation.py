@@ -120,7 +120,7 @@ def test_the_channel_stores_what_is_under_way(log):
 
 def test_metrics_are_those_of_the_registry(log, settings):
     found = set(teleoperation_metrics(log, settings))
-    assert found == set(names_about(log, "port_force"))
+    assert found == set(names_about(log, "port_force", "led_point"))
 
 
 def test_its_figures_are_drawn(log):

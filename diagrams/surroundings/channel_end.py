@@ -1,0 +1,59 @@
+"""A system that talks to the other side of a teleoperation in another process, in real time."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from pfsc_drake.control.teleoperation.message import MESSAGE
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+
+_LATE = 0.1  # s, that is caught up; later than that, time goes on from there
+
+
+class ChannelEnd(LeafSystem):
+    """Sends what a side tells at each tick, and puts out the newest that has come.
+
+    It waits for the clock, so that a simulation is never ahead of it.
+
+    Ports:
+        sent (input): Message of this side, shape (8,).
+        arrived (output): Newest message of the other one, shape (8,), that was there at the last
+            tick; zero before.
+
+    Args:
+        end: End of the link.
+        period: Sampling time [s].
+        clock: Tells the time [s].
+        sleep: Waits [s].
+    """
+
+    def __init__(
+        self,
+        end: TeleoperationEnd,
+        period: float,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        super().__init__()
+        self._end, self._clock, self._sleep = end, clock, sleep
+        self._begin = 0.0
+        self.DeclareVectorInputPort("sent", MESSAGE)
+        state = self.DeclareDiscreteState(MESSAGE)
+        self.DeclareStateOutputPort("arrived", state)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._exchange)
+
+    def _exchange(self, context: Context, values: DiscreteValues) -> None:
+        now = context.get_time()
+        if now == 0.0:
+            self._end.begin()
+            self._begin = self._clock()
+        early = self._begin + now - self._clock()
+        if early > 0.0:
+            self._sleep(early)
+        elif early < -_LATE:
+            self._begin -= early
+        sent: BasicVector = self.GetInputPort("sent").Eval(context)
+        self._end.send(np.asarray(sent))
+        values.set_value(self._end.newest())
