@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from diagrams.scenario.schema import driven
 from diagrams.scenario.streamed import DrawnPlane
 from diagrams.station_parts import make_task
-from diagrams.tasks.streaming import StreamTask, border, plane_axes
+from diagrams.tasks.drawn_plane import border, plane_axes
+from diagrams.tasks.streaming import StreamTask
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.control.streams.parameters import StreamParameters
 from pfsc_drake.errors import InputError
@@ -74,6 +76,11 @@ def test_trajectory_tracking_of_a_stream_is_refused():
     scenario.controller.manifold = "trajectory"
     with pytest.raises(InputError, match=r"controller.manifold = trajectory"):
         make_task(scenario, SCENARIO_DIRECTORY)
+
+
+def test_a_robot_that_stands_elsewhere_needs_a_path_that_is_known():
+    with pytest.raises(InputError, match=r"path.shape = !Streamed"):
+        driven(shipped_scenario("pfc_draw_6r"))
 
 
 @pytest.mark.parametrize(
