@@ -30,6 +30,7 @@ from diagrams.scenario.simulation import (
     OperatorParameters,
     SimulationParameters,
 )
+from diagrams.scenario.streamed import Streamed
 from diagrams.scenario.surface import SurfaceParameters
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
@@ -214,6 +215,9 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
     controller = scenario.controller
     finds_links = controller.law in _OF_ONE_SIDE or controller.state != "measured"
     require(finds_links, "controller.state", controller.state, _ONE_SIDE)
+    known = not isinstance(scenario.path.shape, Streamed)
+    beforehand = "a path that is known beforehand, where the robot stands elsewhere"
+    require(known, "path.shape", "!Streamed", beforehand)
     source = scenario.controller.external_torque.source
     allowed = "none, measured or observed; forces are known in simulation only"
     require(source != "known", "controller.external_torque.source", source, allowed)

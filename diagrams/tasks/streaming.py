@@ -1,18 +1,15 @@
 """Following a path whose way points come while the tool moves."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Iterator
 from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.geometry import Meshcat
-from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import ControllerParameters, PathParameters, StartParameters, Streamed
 from diagrams.scenario.checks import require
-from diagrams.scenario.streamed import DrawnPlane
 from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, strokes, told_messages
+from diagrams.tasks.drawn_plane import SIDE, StreamDrawing, border
 from diagrams.tasks.surface import followed_angles
 from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -21,18 +18,15 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.streams.course import POSE, POSITION
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.streamed_path import Stream, StreamedPath
-from pfsc_drake.geometry import PathPointLayout, PiecewisePolynomialCurve, zyx_to_quaternion
+from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_quaternion
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.waypoint_source import Arrivals, WaypointSource
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.drawing.manifold_visualizer import LineVisualizer
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
 
 _SETTLES = 3.0  # s, after the last way point has come, of a run that tells no duration
 _SLOWEST = 0.3  # of the largest speed, to tell how long a run may take
-_PARALLEL = 2e-3  # rad
-_OF_SIDE = 20  # points of each side of a plane that is drawn
 
 
 class StreamTask(Task):
@@ -49,6 +43,7 @@ class StreamTask(Task):
         path: The path.
         arrivals: When way points come; None where a person draws them.
         drawn: What a person has drawn, of a session that is repeated.
+        plane: Where a person draws, if one does.
 
     Raises:
         InputError: If a file cannot be read, or the start is not where the path begins.
@@ -135,7 +130,7 @@ class StreamTask(Task):
         raise InputError("path.shape = !Streamed: its path is not known beforehand")
 
     @property
-    def drawing(self) -> "StreamDrawing":
+    def drawing(self) -> StreamDrawing:
         """How the manifold is drawn."""
         return StreamDrawing(self._lines(), self.place.layout)
 
@@ -227,7 +222,7 @@ class StreamTask(Task):
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """Yield positions along the way of the tool [m], each (3,), with what to call them."""
         if self.plane is not None:
-            for corner in border(self.plane)[::_OF_SIDE]:
+            for corner in border(self.plane)[::SIDE]:
                 yield corner, "plane to draw in"
             return
         assert self.arrivals is not None
@@ -241,56 +236,6 @@ class StreamTask(Task):
     def check_place(self, coordinates: np.ndarray, key: str) -> None:
         """Refuse coordinates off the manifold: none are known beforehand."""
         require(False, key, coordinates.tolist(), "none on a path whose way points come")
-
-
-@dataclass(frozen=True)
-class StreamDrawing:
-    """Lines that are known beforehand, drawn, with the frame next to the tool.
-
-    Attributes:
-        lines: Points of each [m], each (points, 3).
-        layout: Layout of the path's points.
-    """
-
-    lines: Sequence[np.ndarray]
-    layout: PathPointLayout
-
-    def outline(self) -> list[np.ndarray]:
-        """Return lines that show the manifold [m], each (points, 3)."""
-        return list(self.lines)
-
-    def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """Add what draws it."""
-        visualizer = LineVisualizer(self.lines, self.layout, meshcat, period)
-        drawing = builder.AddNamedSystem("path_visualizer", visualizer)
-        return drawing.GetInputPort("path_point")
-
-
-def plane_axes(plane: DrawnPlane) -> np.ndarray:
-    """Return the directions to the right and upwards, unit vectors, shape (2, 3).
-
-    Args:
-        plane: The plane.
-
-    Raises:
-        InputError: If they are parallel.
-    """
-    right, up = np.array(plane.right, dtype=float), np.array(plane.up, dtype=float)
-    right /= np.linalg.norm(right)
-    across = up - (up @ right) * right
-    slanted = np.linalg.norm(across) > _PARALLEL * np.linalg.norm(up)
-    require(bool(slanted), "path.shape.plane.up", plane.up, "a direction that is not that of right")
-    return np.stack([right, across / np.linalg.norm(across)])
-
-
-def border(plane: DrawnPlane) -> np.ndarray:
-    """Return points along the border of a plane [m], shape (points, 3)."""
-    across = plane_axes(plane) * np.array([[plane.width], [plane.height]]) / 2.0
-    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
-    places = np.array(plane.origin) + corners @ across
-    steps = np.linspace(0.0, 1.0, _OF_SIDE, endpoint=False)[:, None]
-    sides = [begin + steps * (end - begin) for begin, end in pairwise(places)]
-    return np.vstack([*sides, places[-1:]])
 
 
 def without_orientation(arrivals: Arrivals | None) -> Arrivals | None:

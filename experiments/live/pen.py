@@ -6,7 +6,8 @@ import numpy as np
 
 from diagrams.station import Station
 from diagrams.tasks.arrivals import END, NEW_PATH, WAY_POINT, Event, drawn_text, tell
-from diagrams.tasks.streaming import StreamTask, plane_axes
+from diagrams.tasks.drawn_plane import plane_axes
+from diagrams.tasks.streaming import StreamTask
 from pfsc_drake.control.streams.course import POSITION
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
 
