@@ -21,7 +21,7 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
 
 # s, between the knots of a pace: at first, and at last unless a motion has more; of one move
-_COARSE, _FINE, _KNOTS = 16e-3, 4e-3, 1000
+_COARSE, _FINE, _FINEST, _KNOTS = 16e-3, 4e-3, 2e-3, (200, 1000)
 _FEWEST, _MOST = 24, 4000
 # samples of an interval: where limits are kept, and where that is checked
 _SAMPLES, _CHECKED = 6, 12
@@ -94,7 +94,7 @@ class FastestPlanner(MotionDemand):
         tell(0.05)
         moves = self._faster(moves, _COARSE, tight, 0.0)
         tell(0.25)
-        fine = max(_FINE, sum(move.duration for move in moves) / _KNOTS) / finer
+        fine = self._fine_spacing(moves) / finer
         moves = self._faster(moves, fine, tight, _WATCHED)
         checked = self._check(moves)
         for k in range(_CORRECTIONS):
@@ -110,6 +110,13 @@ class FastestPlanner(MotionDemand):
             moves = [move.slower(_SLOWER) for move in moves]
             checked = self._check(moves)
         return self._told(checked)
+
+    @staticmethod
+    def _fine_spacing(moves: list[Move]) -> float:
+        """Return how far apart knots are at last [s]: closer where there is little to plan."""
+        duration = sum(move.duration for move in moves)
+        least, most = (duration / count for count in _KNOTS[::-1])
+        return float(max(min(_FINE, max(most, _FINEST)), least))
 
     def _first(self, moves: list[Move]) -> list[Move]:
         """Return moves that are slowed down where they do not fit."""

@@ -44,7 +44,7 @@ def test_every_key_of_a_scenario_is_told() -> None:
 @pytest.mark.parametrize(
     "row",
     [
-        "| `velocity` | number or `null` | m/s | `null` | Largest velocity, 1e-6 to 1e3; null for 0.1,",
+        "| `velocity` | number or `null` | m/s | `null` | Largest velocity, 1e-6 to 1e3;",
         "| `radius` | number | m | `0.15` | Radius, 1e-4 to 1e4. |",
         "| `mass` | [block](#keys-profile) | kg or kg m^2 | *must be given* | `m`, positive. |",
         "| `stiffness` | number, or list of numbers |",
