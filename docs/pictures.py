@@ -39,11 +39,13 @@ MOMENTS = {
     "pfc_comau_6r": 1.8,
     "pfc_comau_6r_elastic": 1.8,
     "pfc_compliant_6r": 2.8,
+    "pfc_delta_notch": 1.3,
+    "pfc_delta_notch_stiff": 1.3,
     "pfc_elbow_7r": 5.4,
     "pfc_two_arms": 1.9,
     "pfc_new_path_6r": 3.0,
     "pfc_stream_6r": 2.4,
-    "plate_mounting": 9.5,
+    "plate_mounting": 11.0,
     "plate_return": 7.0,
     "sfc_comau_paraboloid": 7.2,
     "sfc_polish": 6.0,
@@ -65,6 +67,17 @@ MOMENTS = {
     "vf_soft_region": 7.0,
     "vf_wedge": 8.0,
 }
+# what may leave the picture, where something small is what counts
+_MAGAZINE = [f"mounting/magazine_rest_{i}" for i in range(4)]
+_NOTCH = ("delta_robot", "path_following")
+_PLATE = ("visualizer", "path_following", "mounting/magazine", *_MAGAZINE)
+LEFT_OUT = {
+    "pfc_delta_notch": _NOTCH,
+    "pfc_delta_notch_stiff": _NOTCH,
+    "plate_mounting": _PLATE,
+    "plate_return": _PLATE,
+    "vf_many_surfaces": ("visualizer",),
+}
 _LARGEST = 60_000  # bytes of a picture
 _BACKGROUND, _SEEN = (0.86, 0.89, 0.93), 6  # colour, and how far others are from it, of 255
 _MARGIN = 0.05  # beside what is seen, as a share of it
@@ -82,17 +95,20 @@ class Scene:
         scenario: Its name.
         begin: Time of the run at which it begins [s].
         end: And ends [s].
-        to_tool: Whether the arm may leave the picture.
+        left_out: What may leave the picture, by its path in the scene.
     """
 
     scenario: str
     begin: float
     end: float
-    to_tool: bool = False
+    left_out: Sequence[str] = ()
 
 
 # side by side, each as fast as makes both last equally long
-SCENES = (Scene("pfc_elastic_6r", 0.0, 3.6), Scene("vf_forbidden_region", 1.0, 16.0, True))
+SCENES = (
+    Scene("pfc_elastic_6r", 0.0, 3.6),
+    Scene("vf_forbidden_region", 1.0, 16.0, ("visualizer",)),
+)
 _FRAMES, _PACE, _SIDE = 72, 100, (400, 380)  # pictures, ms for each, pixels
 
 
@@ -145,20 +161,18 @@ class View:
         return Image.open(io.BytesIO(base64.b64decode(drawn.partition(",")[2]))).convert("RGB")
 
     def come_close(
-        self, moments: Sequence[float], size: tuple[int, int], to_tool: bool = False
+        self, moments: Sequence[float], size: tuple[int, int], left_out: Sequence[str] = ()
     ) -> None:
         """Narrow the view to what is to be seen.
 
         Args:
             moments: Times at which it is [s].
             size: Width and height in pixels of the pictures that are to be taken.
-            to_tool: Whether the arm may leave the picture.
+            left_out: What may leave the picture, by its path in the scene.
         """
-        shows = "viewer.set_property(['drake', 'visualizer'], 'visible', {})"
-        if to_tool:
-            self._evaluate(shows.format("false"))
+        self._show(left_out, False)
         drawn = [np.asarray(self.picture(moment, size)).astype(int) for moment in moments]
-        self._evaluate(shows.format("true"))
+        self._show(left_out, True)
         seen = np.any([abs(one - one[0, 0]).max(axis=2) > _SEEN for one in drawn], axis=0)
         rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
         if not rows.size:
@@ -169,6 +183,11 @@ class View:
         x, y = (low + high - (width, height)) / 2.0
         window = ", ".join(f"{value:.2f}" for value in (*size, x, y, width, height))
         self._evaluate(f"viewer.camera.setViewOffset({window})")
+
+    def _show(self, paths: Sequence[str], visible: bool) -> None:
+        for path in paths:
+            place = json.dumps(["drake", *path.split("/")])
+            self._evaluate(f"viewer.set_property({place}, 'visible', {json.dumps(visible)})")
 
     def _evaluate(self, expression: str) -> object:
         """Return what an expression of this page is; others may be open beside it."""
@@ -228,15 +247,16 @@ def record_run(scenario: str, folder: Path, duration: float | None = None) -> Pa
     return folder / "recording.html"
 
 
-def write_picture(view: View, moment: float, file: Path) -> int:
+def write_picture(view: View, moment: float, file: Path, left_out: Sequence[str] = ()) -> int:
     """Draw a recording at a time into a file, and return its size in bytes.
 
     Args:
         view: The recording.
         moment: When [s].
         file: For the picture, as WebP.
+        left_out: What may leave the picture, by its path in the scene.
     """
-    view.come_close([moment], SIZE)
+    view.come_close([moment], SIZE, left_out)
     picture = view.picture(moment, SIZE)
     for quality in (90, 80, 65, 50):
         content = io.BytesIO()
@@ -256,7 +276,7 @@ def write_film(views: Sequence[View], file: Path) -> int:
     """
     width, height = _SIDE
     for scene, view in zip(SCENES, views, strict=True):
-        view.come_close(np.linspace(scene.begin, scene.end, 8), _SIDE, scene.to_tool)
+        view.come_close(np.linspace(scene.begin, scene.end, 8), _SIDE, scene.left_out)
     frames = []
     for part in np.linspace(0.0, 1.0, _FRAMES):
         frame = Image.new("RGB", (width * len(views), height))
@@ -288,7 +308,9 @@ def main() -> None:
         recording = record_run(name, RUNS / name, MOMENTS.get(name))
         with opened_browser() as browser:
             view = View(browser, recording)
-            size = write_picture(view, view.duration, GALLERY / f"{name}.webp")
+            size = write_picture(
+                view, view.duration, GALLERY / f"{name}.webp", LEFT_OUT.get(name, ())
+            )
         console.print(f"{name}: {size / 1e3:.0f} kB")
 
 

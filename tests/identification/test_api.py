@@ -46,7 +46,7 @@ def test_a_model_of_it(found, tmp_path):
 def test_what_is_refused(tmp_path):
     with pytest.raises(InputError, match="no record; at least one is required"):
         estimate(ROBOT, [], out=tmp_path / "found", quiet=True)
-    with pytest.raises(InputError, match="none.yaml: cannot be read"):
+    with pytest.raises(InputError, match=r"none\.yaml: cannot be read"):
         simulate(ROBOT, excitation=tmp_path / "none.yaml", out=tmp_path / "runs", quiet=True)
     assert list(tmp_path.iterdir()) == []
 

@@ -158,8 +158,14 @@ def _triangles(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid.reshape(-1, 3), faces.reshape(-1, 3)
 
 
+# so many numbers can be read at a time; of more, those are shown that are nearest to the tool
+_READABLE = 8
+
+
 class RegionVisualizer(LeafSystem):
     """Draws the surfaces that a tool may not cross, and the world's axes at the tool.
+
+    Of more than eight numbers those of the nearest regions are shown.
 
     Ports:
         manifold_point (input): Point of the space manifold, the tool point first.
@@ -186,7 +192,12 @@ class RegionVisualizer(LeafSystem):
     ) -> None:
         super().__init__()
         self._surfaces, self._moving, self._meshcat = surfaces, moving, meshcat
-        self._numbers = numbers
+        self._numbers, self._seen = numbers, set(numbers)
+        ends = [*numbers, len(surfaces)][1:]
+        self._clouds = {
+            first: np.concatenate([skin.reshape(-1, 3) for skin, _ in surfaces[first:end]])
+            for first, end in zip(numbers, ends, strict=True)
+        }
         self._point = self.DeclareVectorInputPort("manifold_point", size)
         self._clock = self.DeclareVectorInputPort("region_clock", 1)
         self.DeclareInitializationPublishEvent(self._draw_surfaces)
@@ -197,6 +208,7 @@ class RegionVisualizer(LeafSystem):
             draw_surface(self._meshcat, f"{_REGION_ROOT}/{i}", skin, lines)
         for i, shown in self._numbers.items():
             draw_number(self._meshcat, f"{_REGION_ROOT}/{i}/number", shown)
+        self._seen = set(self._numbers)
         draw_frame(self._meshcat, f"{_REGION_ROOT}/frame")
         return EventStatus.Succeeded()
 
@@ -205,11 +217,28 @@ class RegionVisualizer(LeafSystem):
         if np.isfinite(position).all():
             X_WF = RigidTransform(position)
             self._meshcat.SetTransform(f"{_REGION_ROOT}/frame", X_WF, context.get_time())
-        if not self._clock.HasValue(context):
-            return
-        clock = float(self._clock.Eval(context)[0])
-        for i, placement in self._moving.items():
-            self._meshcat.SetTransform(f"{_REGION_ROOT}/{i}", placement(clock), context.get_time())
+        placed: dict[int, RigidTransform] = {}
+        if self._clock.HasValue(context):
+            clock = float(self._clock.Eval(context)[0])
+            placed = {i: placement(clock) for i, placement in self._moving.items()}
+        for i, X_WR in placed.items():
+            self._meshcat.SetTransform(f"{_REGION_ROOT}/{i}", X_WR, context.get_time())
+        if len(self._numbers) > _READABLE and np.isfinite(position).all():
+            self._show_nearest(position, placed, context.get_time())
+
+    def _show_nearest(
+        self, position: np.ndarray, placed: Mapping[int, RigidTransform], time: float
+    ) -> None:
+        """Show the numbers of the regions that are nearest to the tool."""
+        distances = {}
+        for i, cloud in self._clouds.items():
+            p_R = placed[i].inverse() @ position if i in placed else position
+            distances[i] = float(np.square(cloud - p_R).sum(axis=1).min())
+        nearest = set(sorted(distances, key=distances.__getitem__)[:_READABLE])
+        for i in self._seen ^ nearest:  # what the scene does not show yet
+            path = f"{_REGION_ROOT}/{i}/number"
+            self._meshcat.SetProperty(path, "visible", i in nearest, time)
+        self._seen = nearest
 
 
 # red, green, blue of the lowest value, of zero, and of the highest

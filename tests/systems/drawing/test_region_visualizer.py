@@ -7,6 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from pfsc_drake.systems.drawing.manifold_visualizer import RegionVisualizer
+from pfsc_drake.systems.drawing.numbers import SceneNumber
 
 
 @pytest.fixture(scope="module")
@@ -37,10 +38,14 @@ def test_regions_are_drawn_and_one_moves_by_the_clock(meshcat):
 
 
 class Scene:
-    """Stands in for Meshcat, and remembers what was moved."""
+    """Stands in for Meshcat, and remembers what was moved, hidden and shown."""
 
     def __init__(self):
-        self.moved = []
+        self.moved, self.seen = [], []
+
+    def SetProperty(self, path, name, value, time):
+        assert name == "visible"
+        self.seen.append((path, value, time))
 
     def SetTransform(self, path, X, time=None):
         if time is not None:
@@ -63,3 +68,37 @@ def test_nothing_moves_without_a_clock_or_a_place(place, clock):
     simulator.AdvanceTo(0.15)
     frame = ["fixtures/frame"] if np.isfinite(place) else []
     assert set(scene.moved) == {*frame, *(["fixtures/0"] if clock else [])}
+
+
+def test_of_many_numbers_those_near_the_tool_are_shown():
+    """Twelve squares in a row, the last of which comes to the tool."""
+    scene, grid = Scene(), np.zeros((2, 2, 3))
+    surfaces = [(grid + 0.1 * i * np.eye(3)[0], []) for i in range(12)]
+    number = SceneNumber(1, np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.1)
+    coming = {11: lambda clock: RigidTransform([-1.1 * clock, 0.0, 0.0])}
+    numbers = dict.fromkeys(range(12), number)
+    system = RegionVisualizer(surfaces, coming, 3, scene, 0.1, numbers)
+    simulator = Simulator(system)
+    context = simulator.get_mutable_context()
+    system.GetInputPort("manifold_point").FixValue(context, np.zeros(3))
+    clock = system.GetInputPort("region_clock").FixValue(context, [0.0])
+    simulator.AdvanceTo(0.25)
+    hidden = [(f"fixtures/{i}/number", False, 0.0) for i in range(8, 12)]
+    assert sorted(scene.seen) == sorted(hidden)  # once, as nothing changes
+    clock.GetMutableData().get_mutable_value().SetFromVector([1.0])
+    simulator.AdvanceTo(0.35)
+    changed = scene.seen[4:]
+    assert [entry[:2] for entry in sorted(changed)] == [
+        ("fixtures/11/number", True),
+        ("fixtures/7/number", False),
+    ]
+
+
+def test_few_numbers_are_all_shown():
+    scene, grid = Scene(), np.zeros((2, 2, 3))
+    number = SceneNumber(1, np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.1)
+    system = RegionVisualizer([(grid, [])] * 8, {}, 3, scene, 0.1, dict.fromkeys(range(8), number))
+    simulator = Simulator(system)
+    system.GetInputPort("manifold_point").FixValue(simulator.get_mutable_context(), np.zeros(3))
+    simulator.AdvanceTo(0.15)
+    assert scene.seen == []
