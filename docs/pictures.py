@@ -41,6 +41,8 @@ MOMENTS = {
     "pfc_compliant_6r": 2.8,
     "pfc_delta_notch": 1.3,
     "pfc_delta_notch_stiff": 1.3,
+    "pfc_crossing_6r": 2.2,
+    "pfc_crossing_7r": 4.0,
     "pfc_elbow_7r": 5.4,
     "pfc_two_arms": 1.9,
     "pfc_new_path_6r": 3.0,

@@ -39,6 +39,7 @@ _STUDIES = {
     "fixture_rules": "printed rules of forbidden regions against the program at an acute edge",
     "teleoperation": "couplings of leader and follower over a channel: felt, stable, passive",
     "fastest": "the fastest motion on ten paths, and how near it is to the best",
+    "crossings": "300 persons who walk across a path at random",
     "peers": "path following beside impedance control and Toppra",
     IDENTIFICATION: "from robots to their models and back",
     TEACH_IN: "a path taught by hand, and followed",
@@ -65,6 +66,7 @@ def study_command(
     if name not in _STUDIES:
         allowed = ", ".join(_STUDIES)
         raise InputError(f"study {shortened(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
+    from experiments.studies.crossings import write_crossings
     from experiments.studies.fastest import write_fastest
     from experiments.studies.fixture_rules import write_fixture_rules
     from experiments.studies.identify import write_identification
@@ -84,6 +86,7 @@ def study_command(
         "fixture_rules": write_fixture_rules,
         "teleoperation": write_teleoperation,
         "fastest": write_fastest,
+        "crossings": write_crossings,
         "peers": write_peers,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,
