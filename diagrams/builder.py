@@ -25,12 +25,12 @@ from diagrams.robots.joint_state import add_joint_state, add_link_state, states_
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
+from diagrams.scenario.pair import check_holder
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.station_parts import (
     add_afar,
     add_robot,
-    check_holder,
     choose_mounting,
     following_options,
     friction_options,

@@ -18,12 +18,12 @@ from diagrams.robots.joint_state import add_joint_state, add_link_state, states_
 from diagrams.robots.model import is_delta
 from diagrams.scenario import DriverParameters, HolderParameters, Scenario
 from diagrams.scenario.checks import require
+from diagrams.scenario.pair import holder_scenario
 from diagrams.signal_log import SignalLog
 from diagrams.station_parts import (
     belief_source,
     following_options,
     friction_options,
-    holder_scenario,
     make_task,
 )
 from diagrams.station_start import find_rest, find_start
@@ -143,6 +143,8 @@ def add_holder(
     """
     holder, own = scenario.holder, holder_scenario(scenario)
     assert holder is not None
+    model = scenario.robot.model
+    require(not is_delta(model), "robot.model", model, "a serial arm where there is a holder")
     named, period = PrefixingBuilder(builder, HOLDER), scenario.controller.sampling_time
     with naming_holder():
         _check(holder, period, order)

@@ -1,6 +1,5 @@
 """The parts of a station that a scenario chooses: task, robot, drives, workpiece."""
 
-from dataclasses import replace
 from pathlib import Path as FilePath
 
 from pydrake.systems.framework import DiagramBuilder
@@ -197,59 +196,6 @@ def add_robot(
     # what cannot be read is said before what it could not do
     _check_delta(scenario)
     return part
-
-
-def holder_scenario(scenario: Scenario) -> Scenario:
-    """Return the scenario of the robot that holds the workpiece alone.
-
-    Args:
-        scenario: One with a holder.
-    """
-    holder = scenario.holder
-    assert holder is not None
-    alone = replace(scenario.simulation, sensor_failure=holder.sensor_failure)
-    return Scenario(
-        robot=holder.robot,
-        path=holder.path,
-        controller=holder.controller,
-        model_error=holder.model_error,
-        reference=holder.reference,
-        start=holder.start,
-        simulation=alone,
-        friction=holder.friction,
-        encoders=holder.encoders,
-        faults=holder.faults,
-    )
-
-
-# what acts where the world's axes or one robot alone are meant
-_BESIDE_HOLDER = (
-    *("forces", "pushes", "hand", "operator", "hold_back", "servo", "driver", "compliance"),
-    *("notch", "workpiece", "plate"),
-)
-
-
-def check_holder(scenario: Scenario) -> None:
-    """Refuse what does not go with a robot that holds the workpiece.
-
-    Args:
-        scenario: One with a holder.
-
-    Raises:
-        InputError: If there is something of the kind.
-    """
-    plain, manifold = Scenario(), scenario.controller.manifold
-    for key in _BESIDE_HOLDER:
-        given = getattr(scenario, key) != getattr(plain, key)
-        require(not given, key, "given", "left out where a holder has the workpiece")
-    allowed = "path, trajectory or surface where a holder has the workpiece"
-    require(manifold != "space", "controller.manifold", manifold, allowed)
-    controller = scenario.controller
-    source = controller.external_torque.source
-    require(source == "none", "controller.external_torque.source", source, "none, with a holder")
-    require(controller.delay is None, "controller.delay", controller.delay, "null, with a holder")
-    model = scenario.robot.model
-    require(not is_delta(model), "robot.model", model, "a serial arm where there is a holder")
 
 
 def belief_source(scenario: Scenario, folder: FilePath) -> BeliefSource:

@@ -13,7 +13,7 @@ from diagrams.tasks.path_following import TrajectoryTask
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.paced_reference import PacedReference
+from pfsc_drake.control.law.waiting_reference import WaitingReference
 from pfsc_drake.control.obstacles.elbow_room import ElbowRoom
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
@@ -131,7 +131,7 @@ def add_waiting_reference(
         ``reference``, and for the log ``clock`` and ``watch``; of an elbow that gives way
         ``posture_torque``.
     """
-    timed = PacedReference(task.motion, waiting.pace, outputs, period)
+    timed = WaitingReference(task.motion, waiting.pace, outputs, period)
     generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
     shapes = [obstacle.shape for obstacle in waiting.crossing.moving]
     block = ObstacleWatch(waiting.ahead, shapes, waiting.crossing.watch, waiting.pace, period)

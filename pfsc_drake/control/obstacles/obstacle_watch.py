@@ -75,7 +75,7 @@ class ObstacleWatch(Block):
     If something measured is no number, it stops.
 
     Ports:
-        clock (input): Of a :class:`PacedReference`, shape (3,).
+        clock (input): Of a :class:`WaitingReference`, shape (3,).
         joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
         obstacles (input): Position and velocity of K obstacles as measured, shape (6K,)
             [m, m/s].

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.law.paced_reference import PacedReference
 from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.law.waiting_reference import WaitingReference
 from pfsc_drake.control.obstacles.clearance import ObstacleShape
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
 from pfsc_drake.control.obstacles.parameters import WatchParameters
@@ -41,7 +41,7 @@ class _Crane:
         q = np.vstack([x, np.zeros(len(x))])
         points = outline_points(chain, outline).map(len(x))(q).full().T
         ahead = ArmAhead(chain, outline, 0.0, step, points)
-        self.reference = Stepper(PacedReference(motion, self.pace, 1, PERIOD))
+        self.reference = Stepper(WaitingReference(motion, self.pace, 1, PERIOD))
         self.watch = Stepper(
             ObstacleWatch(ahead, [SHAPE], parameters, self.pace, PERIOD), ("asked",)
         )

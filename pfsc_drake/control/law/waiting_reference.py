@@ -10,7 +10,7 @@ from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 
 
-class PacedReference(TimedReference):
+class WaitingReference(TimedReference):
     """A :class:`TimedReference` whose override depends on where it is.
 
     It starts at rest. Its ``clock`` is a state alone, so that what decides over the override from

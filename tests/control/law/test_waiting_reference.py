@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.law.paced_reference import PacedReference
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
+from pfsc_drake.control.law.waiting_reference import WaitingReference
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 
 PERIOD = 1e-3
@@ -15,7 +15,7 @@ MOTION = rest_to_rest([0.0, 1.0], velocity=0.5, acceleration=2.0, dwell=0.1)
 
 def test_it_starts_at_rest_and_then_is_a_timed_reference():
     pace = WaitingPace(4, 25.0, 0.05)
-    paced = Stepper(PacedReference(MOTION, pace, 3, PERIOD))
+    paced = Stepper(WaitingReference(MOTION, pace, 3, PERIOD))
     timed = Stepper(TimedReference(MOTION, 4, 3, PERIOD, 25.0), ("override",))
     timed.start(override=0.0)
     rng = np.random.default_rng(3)
