@@ -141,10 +141,12 @@ def add_afar(
         start: Where the tool starts.
 
     Raises:
-        InputError: If nobody is there, or times do not suit the sampling time.
+        InputError: If nobody is there, or nothing yields.
     """
     if scenario.teleoperation is None:
         return None
+    allowed = "null where nothing yields to what a sensor measures (compliance)"
+    require(scenario.compliance.needs_sensor, "teleoperation", "given", allowed)
     period = scenario.controller.sampling_time
     way, y_0 = scenario.teleoperation, start.target.y_t
     return add_operator_afar(builder, way, scenario.hand, operator, task, y_0, period)

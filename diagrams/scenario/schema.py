@@ -150,9 +150,6 @@ class Scenario:
         for key in ("duration", "judged_after"):
             require_not_negative(key, getattr(self, key))
         require_positive("settling_tolerance", self.settling_tolerance)
-        if self.teleoperation is not None:
-            allowed = "null where nothing yields to what a sensor measures (compliance)"
-            require(self.compliance.needs_sensor, "teleoperation", "given", allowed)
         for law in self.targets:
             require_one_of("targets", law, RELATIVE_DEGREE)
 

@@ -7,14 +7,13 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import HandParameters, HandWaypoint
-from diagrams.scenario.schema import Scenario, driven
+from diagrams.scenario.schema import driven
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from experiments.results.run_signals import collect_log
 from experiments.results.teleoperation import teleoperation_metrics
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.leader_device import ClutchParameters
-from pfsc_drake.yaml.typed import load_typed
 from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"
@@ -27,7 +26,7 @@ def run(settings, duration):
     return station, collect_log(station, result.root)
 
 
-def region(**teleoperation) -> Scenario:
+def region(**teleoperation):
     """A hand that pulls the tool down by 4 cm within half a second."""
     settings = shipped_scenario("teleop_region")
     for key, value in ({"smoothing": 0.004} | teleoperation).items():
@@ -88,11 +87,10 @@ def test_other_couplings_lead_the_tool_too(coupling):
 
 
 def test_what_leads_needs_a_tool_that_yields():
-    settings = shipped_scenario("vf_forbidden_region")
-    text = {"teleoperation": {}, "name": "x"}
+    settings = shipped_scenario("pfc_comau_6r")
+    settings.teleoperation = TeleoperationParameters()
     with pytest.raises(InputError, match="teleoperation = given"):
-        load_typed(Scenario, text, "made up")
-    assert settings.teleoperation is None
+        build_station(settings, SCENARIOS)
 
 
 def test_somebody_holds_the_leader():
