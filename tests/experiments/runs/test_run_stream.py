@@ -60,7 +60,7 @@ def test_it_never_passes_what_it_knows(exact):
     assert (exact["eta"] - known).max() < 1e-6
     assert exact["way_left"].min() >= -1e-12
     running = exact["stream_status"][:, 0] == StreamStatus.RUNNING
-    assert running.sum() > 1000
+    assert running.sum() > 400
     assert exact["eta_dot"].max() == pytest.approx(0.5, rel=0.01)
     assert exact["bend_speed"].max() == pytest.approx(0.5)
 
@@ -68,7 +68,7 @@ def test_it_never_passes_what_it_knows(exact):
 def test_a_run_tells_what_became_of_way_points(exact):
     assert exact.metrics["way_points_taken"]["value"] > 20
     assert exact.metrics["past_known_way"]["value"] < 1e-6
-    assert exact.metrics["past_known_way"]["target"] == "<= 0.001"
+    assert exact.metrics["past_known_way"]["target"] == "< 0.5e-3"
 
 
 def test_it_goes_over_to_a_new_path_without_stopping(tmp_path, run_scenario):
