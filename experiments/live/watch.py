@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 
+import casadi as ca
 import numpy as np
 
 from diagrams.builder import build_station, draw_station
@@ -19,13 +20,15 @@ from experiments.live.session import Teller
 from experiments.live.status import LiveStatus
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
+from pfsc_drake import jets
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.manifolds.coordinate import Kind
-from pfsc_drake.control.manifolds.manifold import indices
+from pfsc_drake.control.manifolds.manifold import PlaceManifold, indices
 from pfsc_drake.drivers.link import WatchingEnd
 from pfsc_drake.drivers.messages import RobotStatus
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Pause, Request
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import pose_function
+from pfsc_drake.robot.robot_model import RobotModel, pose_function
 from pfsc_drake.yaml.typed import load_typed
 from reporting.processes import noticed_interruption
 
@@ -114,6 +117,8 @@ class Watch:
         self._scene: Scene | None = None
         self._make = scene
         self._names = station.law.linearization.manifold.coordinates
+        self._coordinates = coordinate_function(station.task.place, station.part.belief.robot)
+        self._seen: dict[str, float] = {}
         status.override = 1.0
 
     def look(self, timeout: float) -> bool:
@@ -142,7 +147,11 @@ class Watch:
         positions = coordinates.plant_state(state)[: coordinates.num_states // 2]
         pose = np.array(self._pose(q)).ravel()
         point = self._station.task.evaluate(pose[:3], self._memory)
-        self._memory = point[self._station.task.place.layout.memory]
+        place = self._station.task.place
+        self._memory = point[place.layout.memory]
+        values = np.array(self._coordinates(q, point)).ravel()
+        names = [coordinate.name for coordinate in place.coordinates]
+        self._seen = {name: float(v) for name, v in zip(names, values, strict=True)}
         frame = LiveFrame(positions, pose, point, np.zeros(3))
         if self._scene is None:
             self._scene = self._make(frame)
@@ -171,8 +180,25 @@ class Watch:
             (Kind.ROTATIONAL, "angles"),
         ):
             names = [coordinate.name for coordinate in self._names[indices(self._names, kind)]]
-            setattr(status, kept, {name: told[name] for name in names if name in told})
+            # a loop in C tells none: then they are those of the joints that the robot tells
+            known = self._seen | told
+            setattr(status, kept, {name: known[name] for name in names if name in known})
         status.controls = self._panel.content(status.override)
+
+
+@once_per_content()
+def coordinate_function(manifold: PlaceManifold, robot: RobotModel) -> ca.Function:
+    """Return the coordinates of a tool on a manifold, ``(q, point) -> values``, shape (m,).
+
+    Args:
+        manifold: The manifold, whose point is given.
+        robot: The robot that carries the tool.
+    """
+    q, point = ca.SX.sym("q", robot.dimension), ca.SX.sym("point", manifold.layout.size)
+    resting = [jets.constant(q[i], 1) for i in range(robot.dimension)]
+    outputs = manifold.virtual_output(*robot.tool_pose(resting), point, [])
+    values = ca.vertcat(*[output.coefficients[0] for output in outputs])
+    return ca.Function("coordinates", [q, point], [ca.densify(values)])
 
 
 def run_watch(scenario: ScenarioFile, end: WatchingEnd, *, port: int, tell: Teller) -> None:

@@ -15,6 +15,9 @@ from pfsc_drake.drivers.remote_values import Request
 from pfsc_drake.errors import InputError
 from tests.experiments.hardware.test_drive import Loop, panda
 
+# what a loop in C tells
+PROGRESS = ("time", "motion_time", "override", "stopping", "ended", "missed", "clipped")
+
 
 class Frames:
     """A scene that keeps what it is given."""
@@ -74,6 +77,22 @@ def test_what_is_seen(watched):
     on_path = frame.manifold_point[layout.position][:3]
     assert np.linalg.norm(frame.tool_pose[:3] - on_path) < 1e-4
     assert json.dumps(status.content(), allow_nan=False)
+
+
+def test_a_loop_in_c_tells_no_coordinates(watched):
+    """They are found from what the robot tells, and are those that the controller has."""
+    progress = watched.loop.drive.progress()
+    bare = {name: value for name, value in progress.items() if name in PROGRESS}
+    watched.loop.end.tell(2, bare)
+    watched.watch.look(0.0)
+    status = watched.status
+    assert list(status.deviation) == ["xi_1", "xi_2"]
+    assert list(status.progress) == ["eta"]
+    assert len(status.angles) == 3
+    for kept in (status.deviation, status.progress, status.angles):
+        for name, value in kept.items():
+            assert value == pytest.approx(progress[name], abs=1e-5), name
+    assert status.progress["eta"] > 0.01
 
 
 def test_the_page_slows_pauses_and_goes_on(watched):
