@@ -16,6 +16,7 @@ from diagrams.warnings.law_warnings import (
     stiff_regions,
     unused_parameters,
 )
+from diagrams.warnings.obstacles import obstacle_warnings
 from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
 from diagrams.warnings.untold_forces import (
     ExpectedForces,
@@ -59,6 +60,7 @@ def controller_warnings(
     if scenario.friction.is_given:
         said += untold_friction(bearable, parameters, law)
     said += observed_force_warnings(scenario.compliance, robot, law, rest)
+    said += obstacle_warnings(scenario.obstacles)
     said += unused_parameters(parameters, law)
     if scenario.fixtures is not None and isinstance(task, SpaceTask):
         said += stiff_regions(scenario.fixtures.regions, task.guided)

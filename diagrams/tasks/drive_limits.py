@@ -73,7 +73,9 @@ def keep_drive_limits(
     led = isinstance(task, SpaceTask) or law.stabilization.is_free[along].any()
     if task.drive_plan is not None or led or task.motion.domain[1] > _LONGEST:
         return
-    task.drive_plan = DrivePlanner(reference, controller, duration, task, law, start, friction).plan()
+    task.drive_plan = DrivePlanner(
+        reference, controller, duration, task, law, start, friction
+    ).plan()
     task.motion = task.drive_plan.motion
 
 

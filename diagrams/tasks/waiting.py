@@ -93,9 +93,7 @@ def plan_waiting(
     )
 
 
-def _ahead(
-    chain: SerialChain, radius: float, q: np.ndarray, fine: float, step: float
-) -> ArmAhead:
+def _ahead(chain: SerialChain, radius: float, q: np.ndarray, fine: float, step: float) -> ArmAhead:
     """Return where the arm will be, at steps of the horizon's length over their number [s]."""
     end = fine * (len(q) - 1)
     times = step * np.arange(int(np.ceil(end / step)) + 1)

@@ -9,8 +9,8 @@ from experiments.results.drives import add_friction
 from experiments.results.found_links import add_found_links
 from experiments.results.guidance import add_guidance
 from experiments.results.mounting import add_mounting_signals
-from experiments.results.path import add_pressing
 from experiments.results.obstacles import add_obstacles
+from experiments.results.path import add_pressing
 from experiments.results.posture import add_link_signals, add_posture
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS

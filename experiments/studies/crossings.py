@@ -1,5 +1,6 @@
 """Many persons who walk across a path at random, and how near they come to the arm."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
@@ -77,7 +78,7 @@ def _timed(
     stops: Sequence[np.ndarray], speeds: np.ndarray, pauses: np.ndarray, near: float
 ) -> list[dict[str, Any]]:
     """Return places with times, of which the one at the second place is given."""
-    ways = [float(np.linalg.norm(b - a)) for a, b in zip(stops[:-1], stops[1:], strict=True)]
+    ways = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(stops)]
     lasts = np.array(ways) / speeds
     times, time = [], near - lasts[0]
     for k, stop in enumerate(stops):
@@ -200,7 +201,10 @@ def _picture(rows: Mapping[int, RunRow]) -> Figure:
         left, right = canvas.subplots(1, 2)
         bins = np.linspace(0.0, 1.4, 57)
         for k, (name, label) in enumerate(
-            {"least_distance": "at any time", "least_distance_while_moving": "while it moves"}.items()
+            {
+                "least_distance": "at any time",
+                "least_distance_while_moving": "while it moves",
+            }.items()
         ):
             left.hist(values[name], bins, color=COLOURS[k], alpha=0.6, label=label)
         left.axvline(0.15, color=INK, linestyle="--", linewidth=1.1, label="margin")

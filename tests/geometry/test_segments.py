@@ -1,3 +1,5 @@
+"""Distances of segments against a search, and where they degenerate."""
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -38,6 +40,7 @@ def test_distances_are_the_least_that_a_search_finds():
 def test_degenerate_segments(ends, expected):
     distance, _ = to_segment(*[ca.DM(end) for end in ends])
     assert float(distance) == pytest.approx(expected, abs=1e-9)
-    a, b, c, _ = (ca.DM(end) for end in ends)
-    least = min(np.linalg.norm((a + t * (b - a) - c).full()) for t in np.linspace(0, 1, 20001))
-    assert float(to_point(a, b, c)) == pytest.approx(least, abs=1e-4)
+    a, b, c, _ = (np.array(end, dtype=float) for end in ends)
+    places = a + np.linspace(0, 1, 20001)[:, None] * (b - a)
+    least = np.linalg.norm(places - c, axis=1).min()
+    assert float(to_point(*map(ca.DM, (a, b, c)))) == pytest.approx(least, abs=1e-4)

@@ -1,5 +1,6 @@
 """How far an arm is from obstacles, now and where they are expected."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -80,7 +81,7 @@ def clearance_function(
         p, v = axes * obstacle[:3], axes * obstacle[3:]
         c = p + v * (foresight.age + begin)
         d = p + v * (foresight.age + foresight.horizon)
-        for a, b in zip(places[:-1], places[1:], strict=True):
+        for a, b in itertools.pairwise(places):
             near = ca.fmin(near, to_point(axes * a, axes * b, p) - size)
             distance, share = to_segment(axes * a, axes * b, c, d)
             time = begin + share * (foresight.horizon - begin)
@@ -113,7 +114,7 @@ def least_distances(
     for k, shape in enumerate(shapes):
         axes = shape.axes.full().ravel()
         p, least = axes * positions[:, 3 * k : 3 * k + 3], np.full(len(arm), np.inf)
-        for a, b in zip(places[:-1], places[1:], strict=True):
+        for a, b in itertools.pairwise(places):
             along, away = axes * (b - a), p - axes * a
             length = np.maximum(np.sum(along**2, axis=1), 1e-12)
             share = np.clip(np.sum(away * along, axis=1) / length, 0.0, 1.0)

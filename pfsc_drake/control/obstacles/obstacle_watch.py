@@ -161,7 +161,9 @@ class ObstacleWatch(Block):
         )
         return {
             "override": where(known, override, 0.0),
-            "record": ca.vertcat(where(known, now, ca.DM.nan(1)), permitted, all_of(known, passing)),
+            "record": ca.vertcat(
+                where(known, now, ca.DM.nan(1)), permitted, all_of(known, passing)
+            ),
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
@@ -191,7 +193,9 @@ def _decision(
     See :class:`ObstacleWatch`; the first three are rows of all samples.
     """
     p = parameters
-    near, expected, times = (ca.SX.sym(name, 1, STEPS + 1) for name in ("near", "expected", "times"))
+    near, expected, times = (
+        ca.SX.sym(name, 1, STEPS + 1) for name in ("near", "expected", "times")
+    )
     rest, asked, now, passed = (ca.SX.sym(name) for name in ("rest", "asked", "now", "passed"))
 
     def until(distance: Any) -> Any:

@@ -1,5 +1,6 @@
 """The pace at which a motion can be stopped in the time that is left."""
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -126,7 +127,7 @@ class WaitingPace:
         # z_{k+1} = z_k + z_k' / omega
         lags, total = list(rates), rates[0]
         for _ in range(self.order - 1):
-            lags = [a + b / self.bandwidth for a, b in zip(lags[:-1], lags[1:], strict=True)]
+            lags = [a + b / self.bandwidth for a, b in itertools.pairwise(lags)]
             total = total + lags[0]
         return s + total / self.bandwidth
 
@@ -143,7 +144,7 @@ class WaitingPace:
         r, omega = self.order, self.bandwidth
         # Q' = -x^(r-1) e^-x / (r-1)!, a polynomial times e^-x
         fading = np.polynomial.Polynomial([1.0 / math.factorial(k) for k in range(r)])
-        rates = []
+        rates: list[np.ndarray] = []
         for _ in range(4):
             rates.append(fading(x) * np.exp(-x) * omega ** len(rates))
             fading = fading.deriv() - fading

@@ -1,3 +1,5 @@
+"""The pace at which a motion can be stopped in the time that is left."""
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -99,10 +101,12 @@ def test_the_rates_of_a_stop_are_derivatives_of_its_way():
     way, rates = WaitingPace(4, 25.0, 0.05).stop(x)
     for lower, upper in zip([way, *rates.T[:3]], rates.T, strict=True):
         integral = cumulative_simpson(upper, x=x / 25.0, initial=0.0)
-        np.testing.assert_allclose(lower - lower[0], integral, atol=1e-8 * np.abs(lower).max() + 1e-9)
+        np.testing.assert_allclose(
+            lower - lower[0], integral, atol=1e-8 * np.abs(lower).max() + 1e-9
+        )
 
 
 @pytest.mark.parametrize(("bandwidth", "resting"), [(0.0, 0.05), (25.0, 0.0), (25.0, 1.0)])
 def test_what_is_no_pace_is_refused(bandwidth, resting):
-    with pytest.raises(InputError, match="bandwidth|resting"):
+    with pytest.raises(InputError, match=r"bandwidth|resting"):
         WaitingPace(4, bandwidth, resting)
