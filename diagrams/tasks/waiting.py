@@ -14,6 +14,7 @@ from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.paced_reference import PacedReference
+from pfsc_drake.control.obstacles.elbow_room import ElbowRoom
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.control.planning.course import CourseStart
@@ -75,6 +76,10 @@ def plan_waiting(
     if not isinstance(chain, SerialChain):
         raise InputError("obstacles = given: must be null for a robot that is no chain of links")
     require(not reference.swings, "reference.swings", "given", "none where there are obstacles")
+    if crossing.elbow is not None:
+        allowed = "null for an arm without joints to spare, and one whose posture yields to forces"
+        spare = law.posture is not None and controller.posture.yields == "none"
+        require(spare, "obstacles.elbow", "given", allowed)
     watch = crossing.watch
     planner = DrivePlanner(reference, controller, 0.0, task, law, start, friction)
     try:
@@ -123,7 +128,8 @@ def add_waiting_reference(
         ports: ``joint_state`` and ``obstacles_measured``.
 
     Returns:
-        ``reference``, and for the log ``clock`` and ``watch``.
+        ``reference``, and for the log ``clock`` and ``watch``; of an elbow that gives way
+        ``posture_torque``.
     """
     timed = PacedReference(task.motion, waiting.pace, outputs, period)
     generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
@@ -134,7 +140,15 @@ def add_waiting_reference(
     builder.Connect(ports["joint_state"], watch.GetInputPort("joint_state"))
     builder.Connect(ports["obstacles_measured"], watch.GetInputPort("obstacles"))
     builder.Connect(watch.GetOutputPort("override"), generator.GetInputPort("override"))
-    return {
+    made = {}
+    if waiting.crossing.elbow is not None:
+        ahead, age = waiting.ahead, waiting.crossing.watch.latency
+        room = ElbowRoom(ahead.chain, ahead.outline, shapes, waiting.crossing.elbow, age)
+        elbow = builder.AddNamedSystem("elbow_room", BlockSystem(room, period))
+        builder.Connect(ports["joint_state"], elbow.GetInputPort("joint_state"))
+        builder.Connect(ports["obstacles_measured"], elbow.GetInputPort("obstacles"))
+        made["posture_torque"] = elbow.GetOutputPort("torque")
+    return made | {
         "reference": generator.GetOutputPort("reference"),
         "clock": generator.GetOutputPort("clock"),
         "watch": watch.GetOutputPort("record"),

@@ -188,9 +188,10 @@ class ObstacleWatch(Block):
 def _decision(
     parameters: WatchParameters, pace: WaitingPace, step: float, between: float, period: float
 ) -> ca.Function:
-    """Return ``(near, expected, times, rest, asked, now, passed) -> (override, permitted, passes)``.
+    """Return what decides over the pace, see :class:`ObstacleWatch`.
 
-    See :class:`ObstacleWatch`; the first three are rows of all samples.
+    It is ``(near, expected, times, rest, asked, now, passed) -> (override, permitted, passes)``;
+    the first three are rows of all samples.
     """
     p = parameters
     near, expected, times = (

@@ -1,0 +1,114 @@
+"""What makes an elbow give way to obstacles where the tool leaves it free."""
+
+import dataclasses as dc
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.checks import require_positive
+from pfsc_drake.compiled.content import once_per_content
+from pfsc_drake.control.obstacles.clearance import ObstacleShape
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.outline import ArmOutline, outline_points
+
+# m, below which an obstacle is on a joint and no direction leads away
+_ON_IT = 1e-6
+
+
+@dc.dataclass
+class ElbowParameters:
+    """How an elbow gives way to obstacles.
+
+    Attributes:
+        room: Distance below which it does [m].
+        stiffness: Of what pushes it [N/m].
+        force_limit: Largest push [N].
+    """
+
+    room: float = 0.4
+    stiffness: float = 150.0
+    force_limit: float = 30.0
+
+    def __post_init__(self) -> None:
+        for key in ("room", "stiffness", "force_limit"):
+            require_positive(key, getattr(self, key))
+
+
+class ElbowRoom(Block):
+    """Torques that push the joints between shoulder and tool away from obstacles.
+
+    A point p of the arm's outline that is nearer than ``room`` is pushed as by a spring,
+
+        f = min(k (room - d), f_max) n,    d = |p - p_O| - R - r,
+
+    n being the unit vector from the obstacle to it, in the plane for a column. The torques
+    ``sum J_p' f`` are for a posture that yields to them, see
+    :class:`~pfsc_drake.control.compliance.posture_impedance.YieldingPosture`: it takes of them
+    what does no work on the outputs, so that the tool does not leave its path. What is not a
+    number pushes nothing.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
+        obstacles (input): Position and velocity of K obstacles as measured, shape (6K,) [m, m/s].
+        torque (output): On the link side, shape (N,) [Nm or N].
+
+    Args:
+        chain: The arm as it is believed, N joints.
+        outline: Its outline.
+        shapes: The obstacles.
+        parameters: How it gives way.
+        age: Of what is measured [s].
+    """
+
+    def __init__(
+        self,
+        chain: SerialChain,
+        outline: ArmOutline,
+        shapes: Sequence[ObstacleShape],
+        parameters: ElbowParameters,
+        age: float,
+    ) -> None:
+        self._n = chain.dimension
+        self._torque = _torque_function(chain, outline, shapes, parameters, age)
+        self.inputs = {
+            "joint_state": Port(4 * self._n, "rad, rad/s or m, m/s"),
+            "obstacles": Port(6 * len(shapes), "m, m/s"),
+        }
+        self.outputs, self.states = {"torque": Port(self._n, "Nm or N")}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        torque = self._torque(u.joint_state[: self._n], u.obstacles)
+        return {"torque": where(all_finite(torque), torque, 0.0)}
+
+
+@once_per_content()
+def _torque_function(
+    chain: SerialChain,
+    outline: ArmOutline,
+    shapes: Sequence[ObstacleShape],
+    parameters: ElbowParameters,
+    age: float,
+) -> ca.Function:
+    """Return ``(q, obstacles) -> torque``, see :class:`ElbowRoom`."""
+    q, obstacles = ca.SX.sym("q", chain.dimension), ca.SX.sym("obstacles", 6 * len(shapes))
+    # the tool point keeps to its path
+    points = outline_points(chain, outline)(q)[: 3 * (len(outline.points) - 1)]
+    forces = []
+    for point in ca.vertsplit(points, 3):
+        force = ca.SX(np.zeros(3))
+        for shape, obstacle in zip(shapes, ca.vertsplit(obstacles, 6), strict=True):
+            away = shape.axes * (point - obstacle[:3] - age * obstacle[3:])
+            length = ca.fmax(ca.norm_2(away), _ON_IT)
+            left = parameters.room - (length - shape.radius - outline.radius)
+            push = ca.fmin(ca.fmax(parameters.stiffness * left, 0.0), parameters.force_limit)
+            force += push * away / length
+        forces.append(force)
+    torque = ca.jtimes(points, q, ca.vertcat(*forces), True)
+    return ca.Function(
+        "elbow_torque", [q, obstacles], [ca.densify(torque)], ["q", "obstacles"], ["torque"]
+    )
