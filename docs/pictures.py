@@ -39,6 +39,8 @@ MOMENTS = {
     "pfc_comau_6r": 1.8,
     "pfc_comau_6r_elastic": 1.8,
     "pfc_compliant_6r": 2.8,
+    "pfc_crossing_6r": 2.2,
+    "pfc_crossing_7r": 4.0,
     "pfc_elbow_7r": 5.4,
     "plate_mounting": 9.5,
     "plate_return": 7.0,

@@ -37,6 +37,7 @@ _STUDIES = {
     "tracking": "path following against trajectory tracking",
     "joint_sides": "elastic joints of which both sides, torques, or motors alone are measured",
     "fixture_rules": "printed rules of forbidden regions against the program at an acute edge",
+    "crossings": "300 persons who walk across a path at random",
     "peers": "path following beside impedance control and Toppra",
     IDENTIFICATION: "from robots to their models and back",
     TEACH_IN: "a path taught by hand, and followed",
@@ -63,6 +64,7 @@ def study_command(
     if name not in _STUDIES:
         allowed = ", ".join(_STUDIES)
         raise InputError(f"study {shortened(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
+    from experiments.studies.crossings import write_crossings
     from experiments.studies.fixture_rules import write_fixture_rules
     from experiments.studies.identify import write_identification
     from experiments.studies.joint_sides import write_joint_sides
@@ -78,6 +80,7 @@ def study_command(
         "tracking": write_tracking,
         "joint_sides": write_joint_sides,
         "fixture_rules": write_fixture_rules,
+        "crossings": write_crossings,
         "peers": write_peers,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,
