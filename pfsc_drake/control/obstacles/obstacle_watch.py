@@ -156,9 +156,9 @@ class ObstacleWatch(Block):
             way + self._pace.lag,
         )
         now, _ = self._now(arm, obstacles, 0.0)
-        override, permitted, passing = self._decide(
-            near, expected, times, rest, asked, now, x.passing
-        )
+        # without uncertainty, setting off needs no more than going on
+        passed = x.passing if self._parameters.uncertainty > 0.0 else 0.0
+        override, permitted, passing = self._decide(near, expected, times, rest, asked, now, passed)
         return {
             "override": where(known, override, 0.0),
             "record": ca.vertcat(

@@ -1,0 +1,67 @@
+"""A person who crosses the path: kept, and broken, promises of a run on the truth."""
+
+import pytest
+
+from experiments.scenario_file import read_scenario
+from experiments.simulated_run import run_scenario
+from pfsc_drake.errors import InputError
+
+
+class _Silent:
+    def expect(self, duration):
+        """Told the simulated time at the end."""
+
+    def __call__(self, simulated_time, phase):
+        """Told what goes on."""
+
+
+def _run(folder, *overrides, duration=2.0):
+    return run_scenario(
+        read_scenario("pfc_crossing_6r", list(overrides), ()),
+        out=folder,
+        duration=duration,
+        figures=False,
+        recording=False,
+        progress=_Silent(),
+    )
+
+
+def test_the_tool_waits_and_its_promise_is_kept(tmp_path):
+    outcome = _run(tmp_path)
+    metrics = outcome.metrics
+    assert outcome.fault is None
+    assert outcome.broken == []
+    assert metrics["least_distance_while_moving"].passed
+    assert metrics["waited_time"].value > 0.5
+    assert metrics["max_path_deviation"].value < 0.5e-3
+    assert not [warning for warning in outcome.warnings if "obstacles" in warning]
+
+
+def test_who_is_faster_than_was_said_breaks_the_promise_and_the_run_says_so(tmp_path):
+    outcome = _run(
+        tmp_path,
+        "obstacles.watch.largest_speed=0.01",
+        "obstacles.watch.horizon=0.1",
+        "obstacles.watch.margin=0.6",
+        "obstacles.watch.side=0.0",
+        "obstacles.watch.uncertainty=0.0",
+        duration=1.6,
+    )
+    assert any("largest_speed = 0.01 m/s" in warning for warning in outcome.warnings)
+    assert outcome.fault is None
+    assert len(outcome.broken) == 1
+    assert outcome.broken[0].startswith("least_distance_while_moving = ")
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("obstacles.moving=[]", "moving"),
+        ("obstacles.sensor.delay=0.0003", "obstacles.sensor.delay"),
+        ("obstacles.elbow.room=0.3", "obstacles.elbow"),
+        ("controller.manifold=trajectory", "obstacles = given"),
+    ],
+)
+def test_what_does_not_suit_is_refused_by_its_key(tmp_path, override, message):
+    with pytest.raises(InputError, match=message):
+        _run(tmp_path, override)
