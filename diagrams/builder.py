@@ -125,7 +125,9 @@ def build_station(
         scenario.reference, scenario.controller, scenario.duration, task, law, begun, friction
     )
     crossing = scenario.obstacles
-    if crossing is not None:
+    if like is not None:
+        following = replace(following, waiting=like.waiting)
+    elif crossing is not None:
         chosen = scenario.reference, scenario.controller
         waiting = plan_waiting(crossing, *chosen, task, law, begun, friction)
         following = replace(following, waiting=waiting)
