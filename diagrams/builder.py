@@ -137,7 +137,9 @@ def build_station(
         begun = CourseStart(rest().q_J, start.place)
         asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
         keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress)
-        if crossing is not None:
+        if like is not None:
+            following = replace(following, waiting=like.waiting)
+        elif crossing is not None:
             waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
             following = replace(following, waiting=waiting)
 

@@ -42,10 +42,10 @@ class Stride:
 
 @dc.dataclass
 class ObstacleParameters:
-    """An obstacle and its way: from place to place without overshooting, at rest before and after.
+    """An obstacle and its way, place to place without overshooting; before and after it stands.
 
     The way is a piecewise cubic Hermite interpolation, coordinate by coordinate (Fritsch and
-    Butland 1984), with a continuous velocity; where two places are the same it stands.
+    Butland 1984), its velocity continuous in between; where two places are the same it stands.
 
     Attributes:
         kind: ``sphere``, or ``column`` of all heights, as a person.
