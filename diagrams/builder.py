@@ -140,6 +140,8 @@ def build_station(
         if like is not None:
             following = replace(following, waiting=like.waiting)
         elif crossing is not None:
+            given, allowed = scenario.compliance.is_given, "left out where progress waits"
+            require(not given, "compliance", "given", allowed)
             waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
             following = replace(following, waiting=waiting)
 

@@ -60,6 +60,7 @@ def test_who_is_faster_than_was_said_breaks_the_promise_and_the_run_says_so(tmp_
         ("obstacles.sensor.delay=0.0003", "obstacles.sensor.delay"),
         ("obstacles.elbow.room=0.3", "obstacles.elbow"),
         ("controller.manifold=trajectory", "obstacles = given"),
+        ("compliance.transversal.stiffness={value: 2000}", "compliance = given"),
     ],
 )
 def test_what_does_not_suit_is_refused_by_its_key(tmp_path, override, message):
