@@ -7,6 +7,9 @@ from experiments.simulated_run import run_scenario
 from pfsc_drake.errors import InputError
 
 
+_YIELDING = "{mass: {value: 10}, damping: {value: 400}, stiffness: {value: 2000}}"
+
+
 class _Silent:
     def expect(self, duration):
         """Told the simulated time at the end."""
@@ -60,7 +63,7 @@ def test_who_is_faster_than_was_said_breaks_the_promise_and_the_run_says_so(tmp_
         ("obstacles.sensor.delay=0.0003", "obstacles.sensor.delay"),
         ("obstacles.elbow.room=0.3", "obstacles.elbow"),
         ("controller.manifold=trajectory", "obstacles = given"),
-        ("compliance.transversal.stiffness={value: 2000}", "compliance = given"),
+        (f"compliance.transversal={_YIELDING}", "compliance = given"),
     ],
 )
 def test_what_does_not_suit_is_refused_by_its_key(tmp_path, override, message):
