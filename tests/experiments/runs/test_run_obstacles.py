@@ -6,7 +6,6 @@ from experiments.scenario_file import read_scenario
 from experiments.simulated_run import run_scenario
 from pfsc_drake.errors import InputError
 
-
 _YIELDING = "{mass: {value: 10}, damping: {value: 400}, stiffness: {value: 2000}}"
 
 
