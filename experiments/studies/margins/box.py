@@ -140,9 +140,10 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     """
     result, removed = deepcopy(settings), []
     # a model that errs asks for more at a state of one that does not; at its limit a drive is
-    # no loop any more
-    result.controller.effort_scale *= _UNLIMITED
-    removed.append("limits of the drives")
+    # no loop any more. A motion that these limits decide over leaves a reserve
+    if settings.reference.speed != "fastest":
+        result.controller.effort_scale *= _UNLIMITED
+        removed.append("limits of the drives")
     rubs = settings.drive_friction is not False and is_delta(settings.robot.model)
     if settings.friction.is_given or rubs:
         result.friction = JointFrictionParameters()

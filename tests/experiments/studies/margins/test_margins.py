@@ -134,6 +134,16 @@ def test_a_run_prints_one_line_of_margins(tmp_path, capsys):
     assert metrics["margins_slowest_rate"]["value"] < 0.0
 
 
+def test_limits_stay_that_decide_over_the_motion():
+    """Without them the fastest motion would be another one."""
+    settings = Scenario()
+    assert smooth(settings)[0].controller.effort_scale > 1e3
+    settings.reference.speed = "fastest"
+    smoothed, removed = smooth(settings)
+    assert smoothed.controller.effort_scale == settings.controller.effort_scale
+    assert "limits of the drives" not in removed
+
+
 def test_what_has_no_slope_is_taken_off():
     settings = settings_of(
         "pfc_compliant_6r",
