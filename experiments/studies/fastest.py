@@ -216,7 +216,7 @@ def _metrics(times: Mapping[str, Times], rows: Mapping[tuple[str, str], RunRow])
         key, source = f"{name}, {robot}", row.reason or None
         metrics.add(f"{key}: deviation", row.value("max_path_deviation"), "m", source=source)
         given = row.value("given_torque_share") / row.value("planned_torque_share")
-        metrics.add(f"{key}: torque by plan", given, source=source)
+        metrics.add(f"{key}: torque by plan", given, "1", source=source)
     return metrics
 
 
