@@ -53,6 +53,16 @@ class ProgressListener(Protocol):
         """Told the simulated time [s] and what goes on, e.g. ``simulating``."""
 
 
+class NoProgress:
+    """Tells nobody how far a run is."""
+
+    def expect(self, duration: float) -> None:
+        """Tell nothing."""
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        """Tell nothing."""
+
+
 class _Display:
     """A bar while something is under way; none where there is no terminal."""
 

@@ -11,7 +11,8 @@ from diagrams.scenario.checks import require
 from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, strokes, told_messages
 from diagrams.tasks.drawn_plane import SIDE, StreamDrawing, border
 from diagrams.tasks.surface import followed_angles
-from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
+from diagrams.tasks.task import StartPoint, Task
+from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import PlaceEvaluator, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
@@ -143,19 +144,9 @@ class StreamTask(Task):
         breaks = np.flatnonzero(rows[:, -1] > 0.0)
         return [part[:, :POSITION] for part in np.split(rows, breaks) if len(part) > 1]
 
-    def add_place(
-        self,
-        builder: DiagramBuilder,
-        tool_pose: OutputPort,
-        reference: OutputPort | None,
-        period: float,
-    ) -> ManifoldProjector:
-        """Add what finds the place on the manifold."""
-        projector = builder.AddNamedSystem(
-            self.projector_name, BlockSystem(self.path.projector, period)
-        )
-        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
+    @property
+    def _projecting(self) -> Block:
+        return self.path.projector
 
     def add_source(
         self, builder: DiagramBuilder, stream: Stream, period: float

@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.tasks.drawing import ManifoldDrawing
+from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.manifolds.manifold import (
     Manifold,
     PlaceEvaluator,
@@ -198,10 +199,15 @@ class Task(ABC):
             period: Sampling time [s].
         """
         projector = builder.AddNamedSystem(
-            self.projector_name, BlockSystem(Projector(self.evaluator), period)
+            self.projector_name, BlockSystem(self._projecting, period)
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
+
+    @property
+    def _projecting(self) -> Block:
+        """What finds the place on the manifold at each tick."""
+        return Projector(self.evaluator)
 
     @property
     @abstractmethod

@@ -17,6 +17,7 @@ from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.yaml.typed import load_typed
+from reporting.progress import NoProgress
 
 STEPS, TICKS = integration._STEPS, integration._TICKS
 RIGID = (
@@ -25,13 +26,6 @@ RIGID = (
     "controller.gains.rigid="
     "{eta: {poles: [-20, -20]}, xi: {poles: [-30, -30]}, phi: {poles: [-30, -30]}}",
 )
-
-
-class Quiet:
-    """Listens to no progress."""
-
-    def __call__(self, simulated_time, phase):
-        pass
 
 
 def build(name, *changes):
@@ -47,7 +41,7 @@ def choose(name, *changes):
 
 def motion(station, settings, parameters):
     """Positions in the first 0.2 s of a run, shape (201, n)."""
-    result = simulate(station, parameters, 0.2, Quiet())
+    result = simulate(station, parameters, 0.2, NoProgress())
     log = collect_log(station, result.root)
     return np.hstack([log["q_J"].values, log["y_t"].values])
 

@@ -16,6 +16,7 @@ from experiments.simulation import configure, simulate
 from experiments.studies.peers.laws import Law
 from pfsc_drake.geometry import quaternion_to_matrix
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
+from reporting.progress import NoProgress
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def under_own_law(settings: Scenario, folder: FilePath, duration: float) -> Robo
         duration: Simulated time [s].
     """
     station = build_station(settings, folder)
-    result = simulate(station, settings.simulation, duration, _Silent())
+    result = simulate(station, settings.simulation, duration, NoProgress())
     time, signals = station.log.read(result.root)
     n = station.robot.dimension
     hand = signals.get("push_wrench", np.zeros((len(time), 6)))[:, :3]
@@ -134,13 +135,3 @@ def judge(motion: RobotMotion, robot: RobotModel, task: PathTask, end: float) ->
         R_d = quaternion_to_matrix(point[layout.quaternion][:4])
         turned[k] = Rotation.from_matrix(pose[3:].reshape(3, 3) @ R_d.T).magnitude()
     return Judgement(deviation, turned, np.linalg.norm(poses[:, :3] - goal, axis=1))
-
-
-class _Silent:
-    """Tells nobody how far a run is."""
-
-    def expect(self, duration: float) -> None:
-        """Tell nothing."""
-
-    def __call__(self, simulated_time: float, phase: str) -> None:
-        """Tell nothing."""

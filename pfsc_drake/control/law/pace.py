@@ -7,7 +7,7 @@ from scipy.linalg import expm
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import is_finite, where
-from pfsc_drake.control.law.timed_reference import StreamLimits, lags, speed_to_stop
+from pfsc_drake.control.law.timed_reference import StreamLimits, allowed_speed, lags, speed_to_stop
 
 _ROUNDING = 1e-9  # m
 
@@ -132,10 +132,8 @@ class PacedReference(Block):
 
     def _speed(self, x: Values, u: Values, goal: Any) -> Any:
         """Return ``v+``."""
-        A, T, fastest = self._limits.acceleration, self._period, ca.DM(self._limits.velocity)
-        if u.speed is not None:
-            asked = where(is_finite(u.speed), u.speed, 0.0)
-            fastest = ca.fmin(ca.fmax(asked, 0.0), fastest)
+        A, T = self._limits.acceleration, self._period
+        fastest = allowed_speed(self._limits, u.speed)
         place, speed = ca.vertsplit(x.place)
         here = place + T * speed / 2.0
         wanted = ca.fmin(

@@ -244,14 +244,25 @@ class StreamedReference(Block):
 
     def _speed(self, x: Values, u: Values, goal: Any) -> Any:
         """Return ``v+``."""
-        A, T, fastest = self._limits.acceleration, self._period, ca.DM(self._limits.velocity)
-        if u.speed is not None:
-            asked = where(is_finite(u.speed), u.speed, 0.0)
-            fastest = ca.fmin(ca.fmax(asked, 0.0), fastest)
+        A, T = self._limits.acceleration, self._period
         place, speed = ca.vertsplit(x.place)
         left = ca.fmax(goal - place - T * speed / 2.0, 0.0)
+        fastest = allowed_speed(self._limits, u.speed)
         wanted = ca.fmin(ca.fmin(fastest, speed + A * T), speed_to_stop(left, A, T))
         return ca.fmax(wanted, ca.fmax(speed - A * T, 0.0))
+
+
+def allowed_speed(limits: StreamLimits, asked: Any) -> Any:
+    """Return the largest speed from now on [m/s].
+
+    Args:
+        limits: Its limit V.
+        asked: What is asked for besides [m/s], or None; what is no number counts as 0.
+    """
+    fastest = ca.DM(limits.velocity)
+    if asked is None:
+        return fastest
+    return ca.fmin(ca.fmax(where(is_finite(asked), asked, 0.0), 0.0), fastest)
 
 
 def speed_to_stop(left: Any, acceleration: float, period: float) -> Any:

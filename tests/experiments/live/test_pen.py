@@ -14,7 +14,8 @@ from experiments.live.pen import DRAWING
 from experiments.scenario_file import read_scenario
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
 from pfsc_drake.errors import InputError
-from tests.experiments.live.test_session import BARE, RECORD, Rehearsal, Silent
+from reporting.progress import NoProgress
+from tests.experiments.live.test_session import BARE, RECORD, Rehearsal
 from tests.experiments.live.test_session import END as LEAVE
 
 NAME = "pfc_draw_6r"
@@ -47,7 +48,7 @@ class Drawing(Rehearsal):
                 assert self._pages.hear(json.dumps({"client": "a"} | script.pop(0)[1]).encode())
             return False
 
-        self.session.run(follow, Silent())
+        self.session.run(follow, NoProgress())
         return seen
 
 

@@ -16,19 +16,10 @@ from experiments.live.status import LiveStatus
 from experiments.live.take import TakeFolders
 from experiments.preparation import prepare
 from experiments.scenario_file import read_scenario
+from reporting.progress import NoProgress
 
 RESET, RECORD, END = "reset (X)", "record (C)", "end (Q)"
 BARE = ("--no-figures", "--no-recording")
-
-
-class Silent:
-    """Is told how far it is."""
-
-    def expect(self, duration):
-        pass
-
-    def __call__(self, time, phase):
-        pass
 
 
 class Rehearsal:
@@ -36,7 +27,7 @@ class Rehearsal:
 
     def __init__(self, folder, name, *changes):
         scenario = with_operator(read_scenario(name, list(changes)))
-        prepared = prepare(scenario, 60.0, recording=True, progress=Silent(), live=True)
+        prepared = prepare(scenario, 60.0, recording=True, progress=NoProgress(), live=True)
         # a clock that stands still: nobody is silent
         self.status, self.said, self._pages = LiveStatus(name), [], Pages(lambda: 0.0)
         self._hand = {}
@@ -69,7 +60,7 @@ class Rehearsal:
                 self._say(dict(left.pop(0)[1]))
             return False
 
-        self.session.run(follow, Silent())
+        self.session.run(follow, NoProgress())
         assert not left
         return seen
 

@@ -5,16 +5,9 @@ import pytest
 from experiments.scenario_file import read_scenario
 from experiments.simulated_run import run_scenario
 from pfsc_drake.errors import InputError
+from reporting.progress import NoProgress
 
 _YIELDING = "{mass: {value: 10}, damping: {value: 400}, stiffness: {value: 2000}}"
-
-
-class _Silent:
-    def expect(self, duration):
-        """Told the simulated time at the end."""
-
-    def __call__(self, simulated_time, phase):
-        """Told what goes on."""
 
 
 def _run(folder, *overrides, duration=2.0):
@@ -24,7 +17,7 @@ def _run(folder, *overrides, duration=2.0):
         duration=duration,
         figures=False,
         recording=False,
-        progress=_Silent(),
+        progress=NoProgress(),
     )
 
 

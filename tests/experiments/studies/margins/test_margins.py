@@ -15,16 +15,7 @@ from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import one_line, sentences
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
-
-
-class Quiet:
-    """Progress that nobody looks at."""
-
-    def expect(self, duration):
-        """Take no notice."""
-
-    def __call__(self, simulated_time, phase):
-        """Take no notice."""
+from reporting.progress import NoProgress
 
 
 def settings_of(name, *overrides):
@@ -36,7 +27,7 @@ def analysis_of(name, *overrides, box=None, only_start=True):
     folder = Path(read_scenario(name, []).path).parent
     nothing = ErrorBox(0.0, 0.0, 0.0, 0.0)
     settings = settings_of(name, *overrides)
-    return analyse(settings, folder, box or nothing, Quiet(), only_start=only_start)
+    return analyse(settings, folder, box or nothing, NoProgress(), only_start=only_start)
 
 
 def poles(*values):
