@@ -9,9 +9,9 @@ From a script or a notebook::
     again = load("out/pfc_panda_7r")
 """
 
-import importlib
 import os
-from typing import Any
+
+from pfsc_drake.door import door
 
 # all matrices are small; BLAS threads would only compete with the control loop
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -37,9 +37,4 @@ _DOOR = {
 
 __all__ = [*_DOOR]
 
-
-def __getattr__(name: str) -> Any:
-    """Load what is asked for, so that whoever lists scenarios does not wait for Drake."""
-    if name not in _DOOR:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_DOOR[name]), name)
+__getattr__ = door(__name__, _DOOR)

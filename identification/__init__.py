@@ -8,9 +8,9 @@ From a script or a notebook::
     model = consistent_model(found, out="out/model", bounds="bounds.yaml")
 """
 
-import importlib
 import os
-from typing import Any
+
+from pfsc_drake.door import door
 
 # threads of BLAS compete with the processes side by side, and take longer than one does alone
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -26,9 +26,4 @@ _DOOR = {
 
 __all__ = [*_DOOR]
 
-
-def __getattr__(name: str) -> Any:
-    """Load what is asked for."""
-    if name not in _DOOR:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_DOOR[name]), name)
+__getattr__ = door(__name__, _DOOR)

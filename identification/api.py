@@ -15,6 +15,7 @@ from identification.consistency.writing import WrittenModel
 from identification.estimation.least_squares import Estimate
 from identification.estimation.validation import refuse_implausible
 from identification.findings import Findings
+from identification.measured_files import MeasuredFiles
 from identification.measurement.columns import Reading
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
@@ -164,25 +165,20 @@ def estimate(
         WriteError: If results could not be written.
     """
     subject, folder = _begin(robot, out, tool)
-    files = [Path(one) for one in ([records] if isinstance(records, str | Path) else records)]
-    other_file = None if validation is None else Path(validation)
-    reading = Reading(dict(names or {}), dict(units or {}), dict(scales or {}))
+    files = MeasuredFiles(
+        [Path(one) for one in ([records] if isinstance(records, str | Path) else records)],
+        None if validation is None else Path(validation),
+        Reading(dict(names or {}), dict(units or {}), dict(scales or {})),
+        period,
+        skip,
+        bandwidth,
+    )
     with _progress(subject.name, quiet) as progress:
         findings, other = estimate_files(
-            subject,
-            files,
-            other_file,
-            reading,
-            period=period,
-            skip=skip,
-            bandwidth_hz=bandwidth,
-            choose=not plain,
-            simulated=simulated,
-            progress=progress,
+            subject, files, choose=not plain, simulated=simulated, progress=progress
         )
-    inputs = [*files, *([other_file] if other_file else [])]
     known = None if bounds is None else Path(bounds)
-    report = write_identification(subject, findings, other, folder, inputs, known, None)
+    report = write_identification(subject, findings, other, folder, files.paths, known, None)
     if report.problem is not None:
         raise WriteError(report.problem)
     return Identification(robot, folder, findings)

@@ -166,6 +166,7 @@ def estimate_command(
     tool: Tool = False,
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
+    from identification.measured_files import MeasuredFiles
     from identification.pages import write_identification
     from identification.report.page import parameter_table, torque_table
     from identification.steps import estimate_files
@@ -174,21 +175,14 @@ def estimate_command(
     with interruptible():
         console, subject, folder = _begin(robot, tool, out, "identification")
         reading = read_reading(names, units, scales)
+        files = MeasuredFiles(records, validation, reading, period, skip, bandwidth)
         with fraction_display(console, subject.name) as progress:
             findings, other = estimate_files(
-                subject,
-                records,
-                validation,
-                reading,
-                period=period,
-                skip=skip,
-                bandwidth_hz=bandwidth,
-                choose=not plain,
-                simulated=simulated,
-                progress=progress,
+                subject, files, choose=not plain, simulated=simulated, progress=progress
             )
-        inputs = [*records, *([validation] if validation else [])]
-        report = write_identification(subject, findings, other, folder, inputs, bounds, excitation)
+        report = write_identification(
+            subject, findings, other, folder, files.paths, bounds, excitation
+        )
         print_table(console, parameter_table(findings, words=False), most=12)
         print_table(console, torque_table(findings))
         for note in findings.notes:

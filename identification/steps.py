@@ -1,6 +1,5 @@
 """The steps of an identification on files, as the command line has them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,7 +7,6 @@ from identification.consistency.bounds import PhysicalBounds, load_bounds
 from identification.consistency.nearest import ConsistentParameters, estimate_consistent
 from identification.consistency.writing import WrittenModel, write_model
 from identification.estimation.repetitions import Repetitions
-from identification.estimation.residuals import choose_bandwidth
 from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
 from identification.estimation.validation import predict, refuse_implausible
 from identification.estimation.wiring import unchecked
@@ -19,9 +17,9 @@ from identification.excitation.run_in import rest_to_rest
 from identification.excitation.scene import cell_of
 from identification.excitation.search import SearchResult
 from identification.findings import Findings, find_consistent, find_parameters, true_base
-from identification.measurement.columns import Reading
-from identification.measurement.experiment import prepare_motion, run_experiment
-from identification.measurement.files import read_record, write_record
+from identification.measured_files import MeasuredFiles
+from identification.measurement.experiment import run_experiment
+from identification.measurement.files import write_record
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.periods import AveragedMotion
 from identification.model.base import base_parameters
@@ -178,13 +176,8 @@ def _run(
 
 def estimate_files(
     subject: Subject,
-    records: Sequence[Path],
-    validation: Path | None,
-    reading: Reading,
+    files: MeasuredFiles,
     *,
-    period: float | None = None,
-    skip: int = 1,
-    bandwidth_hz: float | None = None,
     choose: bool = True,
     simulated: bool = False,
     progress: Progress,
@@ -193,33 +186,16 @@ def estimate_files(
 
     Args:
         subject: The robot.
-        records: Runs of one excitation.
-        validation: Measurement of another motion.
-        reading: What files say in other words or not at all.
-        period: Period of the excitation [s], if files do not state it.
-        skip: Periods at the start that are left out.
-        bandwidth_hz: Bandwidth of the motion [Hz]; by default the least with which the model
-            explains the torques of the first record as well as with any.
+        files: The files, and how they are read.
         choose: Whether to choose friction beyond Coulomb's and viscous.
         simulated: Whether the robot's model is the truth.
         progress: Told the fraction done and what is done.
     """
     regressor = Regressor(subject)
     base = base_parameters(regressor)
-    if not records:
-        raise InputError("estimate: no record; at least one is required")
-    total, motions = len(records) + (validation is not None), []
-    for k, path in enumerate([*records, *([validation] if validation else [])]):
-        progress(0.5 * k / total, f"reading {path.name}")
-        record = read_record(path, subject, period, reading)
-        if bandwidth_hz is None:
-            bandwidth_hz = choose_bandwidth(
-                regressor, base, record, period, skip, lambda _, phase: progress(0.0, phase)
-            ).bandwidth_hz
-        motions.append(
-            prepare_motion(record, regressor, base, skip=skip, bandwidth_hz=bandwidth_hz)
-        )
-    other = motions.pop() if validation is not None else None
+    motions, other = files.motions(
+        regressor, base, lambda fraction, phase: progress(0.5 * fraction, phase)
+    )
     findings = find_parameters(
         regressor,
         base,

@@ -19,9 +19,7 @@ point downwards:
 * :mod:`pfsc_drake.jets`: truncated Taylor arithmetic.
 """
 
-import importlib
-from typing import Any
-
+from pfsc_drake.door import door
 from pfsc_drake.errors import InputError
 
 __version__ = "0.1.0"
@@ -60,9 +58,4 @@ _DOOR = {
 
 __all__ = ["InputError", "__version__", *_DOOR]
 
-
-def __getattr__(name: str) -> Any:
-    """Load what is asked for, so that whoever needs a part does not wait for the whole."""
-    if name not in _DOOR:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_DOOR[name]), name)
+__getattr__ = door(__name__, _DOOR)

@@ -132,7 +132,7 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
 
     Args:
         workers: Number of processes; one for each core by default, 1 for no others than this.
-        most: Number of processes that there is work for.
+        most: Number of processes that there is work for; of 1 there are no others than this.
 
     Raises:
         InputError: If there are to be processes and Dask is not installed, or their number is
@@ -140,7 +140,7 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers = {workers}; must be 1 or more")
-    if workers == 1:
+    if 1 in (workers, most):
         yield lambda function, common, tasks: (function(common, task) for task in tasks)
         return
     cores = count_cores("one worker")

@@ -17,7 +17,7 @@ from identification.excitation.fourier import FourierTrajectory, shipped_excitat
 from identification.excitation.limits import JointLimits, chosen_limits
 from identification.excitation.search import search
 from identification.findings import Findings
-from identification.measurement.columns import Reading
+from identification.measured_files import MeasuredFiles
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
 from identification.report.page import PageContent, write_page
@@ -176,7 +176,7 @@ def _identify(circle: CircularRun, out: Path, progress: Callable[[str], None]) -
         )
         unused = simulate_runs(subject, name, other, faults, out / "validation", 1, 100, say)[0]
         findings, motion = estimate_files(
-            subject, records, unused, Reading(), simulated=True, progress=say
+            subject, MeasuredFiles(records, unused), simulated=True, progress=say
         )
         save_estimate(out / FILE_NAME, findings.estimate, findings.runs)
         consistent = consistent_set(findings, bounds_of(subject, None), direct=False)

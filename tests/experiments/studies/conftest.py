@@ -1,0 +1,25 @@
+"""Runs of studies, one after the other in the tests' own process."""
+
+import pytest
+
+from experiments.sweep import many
+from experiments.sweep.worker import run_task
+from identification import steps
+from reporting.processes import side_by_side
+
+
+@pytest.fixture(scope="module", autouse=True)
+def in_this_process():
+    """Run what a study runs side by side here, where it finds what other runs have built.
+
+    Processes side by side are the subject of ``tests/experiments/sweep``.
+    """
+
+    def run_many(tasks, take, *, interrupted):
+        for number, task in tasks.items():
+            take(number, run_task(task))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(many, "run_many", run_many)
+        patch.setattr(steps, "side_by_side", lambda workers, most: side_by_side(1, most))
+        yield
