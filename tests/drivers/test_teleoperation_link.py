@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from pfsc_drake.control.teleoperation.message import FIELDS
+from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
 from pfsc_drake.drivers.remote_values import encode_values
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd, channel_of
 
 
 def message(count, signal=0.0, energy=0.0):
-    told = np.zeros(8)
+    told = np.zeros(MESSAGE)
     told[FIELDS["count"]], told[FIELDS["signal"]] = count, signal
-    told[FIELDS["felt"]], told[FIELDS["energy"]] = [1.0, 2.0, 3.0], energy
+    told[FIELDS["felt"]], told[FIELDS["energy"]] = np.arange(1.0, 7.0), energy
     return told
 
 
@@ -23,7 +23,7 @@ def fixture_ends():
 
 
 def test_nothing_is_zero(ends):
-    np.testing.assert_array_equal(ends[1].newest(), np.zeros(8))
+    np.testing.assert_array_equal(ends[1].newest(), np.zeros(MESSAGE))
 
 
 def test_the_newest_is_heard_by_the_other_side_alone(ends):

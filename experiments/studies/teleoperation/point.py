@@ -23,7 +23,8 @@ from pfsc_drake.control.teleoperation.port import RECORD, TeleoperationPort
 from pfsc_drake.control.teleoperation.reaction import FixtureReaction
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.physics.channel import ChannelParameters, message_ages
-from pfsc_drake.physics.leader_device import Clutch, LeaderDevice, LeaderParameters
+from pfsc_drake.physics.leader_clutch import Clutch
+from pfsc_drake.physics.leader_device import LeaderDevice, LeaderParameters
 
 PERIOD = 1e-3
 _LAG, _DELAY = 5e-3, 2e-3

@@ -13,7 +13,7 @@ from experiments.results.run_signals import collect_log
 from experiments.results.teleoperation import teleoperation_metrics
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.leader_device import ClutchParameters
+from pfsc_drake.physics.leader_clutch import ClutchParameters
 from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"
