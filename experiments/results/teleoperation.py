@@ -56,8 +56,8 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
         the work of the hand and of what the tool touches, as it truly was, stayed above what was
         stored at the start; with six axes ``led_turn_end`` [rad] and ``largest_felt_moment`` [Nm],
         and moments do work, too; ``audit_ports`` [J]: beside the law of the tanks;
-        ``audit_channel`` [J]: what arrived beyond what was sent. Of a follower alone, whose leader is in another
-        process, what its own tank tells.
+        ``audit_channel`` [J]: what arrived beyond what was sent. Of a follower alone, whose leader
+        is in another process, what its own tank tells.
     """
     metrics = Metrics()
     way = settings.teleoperation
