@@ -132,6 +132,8 @@ def add_afar(
     operator: Operator | None,
     task: Task,
     start: StartPoint,
+    *,
+    paced: bool = True,
 ) -> LedFromAfar | None:
     """Add a scenario's operator who is far away, if there is one, with device and channel.
 
@@ -141,6 +143,7 @@ def add_afar(
         operator: A person at the device, if there is one.
         task: What the tool is to do.
         start: Where the tool starts.
+        paced: Whether time is to wait for the clock, where the device is in another process.
 
     Raises:
         InputError: If nobody is there, or nothing yields.
@@ -153,7 +156,8 @@ def add_afar(
     turns = ComplianceParameters(rotational=scenario.compliance.rotational).is_given
     allowed = "null where the tool's orientation is stiff (compliance.rotational)"
     require(way.rotation is None or turns, "teleoperation.rotation", "given", allowed)
-    return add_operator_afar(builder, Leading(way, scenario.hand, operator, task, start, period))
+    leading = Leading(way, scenario.hand, operator, task, start, period)
+    return add_operator_afar(builder, leading, paced=paced)
 
 
 def make_spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:

@@ -26,6 +26,7 @@ class TeleoperationParameters(CouplingParameters):
         lcm: LCM bus on which a leader in another process leads (``lead``), such as
             ``udpm://239.255.76.67:7667?ttl=0``; the run waits for the clock then, and channel and
             leader are those of the other process. Empty where both are simulated here.
+        silence: How long that leader may be silent until a robot that is driven is stopped [s].
         follower_force: Largest force by which the tool is led [N].
         follower_speed: Largest speed that the tool is led with, which the follower's reserve of
             energy is for [m/s]; within regions it is at least that of ``fixtures.guidance``.
@@ -37,6 +38,7 @@ class TeleoperationParameters(CouplingParameters):
     leader: LeaderParameters = dc.field(default_factory=LeaderParameters)
     clutch: list[ClutchParameters] = dc.field(default_factory=list)
     lcm: str = ""
+    silence: float = 0.5
     follower_force: float = 60.0
     follower_speed: float = 1.0
     follower_moment: float = 10.0
@@ -47,6 +49,7 @@ class TeleoperationParameters(CouplingParameters):
         for key in ("force", "speed", "moment", "turning"):
             name = f"follower_{key}"
             require_positive(name, getattr(self, name))
+        require_positive("silence", self.silence)
         known = not self.lcm or self.lcm.partition("://")[0] in _BUSES
         require(known, "lcm", self.lcm, f"empty, or a bus: {', '.join(_BUSES)}://..")
         ends = [time for at in self.clutch for time in (at.begin, at.end)]

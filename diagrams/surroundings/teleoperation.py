@@ -31,6 +31,7 @@ class LedFromAfar:
         signals: What there is to log.
         axes: Of leader and follower.
         period: Sampling time [s].
+        link: To a leader in another process.
     """
 
     port: BlockSystem
@@ -38,6 +39,7 @@ class LedFromAfar:
     signals: dict[str, OutputPort]
     axes: int
     period: float
+    link: TeleoperationEnd | None = None
 
     def lead(self, builder: DiagramBuilder, forces: dict[str, OutputPort]) -> OutputPort:
         """Return what the tool yields to: the operator, and what is measured at the tool.
@@ -88,12 +90,15 @@ class LedFromAfar:
         return self.signals
 
 
-def add_operator_afar(builder: DiagramBuilder, leading: Leading) -> LedFromAfar:
+def add_operator_afar(
+    builder: DiagramBuilder, leading: Leading, *, paced: bool = True
+) -> LedFromAfar:
     """Add both sides and the channel between them, or the follower's side and a link.
 
     Args:
         builder: Builder of the diagram.
         leading: Who leads.
+        paced: Whether a link to another process is what makes time wait for the clock.
 
     Raises:
         InputError: If nobody holds the leader, or tanks do not suit their sides.
@@ -112,9 +117,10 @@ def add_operator_afar(builder: DiagramBuilder, leading: Leading) -> LedFromAfar:
     builder.Connect(port.GetOutputPort("force"), wrench.GetInputPort("vector"))
     signals = {"follower_record": port.GetOutputPort("record")}
     told, heard = port.GetOutputPort("message"), port.GetInputPort("message")
+    link = None
     if way.lcm:
-        link = TeleoperationEnd(DrakeLcm(way.lcm), "follower")
-        end = builder.AddNamedSystem("leader_link", ChannelEnd(link, period))
+        link = TeleoperationEnd(DrakeLcm(way.lcm), "follower", way.silence)
+        end = builder.AddNamedSystem("leader_link", ChannelEnd(link, period, paced=paced))
         builder.Connect(told, end.GetInputPort("sent"))
         builder.Connect(end.GetOutputPort("arrived"), heard)
     else:
@@ -126,4 +132,4 @@ def add_operator_afar(builder: DiagramBuilder, leading: Leading) -> LedFromAfar:
         builder.Connect(told, back.GetInputPort("sent"))
         builder.Connect(back.GetOutputPort("arrived"), leader.port.GetInputPort("message"))
         signals |= leader.signals
-    return LedFromAfar(port, wrench.GetOutputPort("product"), signals, way.axes, period)
+    return LedFromAfar(port, wrench.GetOutputPort("product"), signals, way.axes, period, link)

@@ -180,6 +180,11 @@ def test_wrong_teleoperations_are_refused(wrong, key):
         TeleoperationParameters(**wrong)
 
 
-def test_a_robot_elsewhere_is_not_led_from_a_third_place():
-    with pytest.raises(InputError, match="teleoperation"):
-        driven(shipped_scenario("teleop_region"))
+def test_a_robot_elsewhere_is_led_over_a_bus():
+    settings = shipped_scenario("teleop_region")
+    with pytest.raises(InputError, match=r"teleoperation.lcm = ''"):
+        driven(settings)
+    settings.teleoperation.lcm = "memq://"
+    left, said = driven(settings)
+    assert left.hand is None
+    assert said[0] == "left to the leader: hand"
