@@ -209,7 +209,7 @@ def _network(station: PointStation) -> Network:
     blocks: dict[str, Network] = {
         "hand": Network.of(StudyHand()),
         "device": Network.of(LeaderDevice(device, PERIOD)),
-        "clutch": Network.of(Clutch(coupling.motion_scale, [0.0] * 3, [], PERIOD), ["opened"]),
+        "clutch": Network.of(Clutch(coupling.motion_scale, [0.0] * 3, [], PERIOD), ["opened", "orientation"]),
         "leader": Network.of(TeleoperationPort("leader", coupling, of_leader)),
         "motor": Network.of(Linear(coupling.force_scale * np.eye(3))),
         "felt": Network.of(Linear(np.eye(3, 6) / coupling.force_scale)),

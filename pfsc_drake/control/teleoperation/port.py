@@ -129,7 +129,8 @@ class TeleoperationPort(Block):
         aim = way.per_axis("wave") * moved.there - x.taken[-axes:]
         given, sent, paid = self._send(x, aim, tank)
         left = tank - sent
-        force = self._force(x, u, moved.there, velocity, rate, tank)
+        force = self._force(heard - moved.there, velocity, rate, tank)
+        force = self._of.wrench(moved.there, force) + self._told_force(u)
         force, share = self._affordable(x, u, force, left)
         felt = u.felt if u.felt is not None else ca.DM.zeros(axes)
         felt = force if way.coupling == "position_force" else felt
@@ -153,24 +154,24 @@ class TeleoperationPort(Block):
         """Return what is remembered at the next tick; what is left out stays."""
         return {name: getattr(y, f"{name}_after") for name in self.states}
 
-    def _force(self, x: Values, u: Values, there: Any, velocity: Any, rate: Any, tank: Any) -> Any:
-        """Return the force that the coupling wants [N, Nm], shape (axes,)."""
-        way, felt = self._coupling, u.message[FIELDS["felt"]][: self._of.axes]
-        force, beside = ca.DM.zeros(self._of.axes), None
+    def _force(self, apart: Any, velocity: Any, rate: Any, tank: Any) -> Any:
+        """Return the force on the coordinates that the coupling wants, shape (axes,)."""
+        way, force = self._coupling, ca.DM.zeros(self._of.axes)
         if self._waves:
             force = way.per_axis("wave") * rate - way.per_axis("impedance") * velocity
-        elif way.coupling == "position_force" and self._side == "leader":
-            beside = -felt
-        else:
-            force = way.per_axis("stiffness") * (x.heard - there)
-            force += way.per_axis("damping") * (rate - velocity)
-            if way.coupling == "four_channel":
-                beside = way.force_share * felt
+        elif way.coupling == "four_channel" or self._side == "follower":
+            force = way.per_axis("stiffness") * apart + way.per_axis("damping") * (rate - velocity)
         if way.passive:
             lack = ca.fmax(0.0, ca.fmin(1.0, 1.0 - tank / way.tank.initial))
             force -= way.per_axis("refill") * lack * velocity
-        wrench = self._of.wrench(there, force)
-        return wrench if beside is None else wrench + beside
+        return force
+
+    def _told_force(self, u: Values) -> Any:
+        """Return the force that the other side feels, as far as the coupling gives it [N, Nm]."""
+        way, felt = self._coupling, u.message[FIELDS["felt"]][: self._of.axes]
+        if way.coupling == "four_channel":
+            return way.force_share * felt
+        return -felt if way.coupling == "position_force" and self._side == "leader" else 0.0
 
     def _send(self, x: Values, aim: Any, tank: Any) -> tuple[Any, Any, Any]:
         """Return what was sent of O by now, energy that goes with it [J], and the share of it.

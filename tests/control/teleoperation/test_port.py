@@ -166,18 +166,14 @@ def test_position_and_force_couplings_are_as_they_say():
             )
         return row
 
-    # the first look is the start
-    x_seen = x + 2 * T * v
-    spring = 300.0 * (heard - T * rate - x) + 20.0 * (rate - v)
-    del x_seen
+    # x counts from where the first look was
+    spring = 300.0 * (heard - 2 * T * v) + 20.0 * (rate - v)
     leader = last(side="leader", coupling="position_force")
     np.testing.assert_allclose(leader["force"], -felt, rtol=1e-12)
     four = last(side="leader", coupling="four_channel", force_share=0.5)
     follower = last(side="follower", coupling="position_force")
-    origin = x - 2 * T * v
-    expected = spring + 300.0 * origin
-    np.testing.assert_allclose(follower["force"], expected, atol=1e-9)
-    np.testing.assert_allclose(four["force"], expected + 0.5 * felt, atol=1e-9)
+    np.testing.assert_allclose(follower["force"], spring, atol=1e-9)
+    np.testing.assert_allclose(four["force"], spring + 0.5 * felt, atol=1e-9)
     np.testing.assert_allclose(linear(follower["message"], "felt"), follower["force"])
     np.testing.assert_allclose(linear(four["message"], "felt"), [7.0, 8.0, 9.0])
 
