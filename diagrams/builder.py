@@ -180,7 +180,7 @@ def build_station(
         operator = add_operator(
             builder, scenario.operator, scenario.switched_regions, period, folder
         )
-    afar = add_afar(builder, scenario, operator, task, start)
+    afar = add_afar(builder, scenario, operator, task, start, paced=not remote)
     at_tool = operator if afar is None else None
     forces = add_surroundings(
         builder, part, task, outside(scenario), around, start, at_tool, mounting, spring
@@ -270,6 +270,7 @@ def build_station(
         holder,
         place.pen,
         following.waiting,
+        None if afar is None else afar.link,
     )
 
 

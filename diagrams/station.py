@@ -19,6 +19,7 @@ from diagrams.tasks.task import StartPoint, Task
 from diagrams.tasks.waiting import Waiting
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess
@@ -58,6 +59,7 @@ class Station:
         holder: The robot that holds the workpiece which the path is on, if one does.
         pen: Where way points enter that a person draws, if one does.
         waiting: How progress waits for obstacles, if it does.
+        leader: Link to who leads the tool in another process, if somebody does.
     """
 
     diagram: Diagram
@@ -81,6 +83,7 @@ class Station:
     holder: Holder | None = None
     pen: OperatorPanel | None = None
     waiting: Waiting | None = None
+    leader: TeleoperationEnd | None = None
 
     @property
     def robot(self) -> RobotModel:

@@ -19,6 +19,7 @@ from diagrams.scenario import Scenario, Streamed
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.surroundings.forces import Outside
+from diagrams.surroundings.leader import Leading
 from diagrams.surroundings.mounting import Mounting, make_mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.surroundings.teleoperation import LedFromAfar, add_operator_afar
@@ -34,6 +35,7 @@ from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import free_motion, make_lead
+from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
@@ -130,6 +132,8 @@ def add_afar(
     operator: Operator | None,
     task: Task,
     start: StartPoint,
+    *,
+    paced: bool = True,
 ) -> LedFromAfar | None:
     """Add a scenario's operator who is far away, if there is one, with device and channel.
 
@@ -139,6 +143,7 @@ def add_afar(
         operator: A person at the device, if there is one.
         task: What the tool is to do.
         start: Where the tool starts.
+        paced: Whether time is to wait for the clock, where the device is in another process.
 
     Raises:
         InputError: If nobody is there, or nothing yields.
@@ -147,9 +152,12 @@ def add_afar(
         return None
     allowed = "null where nothing yields to what a sensor measures (compliance)"
     require(scenario.compliance.needs_sensor, "teleoperation", "given", allowed)
-    period = scenario.controller.sampling_time
-    way, y_0 = scenario.teleoperation, start.target.y_t
-    return add_operator_afar(builder, way, scenario.hand, operator, task, y_0, period)
+    way, period = scenario.teleoperation, scenario.controller.sampling_time
+    turns = ComplianceParameters(rotational=scenario.compliance.rotational).is_given
+    allowed = "null where the tool's orientation is stiff (compliance.rotational)"
+    require(way.rotation is None or turns, "teleoperation.rotation", "given", allowed)
+    leading = Leading(way, scenario.hand, operator, task, start, period)
+    return add_operator_afar(builder, leading, paced=paced)
 
 
 def make_spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:

@@ -18,6 +18,7 @@ from diagrams.warnings.law_warnings import (
 )
 from diagrams.warnings.obstacles import obstacle_warnings
 from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
+from diagrams.warnings.teleoperation import rest_warnings
 from diagrams.warnings.untold_forces import (
     ExpectedForces,
     bearable_way,
@@ -61,6 +62,7 @@ def controller_warnings(
         said += untold_friction(bearable, parameters, law)
     said += observed_force_warnings(scenario.compliance, robot, law, rest)
     said += obstacle_warnings(scenario.obstacles)
+    said += rest_warnings(scenario.teleoperation, scenario.hand, scenario.duration)
     said += unused_parameters(parameters, law)
     if scenario.fixtures is not None and isinstance(task, SpaceTask):
         said += stiff_regions(scenario.fixtures.regions, task.guided)

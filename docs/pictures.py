@@ -55,6 +55,7 @@ MOMENTS = {
     "teleop_path": 13.5,
     "teleop_plate": 11.0,
     "teleop_region": 15.0,
+    "teleop_tilt": 17.2,
     "ttc_comau_6r": 1.8,
     "vf_backdrivable_circle": 5.2,
     "vf_backdrivable_paraboloid": 7.2,

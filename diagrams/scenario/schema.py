@@ -206,9 +206,12 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         InputError: If it needs what only a simulation knows.
     """
     left, plain = deepcopy(scenario), Scenario()
-    for key in ("plate", "operator", "teleoperation", "holder", "obstacles"):
+    for key in ("plate", "operator", "holder", "obstacles"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
+    if scenario.teleoperation is not None:
+        bus = scenario.teleoperation.lcm
+        require(bool(bus), "teleoperation.lcm", repr(bus), "the bus of a leader (lead)")
     controller = scenario.controller
     finds_links = controller.law in _OF_ONE_SIDE or controller.state != "measured"
     require(finds_links, "controller.state", controller.state, _ONE_SIDE)
@@ -227,7 +230,12 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         if getattr(scenario.simulation, key) != getattr(plain.simulation, key):
             setattr(left.simulation, key, getattr(plain.simulation, key))
             ignored.append(f"simulation.{key}")
-    said = [f"left to the robot: {', '.join(ignored)}"] if ignored else []
+    said = []
+    if scenario.teleoperation is not None and "hand" in ignored:
+        ignored.remove("hand")
+        said.append("left to the leader: hand")
+    if ignored:
+        said.append(f"left to the robot: {', '.join(ignored)}")
     faults = left.faults
     rigid = controller.law in _OF_ONE_SIDE
     holding = _HOLD_BANDWIDTH if rigid else _HOLD_OF_SPRINGS

@@ -5,7 +5,8 @@ import dataclasses as dc
 from diagrams.scenario.checks import require, require_positive
 from pfsc_drake.control.teleoperation.parameters import CouplingParameters
 from pfsc_drake.physics.channel import ChannelParameters
-from pfsc_drake.physics.leader_device import ClutchParameters, LeaderParameters
+from pfsc_drake.physics.leader_clutch import ClutchParameters
+from pfsc_drake.physics.leader_device import LeaderParameters
 
 # the way back draws its own delays and losses
 _OTHER_SEED = 1000
@@ -25,22 +26,30 @@ class TeleoperationParameters(CouplingParameters):
         lcm: LCM bus on which a leader in another process leads (``lead``), such as
             ``udpm://239.255.76.67:7667?ttl=0``; the run waits for the clock then, and channel and
             leader are those of the other process. Empty where both are simulated here.
+        silence: How long that leader may be silent until a robot that is driven is stopped [s].
         follower_force: Largest force by which the tool is led [N].
         follower_speed: Largest speed that the tool is led with, which the follower's reserve of
             energy is for [m/s]; within regions it is at least that of ``fixtures.guidance``.
+        follower_moment: Largest moment by which the tool is turned [Nm].
+        follower_turning: Largest angular velocity that it is turned with [rad/s].
     """
 
     channel: ChannelParameters = dc.field(default_factory=ChannelParameters)
     leader: LeaderParameters = dc.field(default_factory=LeaderParameters)
     clutch: list[ClutchParameters] = dc.field(default_factory=list)
     lcm: str = ""
+    silence: float = 0.5
     follower_force: float = 60.0
     follower_speed: float = 1.0
+    follower_moment: float = 10.0
+    follower_turning: float = 2.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in ("follower_force", "follower_speed"):
-            require_positive(key, getattr(self, key))
+        for key in ("force", "speed", "moment", "turning"):
+            name = f"follower_{key}"
+            require_positive(name, getattr(self, name))
+        require_positive("silence", self.silence)
         known = not self.lcm or self.lcm.partition("://")[0] in _BUSES
         require(known, "lcm", self.lcm, f"empty, or a bus: {', '.join(_BUSES)}://..")
         ends = [time for at in self.clutch for time in (at.begin, at.end)]

@@ -15,11 +15,11 @@ _LATE = 0.1  # s, that is caught up; later than that, time goes on from there
 class ChannelEnd(LeafSystem):
     """Sends what a side tells at each tick, and puts out the newest that has come.
 
-    It waits for the clock, so that a simulation is never ahead of it.
+    It waits for the clock, so that a simulation is never ahead of it, unless it is driven by one.
 
     Ports:
-        sent (input): Message of this side, shape (8,).
-        arrived (output): Newest message of the other one, shape (8,), that was there at the last
+        sent (input): Message of this side, shape (14,).
+        arrived (output): Newest message of the other one, shape (14,), that was there at the last
             tick; zero before.
 
     Args:
@@ -27,6 +27,7 @@ class ChannelEnd(LeafSystem):
         period: Sampling time [s].
         clock: Tells the time [s].
         sleep: Waits [s].
+        paced: Whether it waits for the clock.
     """
 
     def __init__(
@@ -35,10 +36,12 @@ class ChannelEnd(LeafSystem):
         period: float,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        *,
+        paced: bool = True,
     ) -> None:
         super().__init__()
         self._end, self._clock, self._sleep = end, clock, sleep
-        self._begin = 0.0
+        self._begin, self._paced = 0.0, paced
         self.DeclareVectorInputPort("sent", MESSAGE)
         state = self.DeclareDiscreteState(MESSAGE)
         self.DeclareStateOutputPort("arrived", state)
@@ -49,11 +52,15 @@ class ChannelEnd(LeafSystem):
         if now == 0.0:
             self._end.begin()
             self._begin = self._clock()
+        if self._paced:
+            self._wait(now)
+        sent: BasicVector = self.GetInputPort("sent").Eval(context)
+        self._end.send(np.asarray(sent))
+        values.set_value(self._end.newest())
+
+    def _wait(self, now: float) -> None:
         early = self._begin + now - self._clock()
         if early > 0.0:
             self._sleep(early)
         elif early < -_LATE:
             self._begin -= early
-        sent: BasicVector = self.GetInputPort("sent").Eval(context)
-        self._end.send(np.asarray(sent))
-        values.set_value(self._end.newest())

@@ -10,18 +10,61 @@ from diagrams.scenario.checks import require
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
-from diagrams.tasks.task import Task
+from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Linear
 from pfsc_drake.control.teleoperation.parameters import PortLimits
-from pfsc_drake.control.teleoperation.port import TeleoperationPort
+from pfsc_drake.control.teleoperation.port import SIDES, TeleoperationPort
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_way import Place
-from pfsc_drake.physics.leader_device import Clutch, LeaderDevice
+from pfsc_drake.physics.leader_clutch import Clutch, TurningClutch
+from pfsc_drake.physics.leader_device import LeaderDevice, LeaderWrist
 from pfsc_drake.physics.operator_hand import LiveHand, OperatorHand
 from pfsc_drake.systems.block_system import BlockSystem
 
 _BEYOND = 0.5  # m
+
+
+@dataclass(frozen=True)
+class Leading:
+    """How a tool is led from afar, and by whom.
+
+    Attributes:
+        parameters: The teleoperation.
+        hand: The simulated operator's hand.
+        operator: A person at the leader, in place of it.
+        task: What the tool is to do.
+        start: Where the tool starts.
+        period: Sampling time [s].
+    """
+
+    parameters: TeleoperationParameters
+    hand: HandParameters | None
+    operator: Operator | None
+    task: Task
+    start: StartPoint
+    period: float
+
+    def limits(
+        self, side: str, force: tuple[float, float], moment: tuple[float, float]
+    ) -> PortLimits:
+        """Return what a port may count on.
+
+        Args:
+            side: ``leader`` or ``follower``, whose robot is a tick late.
+            force: The largest, and the largest speed [N, m/s].
+            moment: The largest, and the largest angular velocity [Nm, rad/s].
+
+        Raises:
+            InputError: If the tank could not pay the forces of a tick or two.
+        """
+        way, turns = self.parameters, self.parameters.rotation is not None
+        late = SIDES.index(side)
+        limits = PortLimits(*force, late, self.period, *(moment if turns else (0.0, 0.0)))
+        initial, least = way.tank.initial, limits.reserve
+        allowed = f"above {least:g} J, what the {side}'s forces take within a tick or two"
+        require(initial > least, "teleoperation.tank.initial", initial, allowed)
+        return limits
 
 
 @dataclass(frozen=True)
@@ -37,39 +80,32 @@ class Leader:
     signals: dict[str, OutputPort]
 
 
-def add_leader(
-    builder: DiagramBuilder,
-    parameters: TeleoperationParameters,
-    hand: HandParameters | None,
-    operator: Operator | None,
-    task: Task,
-    start: np.ndarray,
-    period: float,
-) -> Leader:
+def add_leader(builder: DiagramBuilder, leading: Leading) -> Leader:
     """Add a device with a hand at it, and its port.
 
     Args:
         builder: Builder of the diagram.
-        parameters: The teleoperation.
-        hand: The simulated operator's hand.
-        operator: A person at the leader, in place of it.
-        task: What the tool is to do.
-        start: Where the tool starts [m], shape (3,).
-        period: Sampling time [s].
+        leading: Who leads.
 
     Raises:
         InputError: If nobody holds the leader, or the tank does not suit it.
     """
-    given = hand is not None or operator is not None
+    parameters, period = leading.parameters, leading.period
+    given = leading.hand is not None or leading.operator is not None
     require(given, "hand", "null", "given where there is a leader")
-    device = parameters.leader
-    limits = PortLimits(
-        device.force_limit / parameters.force_scale,
-        device.largest_speed * parameters.motion_scale,
-        0,
-        period,
-    )
-    require_tank(parameters, "leader", limits)
+    turns = 0.0 if leading.hand is None else leading.hand.rotational_stiffness
+    allowed = "0 where the leader does not turn (teleoperation.rotation)"
+    require(parameters.axes > 3 or turns == 0.0, "hand.rotational_stiffness", turns, allowed)
+    device, scale = parameters.leader, parameters.force_scale
+    force = device.force_limit / scale, device.largest_speed * parameters.motion_scale
+    moment, rotation = (0.0, 0.0), parameters.rotation
+    if rotation is not None:
+        wrist = device.wrist
+        moment = (
+            wrist.torque_limit / parameters.moment_scale,
+            wrist.largest_speed * rotation.scale,
+        )
+    limits = leading.limits("leader", force, moment)
 
     def add(name: str, block: Block) -> BlockSystem:
         return builder.AddNamedSystem(name, BlockSystem(block, period))
@@ -77,14 +113,14 @@ def add_leader(
     def connect(source: BlockSystem, port: str, sink: BlockSystem, into: str) -> None:
         builder.Connect(source.GetOutputPort(port), sink.GetInputPort(into))
 
+    axes, y_0 = parameters.axes, leading.start.target.y_t.tolist()
+    scales = np.diag([scale] * 3 + [parameters.moment_scale] * 3)
     handle = add("leader", LeaderDevice(device, period))
-    clutch = add(
-        "clutch", Clutch(parameters.motion_scale, start.tolist(), parameters.clutch, period)
-    )
+    clutch = add("clutch", Clutch(parameters.motion_scale, y_0, parameters.clutch, period))
     leader = add("leader_port", TeleoperationPort("leader", parameters, limits))
-    motor = add("leader_motor", Linear(parameters.force_scale * np.eye(3)))
-    felt = add("leader_sensor", Linear(np.eye(3, 6) / parameters.force_scale))
-    held = _add_hand(builder, hand, operator, task, period)
+    motor = add("leader_motor", Linear(scales[:3, :axes]))
+    felt = add("leader_sensor", Linear(np.linalg.inv(scales)[:axes]))
+    held = _add_hand(builder, leading)
     connect(clutch, "pose", held, "tool_pose")
     connect(held, "wrench", handle, "hand_wrench")
     connect(held, "wrench", felt, "vector")
@@ -94,29 +130,35 @@ def add_leader(
     connect(felt, "product", leader, "felt")
     connect(leader, "force", motor, "vector")
     connect(motor, "product", handle, "motor_force")
-    return Leader(
-        leader,
-        {
-            "leader_record": leader.GetOutputPort("record"),
-            "leader_state": handle.GetOutputPort("state"),
-            "led_point": clutch.GetOutputPort("position"),
-            "leader_motor": motor.GetOutputPort("product"),
-            "leader_hand": held.GetOutputPort("wrench"),
-        },
-    )
-
-
-def require_tank(parameters: TeleoperationParameters, side: str, limits: PortLimits) -> None:
-    """Refuse a tank that could not pay the forces of a tick or two.
-
-    Args:
-        parameters: The teleoperation.
-        side: ``leader`` or ``follower``.
-        limits: What its port may count on.
-    """
-    initial, least = parameters.tank.initial, limits.reserve
-    allowed = f"above {least:g} J, what the {side}'s forces take within a tick or two"
-    require(initial > least, "teleoperation.tank.initial", initial, allowed)
+    signals = {
+        "leader_record": leader.GetOutputPort("record"),
+        "leader_state": handle.GetOutputPort("state"),
+        "led_point": clutch.GetOutputPort("position"),
+        "leader_motor": motor.GetOutputPort("product"),
+        "leader_hand": held.GetOutputPort("wrench"),
+    }
+    R_0 = leading.start.target.R_e
+    if rotation is not None:
+        allowed = "null where the tool keeps no orientation"
+        require(R_0 is not None, "teleoperation.rotation", "given", allowed)
+    if rotation is not None and R_0 is not None:
+        turned = add("leader_wrist", LeaderWrist(device.wrist, period))
+        turning = add(
+            "turning_clutch", TurningClutch(rotation.scale, R_0, parameters.clutch, period)
+        )
+        wrist_motor = add("wrist_motor", Linear(scales[3:]))
+        connect(held, "wrench", turned, "hand_wrench")
+        connect(turned, "orientation", turning, "handle")
+        connect(turning, "orientation", leader, "orientation")
+        connect(turning, "seen", clutch, "orientation")
+        connect(leader, "force", wrist_motor, "vector")
+        connect(wrist_motor, "product", turned, "motor_moment")
+        signals |= {
+            "wrist_state": turned.GetOutputPort("state"),
+            "led_orientation": turning.GetOutputPort("orientation"),
+            "wrist_motor": wrist_motor.GetOutputPort("product"),
+        }
+    return Leader(leader, signals)
 
 
 @dataclass(frozen=True)
@@ -142,14 +184,9 @@ class _BeyondEnds:
         return at + (coordinates[0] - eta) * along, rates[0] * along + beside
 
 
-def _add_hand(
-    builder: DiagramBuilder,
-    hand: HandParameters | None,
-    operator: Operator | None,
-    task: Task,
-    period: float,
-) -> BlockSystem:
+def _add_hand(builder: DiagramBuilder, leading: Leading) -> BlockSystem:
     """Add the hand at the leader."""
+    hand, operator, task, period = leading.hand, leading.operator, leading.task, leading.period
     if operator is not None:
         block: Block = LiveHand(operator.hand, period)
         held = builder.AddNamedSystem("live_hand", BlockSystem(block, period))

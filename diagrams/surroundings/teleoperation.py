@@ -6,19 +6,15 @@ import numpy as np
 from pydrake.lcm import DrakeLcm
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import HandParameters
-from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.surroundings.channel_end import ChannelEnd
-from diagrams.surroundings.leader import add_leader, require_tank
-from diagrams.surroundings.operator import Operator
+from diagrams.surroundings.leader import Leading, add_leader
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Linear, Sum
 from pfsc_drake.control.teleoperation.message import MESSAGE
-from pfsc_drake.control.teleoperation.parameters import PortLimits
 from pfsc_drake.control.teleoperation.port import TeleoperationPort
-from pfsc_drake.control.teleoperation.reaction import FixtureReaction, LedPoint
+from pfsc_drake.control.teleoperation.reaction import FixtureReaction, LedOrientation, LedPoint
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
 from pfsc_drake.physics.channel import Channel
 from pfsc_drake.robot.robot_model import RobotModel
@@ -30,16 +26,20 @@ class LedFromAfar:
     """What an operator elsewhere does to a tool, before it is known where the tool is.
 
     Attributes:
-        port: Port of the follower, whose ``position`` and ``felt`` are still to be connected.
+        port: Port of the follower, to which is still to be told where the tool is.
         wrench: On the tool, as if a hand were there, shape (6,) [N, Nm].
         signals: What there is to log.
+        axes: Of leader and follower.
         period: Sampling time [s].
+        link: To a leader in another process.
     """
 
     port: BlockSystem
     wrench: OutputPort
     signals: dict[str, OutputPort]
+    axes: int
     period: float
+    link: TeleoperationEnd | None = None
 
     def lead(self, builder: DiagramBuilder, forces: dict[str, OutputPort]) -> OutputPort:
         """Return what the tool yields to: the operator, and what is measured at the tool.
@@ -71,68 +71,65 @@ class LedFromAfar:
             ports: ``wrench_measured``, ``joint_state`` as measured; within regions ``guidance``.
         """
         if isinstance(task, SpaceTask):
-            seen: Block = FixtureReaction(len(task.fixtures))
+            seen: Block = FixtureReaction(len(task.fixtures), self.axes)
             source = {"record": ports["guidance"]}
         else:
-            seen, source = LedPoint(robot, lag), {"joint_state": ports["joint_state"]}
+            seen, source = LedPoint(robot, lag, self.axes), {"joint_state": ports["joint_state"]}
         system = builder.AddNamedSystem("follower_view", BlockSystem(seen, self.period))
         for name, port in source.items():
             builder.Connect(port, system.GetInputPort(name))
         builder.Connect(ports["wrench_measured"], system.GetInputPort("wrench"))
         for name in ("position", "felt"):
             builder.Connect(system.GetOutputPort(name), self.port.GetInputPort(name))
+        if self.axes > 3:
+            block = BlockSystem(LedOrientation(robot, lag), self.period)
+            turned = builder.AddNamedSystem("follower_orientation", block)
+            builder.Connect(ports["joint_state"], turned.GetInputPort("joint_state"))
+            output = turned.GetOutputPort("orientation")
+            builder.Connect(output, self.port.GetInputPort("orientation"))
         return self.signals
 
 
 def add_operator_afar(
-    builder: DiagramBuilder,
-    parameters: TeleoperationParameters,
-    hand: HandParameters | None,
-    operator: Operator | None,
-    task: Task,
-    start: np.ndarray,
-    period: float,
+    builder: DiagramBuilder, leading: Leading, *, paced: bool = True
 ) -> LedFromAfar:
     """Add both sides and the channel between them, or the follower's side and a link.
 
     Args:
         builder: Builder of the diagram.
-        parameters: The teleoperation.
-        hand: The simulated operator's hand.
-        operator: A person at the leader, in place of it.
-        task: What the tool is to do.
-        start: Where the tool starts [m], shape (3,).
-        period: Sampling time [s].
+        leading: Who leads.
+        paced: Whether a link to another process is what makes time wait for the clock.
 
     Raises:
         InputError: If nobody holds the leader, or tanks do not suit their sides.
     """
-    speed = parameters.follower_speed
-    if isinstance(task, SpaceTask):
-        speed = max(speed, task.guided.options.guidance.largest_speed)
-    limits = PortLimits(parameters.follower_force, speed, 1, period)
-    require_tank(parameters, "follower", limits)
+    way, period, speed = leading.parameters, leading.period, leading.parameters.follower_speed
+    if isinstance(leading.task, SpaceTask):
+        speed = max(speed, leading.task.guided.options.guidance.largest_speed)
+    moment = way.follower_moment, way.follower_turning
+    limits = leading.limits("follower", (way.follower_force, speed), moment)
 
     def add(name: str, block: Block) -> BlockSystem:
         return builder.AddNamedSystem(name, BlockSystem(block, period))
 
-    port = add("follower_port", TeleoperationPort("follower", parameters, limits))
-    wrench = add("follower_wrench", Linear(np.eye(6, 3)))
+    port = add("follower_port", TeleoperationPort("follower", way, limits))
+    wrench = add("follower_wrench", Linear(np.eye(6, way.axes)))
     builder.Connect(port.GetOutputPort("force"), wrench.GetInputPort("vector"))
     signals = {"follower_record": port.GetOutputPort("record")}
     told, heard = port.GetOutputPort("message"), port.GetInputPort("message")
-    if parameters.lcm:
-        link = TeleoperationEnd(DrakeLcm(parameters.lcm), "follower")
-        end = builder.AddNamedSystem("leader_link", ChannelEnd(link, period))
+    link = None
+    if way.lcm:
+        link = TeleoperationEnd(DrakeLcm(way.lcm), "follower", way.silence)
+        end = builder.AddNamedSystem("leader_link", ChannelEnd(link, period, paced=paced))
         builder.Connect(told, end.GetInputPort("sent"))
         builder.Connect(end.GetOutputPort("arrived"), heard)
     else:
-        leader = add_leader(builder, parameters, hand, operator, task, start, period)
-        there = add("channel_there", Channel(parameters.channel, MESSAGE, period))
-        back = add("channel_back", Channel(parameters.back, MESSAGE, period))
+        leader = add_leader(builder, leading)
+        there = add("channel_there", Channel(way.channel, MESSAGE, period))
+        back = add("channel_back", Channel(way.back, MESSAGE, period))
         builder.Connect(leader.port.GetOutputPort("message"), there.GetInputPort("sent"))
         builder.Connect(there.GetOutputPort("arrived"), heard)
         builder.Connect(told, back.GetInputPort("sent"))
         builder.Connect(back.GetOutputPort("arrived"), leader.port.GetInputPort("message"))
         signals |= leader.signals
-    return LedFromAfar(port, wrench.GetOutputPort("product"), signals, period)
+    return LedFromAfar(port, wrench.GetOutputPort("product"), signals, way.axes, period, link)

@@ -54,7 +54,11 @@ from experiments.figures.posture import (
     has_pushes,
 )
 from experiments.figures.streaming import draw_stream
-from experiments.figures.teleoperation import draw_port_energy, draw_teleoperation
+from experiments.figures.teleoperation import (
+    draw_led_turns,
+    draw_port_energy,
+    draw_teleoperation,
+)
 from experiments.figures.two_arms import draw_holder_torques, draw_two_arms
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
@@ -123,6 +127,7 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "contact": (draw_contact, has_contact),
     "energy": (draw_energy, gives_energy),
     "teleoperation": (draw_teleoperation, _always),
+    "led_turns": (draw_led_turns, _always),
     "port_energy": (draw_port_energy, _always),
     "limits": (draw_limits, held_by_robot),
     "use_case": (draw_use_case, _always),

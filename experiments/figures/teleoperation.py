@@ -3,7 +3,7 @@
 import numpy as np
 
 from experiments.results.run_log import RunLog
-from experiments.results.teleoperation import stored_in_channel, works
+from experiments.results.teleoperation import stored_in_channel, turns_between, works
 from reporting.style import COLOURS, INK, Drawing, make_panels, place_legend
 
 _AXES = ("x", "y", "z")
@@ -32,6 +32,29 @@ def draw_teleoperation(log: RunLog) -> Drawing:
         "the force times the delay, by the impedance of the waves."
     )
     return Drawing("teleoperation", "Led from afar", caption, canvas)
+
+
+def draw_led_turns(log: RunLog) -> Drawing:
+    """How the leader has the tool turned and how it is, and the moments that both sides feel."""
+    canvas, (turn, apart, moment) = make_panels(3)
+    led, tool = (log[name].values.reshape(-1, 3, 3) for name in ("led_orientation", "R_e"))
+    turned = [turns_between(np.broadcast_to(R[:1], R.shape), R) for R in (tool, led)]
+    for k, axis in enumerate(_AXES):
+        turn.plot(log.time, turned[0][:, k], color=COLOURS[k], label=axis)
+        turn.plot(log.time, turned[1][:, k], "--", color=COLOURS[k], linewidth=0.9)
+    turn.set(title="Turn of the tool, and of the leader (dashed)", ylabel="turn in rad")
+    angle = np.linalg.norm(turns_between(tool, led), axis=1)
+    apart.plot(log.time, 1e3 * angle, color=COLOURS[0])
+    apart.set(title="Between how the leader is turned and the tool", ylabel="angle in mrad")
+    felt = np.linalg.norm(log["leader_moment"].values, axis=1)
+    given = np.linalg.norm(log["port_moment"].values[:, 3:], axis=1)
+    moment.plot(log.time, felt, color=COLOURS[1], label="that the hand feels")
+    moment.plot(log.time, given, color=INK, linewidth=0.9, label="that turns the tool")
+    moment.set(title="Moments", ylabel="moment in Nm")
+    place_legend(turn)
+    place_legend(moment)
+    caption = "Turns since the start, axis times angle, along the world's axes."
+    return Drawing("led_turns", "Turned from afar", caption, canvas)
 
 
 def draw_port_energy(log: RunLog) -> Drawing:

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
+from experiments.hardware.bridge import state_between
 from experiments.hardware.check import AT_REST, check_first
 from experiments.hardware.drive_options import (
     FASTER,
@@ -303,23 +304,11 @@ class Drive:
         for k in range(1, missed + 1):
             share = k / (missed + 1)
             self._tell(
-                self._between(state, share, (missed + 1) * self.period),
+                state_between(self._last_state, state, share, (missed + 1) * self.period),
                 (1.0 - share) * self._last_torque + share * status.torque,
             )
             held = np.zeros(self._n) if self._sent is None else self._sent
             self._advance(DrivenTick(np.nan, 1, 0, int(status.robot_mode), held, self.override))
-
-    def _between(self, state: np.ndarray, share: float, span: float) -> np.ndarray:
-        """Return the joint state at a share of a span of time that ends now, shape (4N,)."""
-        q_0, v_0 = np.split(self._last_state, 4)[:2]
-        q_1, v_1 = np.split(state, 4)[:2]
-        rest = 1.0 - share
-        square = share * share
-        ways = (square * (3.0 - 2.0 * share), span * share * (rest * rest), span * square * rest)
-        rates = (6.0 * share * rest / span, rest * (1.0 - 3.0 * share), share * (1.0 - 3.0 * rest))
-        q = q_0 + ways[0] * (q_1 - q_0) + ways[1] * v_0 - ways[2] * v_1
-        v = rates[0] * (q_1 - q_0) + rates[1] * v_0 + rates[2] * v_1
-        return np.concatenate([q, v, q, v])
 
     def _advance(self, tick: DrivenTick) -> None:
         self.record.ticks.append(tick)
@@ -335,7 +324,10 @@ class Drive:
         return float(self._station.blocks.state(self.root, PACE)[1])
 
     def _look(self, status: RobotStatus, state: np.ndarray) -> None:
-        """End where the robot does not do any more what it is told."""
+        """Stop where nobody leads any more, end where the robot does not do what it is told."""
+        leader = self._station.leader
+        if leader is not None and leader.is_lost:
+            self.stop(f"no word of the leader for {leader.patience:g} s")
         if status.robot_mode is not RobotMode.MOVE:
             self.lose(f"the robot went into mode {status.robot_mode.name}")
         speed = np.abs(state[self._n : 2 * self._n]).max()

@@ -172,6 +172,8 @@ def drive_scenario(
     address = check_native(end, out / NATIVE) if native else None
     prepared = prepare_driven(scenario, duration, recording=recording, progress=progress)
     station, options = prepared.station, DriveOptions()
+    if native and station.leader is not None:
+        raise InputError("--native: a controller in C hears no leader; allowed: a drive without it")
     drive = Drive(station, end, options, override)
     if drive.override != override:
         prepared.warnings.append(

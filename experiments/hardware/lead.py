@@ -13,7 +13,7 @@ from diagrams.scenario.checks import require
 from diagrams.signal_log import add_log
 from diagrams.station_parts import make_task
 from diagrams.surroundings.channel_end import ChannelEnd
-from diagrams.surroundings.leader import add_leader
+from diagrams.surroundings.leader import Leading, add_leader
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.control.teleoperation.port import RECORD
@@ -71,8 +71,8 @@ def lead_scenario(
         lasts = settings.duration if duration is None else duration
         require(lasts > 0.0, "duration", lasts, "a positive number [s]")
         task = make_task(settings, scenario.path.parent)
-        start = task.start(np.zeros(3)).target.y_t
-        leader = add_leader(builder, way, settings.hand, None, task, start, period)
+        start = task.start(np.zeros(3))
+        leader = add_leader(builder, Leading(way, settings.hand, None, task, start, period))
     end = TeleoperationEnd(lcm, "leader")
     link = builder.AddNamedSystem("follower_link", ChannelEnd(end, period))
     builder.Connect(leader.port.GetOutputPort("message"), link.GetInputPort("sent"))
@@ -95,5 +95,5 @@ def lead_scenario(
         end.received,
         float(record[:, RECORD["tank"]].min()),
         float(np.linalg.norm(signals["leader_motor"], axis=1).max()),
-        float(np.linalg.norm(signals["led_point"] - start, axis=1).max()),
+        float(np.linalg.norm(signals["led_point"] - start.target.y_t, axis=1).max()),
     )

@@ -18,6 +18,7 @@ from pfsc_drake.control.manifolds.coordinate import Kind
 
 _DEAD_ZONE = 0.12  # of a stick
 _FARTHEST = 0.3  # m, of the place to hold at from where the hand took hold
+_DRAGGED = 0.15  # m, by the half of a handle
 _FREE_DAMPING = 90.0  # N s/m, where it varies along the manifold: Tab. 4.3
 _AXES = "xyz"
 _KEYS = (("KeyW", "KeyS"), ("KeyA", "KeyD"), ("KeyR", "KeyF"))
@@ -41,11 +42,15 @@ class Panel:
     Sliders and switches keep what they were set to. The hand itself is nothing but what the page
     says at this moment, see :class:`Pages`; whenever that has to let go, a hold opens, too.
 
+    A device far away is dragged: its handles say how far from where the hand took hold of it, and
+    do not pull.
+
     Args:
         pages: Who sets it.
         force_limit: Force limit of the hand [N].
         tuned: What of the impedance can be changed.
         regions: Names of what can be switched on and off.
+        drags: Whether a device far away is led.
     """
 
     def __init__(
@@ -54,12 +59,16 @@ class Panel:
         force_limit: float,
         tuned: Sequence[TunedParameter],
         regions: Sequence[str],
+        *,
+        drags: bool = False,
     ) -> None:
+        self._drags = drags
         self._pages, self._tuned, self._force_limit = pages, tuned, force_limit
         self._idle = idle_controls(regions)
         across, _ = requests_of(Kind.TRANSVERSAL)
         self._can_be_free = any(parameter.index == across for parameter in tuned)
         self._pull = [f"pull {axis} [N]" for axis in _AXES]
+        self._drag = [f"drag {axis} [m]" for axis in _AXES]
         self._stick = [f"stick {axis}" for axis in _AXES]
         self._place = [f"hold d{axis} [m]" for axis in _AXES]
         self._regions = [f"region {name}" for name in regions]
@@ -74,7 +83,11 @@ class Panel:
         self._buttons, self._commands = dict(c.value for c in Command), list[Command]()
         self._hand, self._drawn = dict[str, float](), list[list[float]]()
         self._held_from: np.ndarray | None = None
-        pages.expect([*self._pull, *self._stick, *self._pushes], [*self._sliders, *self._buttons])
+        self._dragged_from: np.ndarray | None = None
+        pages.expect(
+            [*self._pull, *self._drag, *self._stick, *self._pushes],
+            [*self._sliders, *self._buttons],
+        )
 
     def _all_sliders(self) -> list[Slider]:
         limit = self._force_limit
@@ -119,13 +132,14 @@ class Panel:
         self._open()
 
     def _open(self) -> None:
-        self._values[_HOLD], self._held_from = 0.0, None
+        self._values[_HOLD], self._held_from, self._dragged_from = 0.0, None, None
 
     def content(self) -> dict[str, object]:
         """Return what there is to set, for JSON.
 
         Sliders with their values, and buttons and pushes with their keys; what the hand does now,
-        by name of what pulls or pushes, and with how much a handle can pull [N].
+        by name of what pulls or pushes, with how much a handle can pull [N], and how far it can
+        drag [m], if it does that instead.
         """
         rigid = {p.slider.name for p in self._tuned if p.top_is_rigid}
         sliders = [
@@ -139,6 +153,7 @@ class Panel:
             "pushes": pushes,
             "hand": self._hand,
             "force_limit": self._force_limit,
+            "drag": _DRAGGED if self._drags else None,
         }
 
     def read(self, y_t: np.ndarray) -> np.ndarray:
@@ -162,6 +177,9 @@ class Panel:
         limit = self._force_limit
         pull = [self._hand.get(name, 0.0) for name in self._pull]
         push = np.clip(pull, -limit, limit) + self._key_push() + self._stick_push()
+        dragged = self._dragged(y_t)
+        if dragged is not None:
+            return np.concatenate([push, [1.0], dragged])
         holds = self._value(_HOLD) > 0.5
         if holds and self._held_from is None and np.isfinite(y_t).all():
             self._held_from = y_t.copy()
@@ -171,6 +189,18 @@ class Panel:
             return np.concatenate([push, np.zeros(4)])
         moved = self._held_from + [self._value(name) for name in self._place]
         return np.concatenate([push, [1.0], moved])
+
+    def _dragged(self, y_t: np.ndarray) -> np.ndarray | None:
+        """Return where a hand that drags wants the tool to be, shape (3,), if it does."""
+        if not any(name in self._hand for name in self._drag):
+            self._dragged_from = None
+            return None
+        if self._dragged_from is None and np.isfinite(y_t).all():
+            self._dragged_from = y_t.copy()
+        if self._dragged_from is None:
+            return None
+        way = [self._hand.get(name, 0.0) for name in self._drag]
+        return self._dragged_from + np.clip(way, -_FARTHEST, _FARTHEST)
 
     def _key_push(self) -> np.ndarray:
         push, strength = np.zeros(3), self._value(_STRENGTH)

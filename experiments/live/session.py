@@ -95,9 +95,8 @@ class LiveSession:
         self._simulation, self._pace = LiveSimulation(station, settings), pace or RealTimePace()
         self._record, self._pen = ControlRecord(station.operator), Pen.of(station)
         limit = settings.operator.hand.force_limit
-        self._panel = Panel(
-            pages, limit, tuned_parameters(settings, station), self._operator.regions
-        )
+        tuned, drags = tuned_parameters(settings, station), settings.teleoperation is not None
+        self._panel = Panel(pages, limit, tuned, self._operator.regions, drags=drags)
         self._frame = self._simulation.frame(self._simulation.signals())
         self._scene = Scene(
             lambda first, meshcat: LiveView(station, prepared.drawing, first, meshcat, limit),

@@ -1,10 +1,11 @@
 """A tool that is led from afar: its signals, how well it follows, and its energy, checked."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Scenario
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.control.teleoperation.port import RECORD, SIDES
+from pfsc_drake.control.teleoperation.port import RECORD, SIDES, TURNING_RECORD
 from reporting.metrics import Metrics
 
 _AXES = ("x", "y", "z")
@@ -27,7 +28,13 @@ def add_teleoperation(log: RunLog, raw: dict[str, FloatArray]) -> None:
         log.add("leader_hand", raw["leader_hand"][:, :3])
         log.add("leader_force", raw["leader_motor"])
         log.add("led_point", raw["led_point"])
-    for name, rows in RECORD.items():
+    turns = raw[f"{here[0]}_record"].shape[1] > RECORD["share"].stop
+    if turns and "leader" in here:
+        log.add("leader_orientation", raw["wrist_state"][:, :9])
+        log.add("leader_hand_moment", raw["leader_hand"][:, 3:])
+        log.add("leader_moment", raw["wrist_motor"])
+        log.add("led_orientation", raw["led_orientation"])
+    for name, rows in (RECORD | (TURNING_RECORD if turns else {})).items():
         size = rows.stop - rows.start
         sides = [raw[f"{side}_record"][:, rows] for side in here]
         axes = _AXES if size > 1 else ("",)
@@ -47,9 +54,10 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
         and how far it is from there, rms; ``led_distance_end`` [m]: between the two when all is
         over; ``largest_felt_force`` [N]; ``least_port_tank`` [J]; ``energy_margin`` [J]: how far
         the work of the hand and of what the tool touches, as it truly was, stayed above what was
-        stored at the start; ``audit_ports`` [J]: beside the law of the tanks; ``audit_channel``
-        [J]: what arrived beyond what was sent. Of a follower alone, whose leader is in another
-        process, what its own tank tells.
+        stored at the start; with six axes ``led_turn_end`` [rad] and ``largest_felt_moment`` [Nm],
+        and moments do work, too; ``audit_ports`` [J]: beside the law of the tanks;
+        ``audit_channel`` [J]: what arrived beyond what was sent. Of a follower alone, whose leader
+        is in another process, what its own tank tells.
     """
     metrics = Metrics()
     way = settings.teleoperation
@@ -66,6 +74,11 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     metrics.add("led_distance_end", float(np.linalg.norm(apart)))
     felt = np.linalg.norm(log["leader_force"].values, axis=1)
     metrics.add("largest_felt_force", float(felt.max()))
+    if "led_orientation" in log:
+        ends = (log[name].values[-1:].reshape(-1, 3, 3) for name in ("R_e", "led_orientation"))
+        metrics.add("led_turn_end", float(np.linalg.norm(turns_between(*ends))))
+        moment = np.linalg.norm(log["leader_moment"].values, axis=1)
+        metrics.add("largest_felt_moment", float(moment.max()))
     scale = way.motion_scale / way.force_scale
     metrics.add("energy_margin", float(energy_above_bound(log, scale).min()))
     metrics.add("audit_channel", float(np.max(-stored_in_channel(log), initial=0.0)))
@@ -95,6 +108,12 @@ def works(log: RunLog) -> FloatArray:
     force, position = (log[f"port_{name}"].values for name in ("force", "position"))
     steps = force[:-1] * np.diff(position, axis=0)
     done = steps.reshape(len(steps), -1, 3).sum(axis=2)
+    if "port_turn" in log:
+        moment, turn = (log[f"port_{name}"].values for name in ("moment", "turn"))
+        R = Rotation.from_rotvec(turn.reshape(-1, 3)).as_matrix().reshape(len(turn), -1, 3, 3)
+        done += np.sum(
+            moment[:-1].reshape(len(steps), -1, 3) * turns_between(R[:-1], R[1:]), axis=2
+        )
     return np.vstack([np.zeros(done.shape[1]), np.cumsum(done, axis=0)])
 
 
@@ -107,6 +126,8 @@ def energy_above_bound(log: RunLog, scale: float) -> FloatArray:
     """
     hand = log["leader_hand"].values[:-1] * np.diff(log["leader_position"].values, axis=0)
     total = scale * hand.sum(axis=1)
+    if "leader_orientation" in log:
+        total += scale * _turning(log, "leader_hand_moment", "leader_orientation")
     if "wrench_ext" in log:
         total += _touching(log)
     stored = float(log["port_tank"].values[0].sum())
@@ -119,11 +140,29 @@ def _touching(log: RunLog) -> FloatArray:
     """Return the work at each tick of what the tool touches, shape (samples - 1,) [J]."""
     wrench, y_t = log["wrench_ext"].values[:-1], log["y_t"].values
     R = log["R_e"].values.reshape(-1, 3, 3)
-    turned = R[1:] @ np.swapaxes(R[:-1], 1, 2)
-    skew = (turned - np.swapaxes(turned, 1, 2)) / 2.0
-    angles = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
-    moved = np.hstack([np.diff(y_t, axis=0), angles])
+    moved = np.hstack([np.diff(y_t, axis=0), turns_between(R[:-1], R[1:])])
     return np.asarray(np.sum(wrench * moved, axis=1))
+
+
+def _turning(log: RunLog, moment: str, orientation: str) -> FloatArray:
+    """Return the work at each tick of a moment that is held, shape (samples - 1,) [J]."""
+    R = log[orientation].values.reshape(-1, 3, 3)
+    steps = log[moment].values[:-1] * turns_between(R[:-1], R[1:])
+    return np.asarray(steps.sum(axis=1))
+
+
+def turns_between(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return by how much rotations are turned against others, shape (.., 3) [rad].
+
+    Args:
+        before: Shape (.., 3, 3).
+        after: The same; NaN where one is.
+    """
+    turned = (after @ np.swapaxes(before, -1, -2)).reshape(-1, 3, 3)
+    known = np.isfinite(turned).all(axis=(1, 2))
+    vectors = np.full((len(turned), 3), np.nan)
+    vectors[known] = Rotation.from_matrix(turned[known]).as_rotvec()
+    return np.asarray(vectors.reshape(*before.shape[:-2], 3))
 
 
 def stored_in_channel(log: RunLog) -> FloatArray:

@@ -3,6 +3,7 @@
 import math
 import struct
 import time
+from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
@@ -44,15 +45,29 @@ class TeleoperationEnd:
     Args:
         lcm: The bus.
         side: Whose end it is.
+        patience: How long the other side may be silent until it is lost [s].
+        clock: Tells the time [s].
+
+    Attributes:
+        lcm: The bus.
+        patience: See above.
+        received: Messages that were believed.
     """
 
-    def __init__(self, lcm: DrakeLcmInterface, side: str) -> None:
-        self._lcm, self._channel = lcm, channel_of(side)
+    def __init__(
+        self,
+        lcm: DrakeLcmInterface,
+        side: str,
+        patience: float = math.inf,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.lcm, self._channel = lcm, channel_of(side)
+        self.patience, self._clock = patience, clock
         (other,) = set(SIDES) - {side}
         self._queue: list[bytes] = []
         self._heard, self._base = np.zeros(MESSAGE), np.zeros(MESSAGE)
         self._session: float | None = None
-        self.received = 0
+        self.received, self._last = 0, 0.0
         self.begin()
         lcm.Subscribe(channel_of(other), self._queue.append)
 
@@ -61,6 +76,11 @@ class TeleoperationEnd:
         self._own_session = float(time.time_ns() // 1000)
         self._heard[:], self._session = 0.0, None
 
+    @property
+    def is_lost(self) -> bool:
+        """Whether the other side was there, and has been silent for too long."""
+        return self.received > 0 and self._clock() - self._last > self.patience
+
     def send(self, message: np.ndarray) -> None:
         """Send a message.
 
@@ -68,12 +88,12 @@ class TeleoperationEnd:
             message: Shape (8,), see :data:`FIELDS`.
         """
         values = {_SESSION: self._own_session} | dict(zip(_NAMES, message.tolist(), strict=True))
-        self._lcm.Publish(self._channel, encode_values(int(message[0]), values))
+        self.lcm.Publish(self._channel, encode_values(int(message[0]), values))
 
     def newest(self) -> np.ndarray:
         """Return the newest message that has come, shape (8,); zero if none has."""
         for _ in range(_MOST_ROUNDS):
-            if not self._lcm.HandleSubscriptions(0):
+            if not self.lcm.HandleSubscriptions(0):
                 break
         waiting, self._queue[:] = list(self._queue), []
         for data in waiting:
@@ -100,3 +120,4 @@ class TeleoperationEnd:
             return
         self._heard[:] = told
         self.received += 1
+        self._last = self._clock()

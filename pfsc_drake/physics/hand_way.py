@@ -7,7 +7,6 @@ import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.blocks.cases import first_of, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.geometry.curves.piecewise_fit import fit_pieces
@@ -108,10 +107,6 @@ def _fitted(positions: np.ndarray, ways: np.ndarray, place: Place) -> tuple[np.n
     return np.append(breaks, last + 1.0), np.concatenate([table, rest])
 
 
-# rad; below, the sine of half an angle is its series
-_SMALL = 1e-3
-
-
 class OrientationTarget:
     """An orientation ``R_d`` that turns from one to the next about a fixed axis, the shorter way.
 
@@ -143,27 +138,3 @@ class OrientationTarget:
         S, turned = ca.skew(axis), share * angle
         turn = ca.DM.eye(3) + ca.sin(turned) * S + 2.0 * ca.sin(turned / 2.0) ** 2 * (S @ S)
         return turn @ R, rate * angle * axis
-
-
-def rotation_vector(R: Any) -> Any:
-    """Return axis times angle, at most pi, of a rotation, shape (3,) [rad].
-
-    By way of the quaternion that loses no digits: that of four with the largest divisor.
-
-    Args:
-        R: Rotation matrix, shape (3, 3).
-    """
-    x, y, z = R[0, 0], R[1, 1], R[2, 2]
-    a, b, c = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    d, e, f = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
-    q = first_of(
-        (ca.fmin(x + y, ca.fmin(y + z, x + z)) >= 0.0, ca.vertcat(1.0 + x + y + z, a, b, c)),
-        (ca.fmin(x - y, x - z) >= 0.0, ca.vertcat(a, 1.0 + x - y - z, d, e)),
-        (y >= z, ca.vertcat(b, d, 1.0 - x + y - z, f)),
-        otherwise=ca.vertcat(c, e, f, 1.0 - x - y + z),
-    )
-    q = where(q[0] < 0.0, -q, q) / ca.norm_2(q)
-    sine = ca.norm_2(q[1:])
-    angle = 2.0 * ca.atan2(sine, q[0])
-    per_sine = where(sine < _SMALL, 2.0 + sine * sine / 3.0, angle / ca.fmax(sine, _SMALL))
-    return per_sine * q[1:]

@@ -1,20 +1,48 @@
-"""A hand-held device that leads a robot elsewhere: its handle, motors, encoders and clutch."""
+"""A hand-held device that leads a robot elsewhere: its handle, motors and encoders."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.blocks.rotations import matrix_of, rotation_of, rotation_vector, rows_of
 from pfsc_drake.errors import require, require_positive
 
 
 @dataclass
+class WristParameters:
+    """How the handle of a device with six axes turns.
+
+    Attributes:
+        inertia: Of the handle and the hand that grips it, about any axis [kg m^2].
+        damping: Viscous friction of an axis [Nm s/rad].
+        friction: Coulomb friction of an axis [Nm].
+        resolution: Of the encoders [rad]; 0 if they are perfect.
+        torque_limit: Largest moment of the motors [Nm].
+        largest_speed: Fastest that a hand turns it [rad/s].
+    """
+
+    inertia: float = 0.004
+    damping: float = 0.005
+    friction: float = 0.01
+    resolution: float = 1e-4
+    torque_limit: float = 3.0
+    largest_speed: float = 6.0
+
+    def __post_init__(self) -> None:
+        for key in ("inertia", "torque_limit", "largest_speed"):
+            require_positive(key, getattr(self, key))
+        for key in ("damping", "friction", "resolution"):
+            value = getattr(self, key)
+            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
+
+
+@dataclass
 class LeaderParameters:
-    """A hand-held device with three axes.
+    """A hand-held device, with three axes or six.
 
     Attributes:
         mass: Of the handle [kg].
@@ -23,6 +51,7 @@ class LeaderParameters:
         resolution: Of the encoders, at the handle [m]; 0 if they are perfect.
         force_limit: Largest force of the motors [N].
         largest_speed: Fastest that a hand moves it [m/s].
+        wrist: How it turns, where it has six axes.
     """
 
     mass: float = 0.35
@@ -31,6 +60,7 @@ class LeaderParameters:
     resolution: float = 1e-5
     force_limit: float = 30.0
     largest_speed: float = 2.0
+    wrist: WristParameters = field(default_factory=WristParameters)
 
     def __post_init__(self) -> None:
         for key in ("mass", "force_limit", "largest_speed"):
@@ -38,23 +68,6 @@ class LeaderParameters:
         for key in ("damping", "friction", "resolution"):
             value = getattr(self, key)
             require(0.0 <= value < math.inf, key, value, "zero or a positive number")
-
-
-@dataclass
-class ClutchParameters:
-    """A time for which the leader is let loose, to be taken hold of elsewhere.
-
-    Attributes:
-        begin: From when on it moves nothing [s].
-        end: Until when [s].
-    """
-
-    begin: float = 0.0
-    end: float = 1.0
-
-    def __post_init__(self) -> None:
-        good = 0.0 <= self.begin < self.end < math.inf
-        require(good, "begin, end", [self.begin, self.end], "ascending times [s]")
 
 
 class LeaderDevice(Block):
@@ -90,92 +103,75 @@ class LeaderDevice(Block):
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        step, measured = self._device.resolution, x.position
-        if step > 0.0:
-            measured = step * ca.floor(x.position / step + 0.5)
+        measured = _encoded(x.position, self._device.resolution)
         return {"position": measured, "state": ca.vertcat(x.position, x.velocity)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
         device, T = self._device, self._period
         force = u.motor_force + u.hand_wrench[:3]
-        force = where(all_finite(force), force, 0.0)
-        driven = x.velocity + T / device.mass * force
-        least = T / device.mass * device.friction
-        slid = ca.sign(driven) * ca.fmax(0.0, ca.fabs(driven) - least)
-        velocity = slid / (1.0 + T * device.damping / device.mass)
+        velocity = _driven(x.velocity, force, T, device.mass, device.friction, device.damping)
         return {"position": x.position + T * velocity, "velocity": velocity}
 
 
-# s, within which a hand that takes hold again feels the follower's force in full
-_GRIP_TIME = 0.2
+class LeaderWrist(Block):
+    """How the handle of a device with six axes turns, a body that is alike about all axes.
 
-
-class Clutch(Block):
-    """Where the follower is to be, for where the leader's handle is.
-
-    ``x = y_0 + mu (p - p_0)``. While the clutch is open x stays, the leader feels nothing, and p_0
-    moves along with p; thereafter the force comes back within 0.2 s.
+    ``J w' = m_hand + m_motor - d w - f_c sgn(w)`` about the world's axes, as
+    :class:`LeaderDevice` moves, and ``R+ = exp(T [w+]) R``.
 
     Ports:
-        handle (input): p as measured [m], shape (3,).
-        opened (input, optional): Above 0.5 while a person opens it, shape (1,).
-        position (output): x, in the world of the follower [m], shape (3,).
-        grip (output): Share of the force that the leader feels, shape (1,).
-        pose (output): What a hand at the handle goes by, in place of a tool's pose
-            ``[y_t, R_e]``, shape (12,): x; while the clutch is open, the way of the handle from
-            the middle of its room, beside x, so that a hand whose target is x brings it there.
+        motor_moment (input): On the handle [Nm], shape (3,).
+        hand_wrench (input): Of the hand on it, shape (6,), of which the moment counts [Nm].
+        orientation (output): As the encoders tell, R by rows, shape (9,).
+        state (output): R by rows and angular velocity as they are, shape (12,) [1, rad/s].
 
     State:
-        held: x; last: p at the last tick; was_open: Whether it was open then; grip, loose: Shares
-        from 0 to 1.
+        rows: R; velocity: w; not turned and at rest at the start.
 
     Args:
-        scale: mu.
-        start: y_0 [m], shape (3,).
-        opened: When it is open.
-        period: Sampling time [s].
+        parameters: The wrist.
+        period: Sampling time T [s].
     """
 
-    def __init__(
-        self,
-        scale: float,
-        start: Sequence[float],
-        opened: Sequence[ClutchParameters],
-        period: float,
-    ) -> None:
-        self._scale, self._start, self._opened = scale, ca.DM(list(start)), list(opened)
-        self._period = period
-        self.inputs = {"handle": Port(3, "m"), "opened": Port(1, optional=True)}
-        self.outputs = {"position": Port(3, "m"), "grip": Port(1), "pose": Port(12, "m, 1")}
-        self.states = {"held": 3, "last": 3, "was_open": 1, "grip": 1, "loose": 1}
+    def __init__(self, parameters: WristParameters, period: float) -> None:
+        self._wrist, self._period = parameters, period
+        self.inputs = {"motor_moment": Port(3, "Nm"), "hand_wrench": Port(6, "N, Nm")}
+        self.outputs = {"orientation": Port(9), "state": Port(12, "1, rad/s")}
+        self.states = {"rows": 9, "velocity": 3}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero."""
-        return {"held": self._start, "last": u.handle, "grip": 1.0}
+        return {"rows": rows_of(ca.DM.eye(3))}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        position = x.held + where(x.was_open, 0.0, self._scale) * (u.handle - x.last)
-        seen = position + x.loose * u.handle
-        pose = ca.vertcat(seen, ca.DM([1, 0, 0, 0, 1, 0, 0, 0, 1]))
-        grip = where(self._is_open(u, t), 0.0, x.grip)
-        return {"position": position, "grip": grip, "pose": pose}
+        step, measured = self._wrist.resolution, x.rows
+        if step > 0.0:
+            turn = _encoded(rotation_vector(matrix_of(x.rows)), step)
+            measured = rows_of(rotation_of(turn))
+        return {"orientation": measured, "state": ca.vertcat(x.rows, x.velocity)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
-        is_open, rise = self._is_open(u, t), self._period / _GRIP_TIME
-        return {
-            "held": y.position,
-            "last": u.handle,
-            "was_open": is_open,
-            "grip": where(is_open, 0.0, ca.fmin(1.0, x.grip + rise)),
-            "loose": where(is_open, ca.fmin(1.0, x.loose + rise), 0.0),
-        }
+        wrist, T = self._wrist, self._period
+        moment = u.motor_moment + u.hand_wrench[3:]
+        velocity = _driven(x.velocity, moment, T, wrist.inertia, wrist.friction, wrist.damping)
+        R = rotation_of(T * velocity) @ matrix_of(x.rows)
+        return {"rows": rows_of(R), "velocity": velocity}
 
-    def _is_open(self, u: Values, t: Any) -> Any:
-        """Return whether the clutch is open."""
-        time, is_open = t * self._period, 0.0 if u.opened is None else u.opened > 0.5
-        for at in self._opened:
-            is_open = ca.logic_or(is_open, ca.logic_and(time >= at.begin, time < at.end))
-        return is_open
+
+def _encoded(measured: Any, step: float) -> Any:
+    """Return what encoders of a resolution tell; 0 if they are perfect."""
+    return step * ca.floor(measured / step + 0.5) if step > 0.0 else measured
+
+
+def _driven(
+    velocity: Any, force: Any, period: float, mass: float, friction: float, damping: float
+) -> Any:
+    """Return velocities a tick later, shape (3,)."""
+    force = where(all_finite(force), force, 0.0)
+    driven = velocity + period / mass * force
+    least = period / mass * friction
+    slid = ca.sign(driven) * ca.fmax(0.0, ca.fabs(driven) - least)
+    return slid / (1.0 + period * damping / mass)

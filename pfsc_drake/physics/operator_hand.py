@@ -143,7 +143,7 @@ class LiveHand(Block):
     push f, grip g (0 or 1) and target p - passes two lags of first order,
     ``x_1' = (x - x_1) / T_r``, ``x_2' = (x_1 - x_2) / T_r``, so that the force is C^1 in time
     whatever a slider does. The target of an open hand is taken at once: a hand closes where it is
-    asked to hold, not on the way there from where it held before.
+    asked to hold, not on the way there from where it held before. One that opens keeps its target.
 
     It sees tool and person once per period, and holds its wrench until the next.
 
@@ -179,6 +179,8 @@ class LiveHand(Block):
         hand, asked, pose = self._hand, u.asked, u.tool_pose
         sees = all_finite(pose)
         share = -math.expm1(-self._period / hand.response_time)
+        target = where(asked[HOLD] > 0.5, asked[TARGET], x.first[TARGET])
+        asked = ca.vertcat(asked[: TARGET.start], target)
         is_taken = ca.DM(np.arange(ASKED) >= TARGET.start) * (x.first[HOLD] < _OPEN)
         first, second = where(is_taken, asked, x.first), where(is_taken, asked, x.second)
         second += share * (first - second)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from pfsc_drake.control.teleoperation.message import FIELDS
+from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
 from pfsc_drake.drivers.remote_values import encode_values
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd, channel_of
 
 
 def message(count, signal=0.0, energy=0.0):
-    told = np.zeros(8)
+    told = np.zeros(MESSAGE)
     told[FIELDS["count"]], told[FIELDS["signal"]] = count, signal
-    told[FIELDS["felt"]], told[FIELDS["energy"]] = [1.0, 2.0, 3.0], energy
+    told[FIELDS["felt"]], told[FIELDS["energy"]] = np.arange(1.0, 7.0), energy
     return told
 
 
@@ -23,7 +23,7 @@ def fixture_ends():
 
 
 def test_nothing_is_zero(ends):
-    np.testing.assert_array_equal(ends[1].newest(), np.zeros(8))
+    np.testing.assert_array_equal(ends[1].newest(), np.zeros(MESSAGE))
 
 
 def test_the_newest_is_heard_by_the_other_side_alone(ends):
@@ -65,8 +65,27 @@ def test_what_is_old_wrong_or_takes_energy_back_is_lost(ends):
     leader.send(message(4, 9.0, 0.5))
     leader.send(message(7, 9.0, 0.3))
     leader.send(message(8, np.nan, 0.5))
-    leader._lcm.Publish(channel_of("leader"), b"nothing of the kind")
-    leader._lcm.Publish(channel_of("leader"), encode_values(1, {"count": 9.0}))
+    leader.lcm.Publish(channel_of("leader"), b"nothing of the kind")
+    leader.lcm.Publish(channel_of("leader"), encode_values(1, {"count": 9.0}))
     np.testing.assert_array_equal(follower.newest(), kept)
     leader.send(message(9, 2.0, 0.6))
     assert follower.newest()[0] == 9.0
+
+
+def test_who_was_there_and_is_silent_is_lost():
+    now, lcm = [100.0], DrakeLcm("memq://")
+    leader = TeleoperationEnd(lcm, "leader")
+    follower = TeleoperationEnd(lcm, "follower", 0.5, lambda: now[0])
+    now[0] += 10.0
+    assert not follower.is_lost  # nobody has been there yet
+    leader.send(message(1))
+    follower.newest()
+    now[0] += 0.4
+    assert not follower.is_lost
+    leader.send(message(1))  # an old one is no word of it
+    follower.newest()
+    now[0] += 0.2
+    assert follower.is_lost
+    leader.send(message(2))
+    follower.newest()
+    assert not follower.is_lost

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint, Wander
-from pfsc_drake.physics.hand_way import OrientationTarget, rotation_vector
+from pfsc_drake.physics.hand_way import OrientationTarget
 from pfsc_drake.yaml.typed import load_typed
 
 TIMES = np.array([1.0, 3.0, 4.0])
@@ -55,19 +55,6 @@ def test_the_target_turns_about_one_axis_the_shorter_way():
     half = (Rotation.from_matrix(R_d) * rotation(ANGLES[0]).inv()).as_rotvec()
     assert half == pytest.approx(whole / 2.0)
     assert w_d == pytest.approx(1.875 * whole / 2.0)
-
-
-def test_rotation_vectors_are_scipys():
-    """Of small turns, of any, and of nearly half a turn about all axes."""
-    random = np.random.default_rng(0)
-    R = ca.MX.sym("R", 3, 3)
-    function = ca.Function("f", [R], [rotation_vector(R)])
-    for size in (0.0, 1e-9, 1e-4, 1.9e-3, 2.1e-3, 0.1, 1.0, 2.0, 3.0, np.pi - 1e-6):
-        axes = np.vstack([random.normal(size=(20, 3)), np.eye(3), -np.eye(3)])
-        for axis in axes / np.linalg.norm(axes, axis=1)[:, None]:
-            matrix = Rotation.from_rotvec(size * axis).as_matrix()
-            found = function(matrix).full().ravel()
-            np.testing.assert_allclose(found, size * axis, atol=1e-14, rtol=1e-9)
 
 
 def test_it_turns_like_a_spring_and_a_damper():

@@ -1,20 +1,20 @@
-"""A device in a hand: its mass and friction, its encoders, its clutch."""
+"""A device in a hand: its mass and friction, how it turns, its encoders."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.leader_device import (
-    Clutch,
-    ClutchParameters,
     LeaderDevice,
     LeaderParameters,
+    LeaderWrist,
+    WristParameters,
 )
 
 T = 1e-3
-START = [0.9, 0.1, 1.0]
 
 
 def test_the_handle_moves_as_a_mass_with_friction():
@@ -62,38 +62,53 @@ def test_encoders_tell_whole_steps():
     np.testing.assert_allclose(row["position"], row["state"][:3], atol=0.5001e-4)
 
 
-def test_a_clutch_scales_and_lets_loose():
-    """While open the follower's place stays, and the handle may go back; then it goes on."""
-    clutch = Stepper(Clutch(2.0, START, [ClutchParameters(0.010, 0.020)], T))
-    handle = np.concatenate([np.linspace(0, 0.011, 12), np.linspace(0.01, 0.002, 9)])
-    handle = np.append(handle, 0.002 + 0.001 * np.arange(1, 10))
-    rows = [clutch.step(handle=[x, 0.0, 0.0]) for x in handle]
-    place = np.array([row["position"] for row in rows]) - START
-    np.testing.assert_allclose(place[:11, 0], 2.0 * handle[:11], atol=1e-12)
-    np.testing.assert_allclose(place[11:21, 0], 2.0 * handle[10], atol=1e-12)
-    further = handle[21:] - handle[20]
-    np.testing.assert_allclose(place[21:, 0], 2.0 * (handle[10] + further), atol=1e-12)
-    grip = np.array([row["grip"][0] for row in rows])
-    assert (grip[:10] == 1.0).all()
-    assert (grip[10:20] == 0.0).all()
-    assert 0.0 < grip[22] < grip[29] < 1.0
+def matrix(rows):
+    return np.reshape(rows, (3, 3))
 
 
-def test_a_hand_at_an_open_clutch_goes_back_to_the_middle():
-    """What it sees is beside its target by the way of the handle."""
-    clutch = Stepper(Clutch(1.0, START, [ClutchParameters(0.0, 1.0)], T))
+def test_the_wrist_turns_as_a_body_with_friction():
+    """Against an adaptive integration of w and of R, about an axis that wanders."""
+    wrist = WristParameters(inertia=0.01, damping=0.02, friction=0.05, resolution=0.0)
+    stepper = Stepper(LeaderWrist(wrist, T))
+    hand, motor = np.array([0.3, -0.2, 0.15]), np.array([-0.1, 0.05, 0.0])
+    for _ in range(401):
+        row = stepper.step(motor_moment=motor, hand_wrench=[0, 0, 0, *hand])
+
+    def rates(t, y):
+        w = y[:3]
+        turned = np.cross(np.eye(3), w) @ matrix(y[3:])
+        return [*((hand + motor - 0.02 * w - 0.05 * np.sign(hand)) / 0.01), *turned.ravel()]
+
+    begin = [0.0, 0.0, 0.0, *np.eye(3).ravel()]
+    truth = solve_ivp(rates, (0.0, 0.4), begin, rtol=1e-10, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(row["state"][9:], truth[:3], rtol=2e-3)
+    np.testing.assert_allclose(row["state"][:9], truth[3:], atol=6e-3)
+    assert np.linalg.norm(truth[:3]) > 3.0
+
+
+def test_work_on_the_wrist_is_never_less_than_what_it_gains():
+    random, stepper = np.random.default_rng(2), Stepper(LeaderWrist(WristParameters(), T))
+    work, R, moment = 0.0, np.eye(3), np.zeros(3)
     for _ in range(300):
-        row = clutch.step(handle=[0.03, 0.0, -0.01])
-    np.testing.assert_allclose(row["pose"][:3] - row["position"], [0.03, 0.0, -0.01], atol=1e-12)
-    np.testing.assert_array_equal(row["pose"][3:], np.eye(3).ravel())
+        before = moment
+        moment = random.normal(0, 1.0, 3)
+        row = stepper.step(motor_moment=0.4 * moment, hand_wrench=[0, 0, 0, *(0.6 * moment)])
+        turned = Rotation.from_matrix(matrix(row["state"][:9]) @ R.T).as_rotvec()
+        work, R = work + before @ turned, matrix(row["state"][:9])
+        w = row["state"][9:]
+        assert 0.5 * WristParameters().inertia * w @ w <= work + 1e-12
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-13)
 
 
-def test_a_person_opens_it_too():
-    clutch = Stepper(Clutch(1.0, START, [], T), ("opened",))
-    clutch.step(handle=[0.0, 0, 0], opened=[1.0])
-    row = clutch.step(handle=[0.01, 0, 0], opened=[1.0])
-    np.testing.assert_allclose(row["position"], START)
-    assert row["grip"][0] == 0.0
+def test_encoders_of_the_wrist_tell_whole_steps():
+    stepper = Stepper(LeaderWrist(WristParameters(resolution=1e-3), T))
+    for _ in range(60):
+        row = stepper.step(motor_moment=np.zeros(3), hand_wrench=[0, 0, 0, 0.5, -0.2, 0.1])
+    steps = Rotation.from_matrix(matrix(row["orientation"])).as_rotvec() / 1e-3
+    assert np.abs(steps).max() > 10.0
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    true = Rotation.from_matrix(matrix(row["state"][:9])).as_rotvec() / 1e-3
+    np.testing.assert_allclose(steps, true, atol=0.5001)
 
 
 @pytest.mark.parametrize(
@@ -104,6 +119,7 @@ def test_wrong_devices_are_refused(wrong):
         LeaderParameters(**wrong)
 
 
-def test_a_clutch_closes_after_it_opened():
-    with pytest.raises(InputError, match="ascending"):
-        ClutchParameters(2.0, 1.0)
+@pytest.mark.parametrize("wrong", [{"inertia": 0.0}, {"friction": -0.1}, {"torque_limit": 0.0}])
+def test_wrong_wrists_are_refused(wrong):
+    with pytest.raises(InputError, match=next(iter(wrong))):
+        WristParameters(**wrong)

@@ -288,6 +288,13 @@ def test_an_open_hand_closes_where_it_is_asked_to_hold():
     assert np.abs(wrenches).max() < 1e-3
 
 
+def test_a_hand_that_opens_draws_nothing_elsewhere():
+    """What it is asked to hold at while it is not to hold at all does not count."""
+    stepper = person()
+    follow(stepper, ask(hold=1.0, target=AT_HOME[:3]), [AT_HOME] * 500)
+    assert np.abs(follow(stepper, ask(), [AT_HOME] * 500)).max() < 1e-9
+
+
 def test_it_holds_its_wrench_until_the_next_look():
     stepper = person()
     before = [np.zeros(6), *follow(stepper, ask(push=(5.0, 0.0, 0.0)), [AT_HOME] * 20)]

@@ -23,7 +23,8 @@ from pfsc_drake.control.teleoperation.port import RECORD, TeleoperationPort
 from pfsc_drake.control.teleoperation.reaction import FixtureReaction
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.physics.channel import ChannelParameters, message_ages
-from pfsc_drake.physics.leader_device import Clutch, LeaderDevice, LeaderParameters
+from pfsc_drake.physics.leader_clutch import Clutch
+from pfsc_drake.physics.leader_device import LeaderDevice, LeaderParameters
 
 PERIOD = 1e-3
 _LAG, _DELAY = 5e-3, 2e-3
@@ -205,10 +206,11 @@ def _network(station: PointStation) -> Network:
     of_leader = PortLimits(force, speed * coupling.motion_scale, 0, PERIOD)
     guidance = GuidanceParameters(largest_speed=1.0)
     of_follower = PortLimits(_FOLLOWER_FORCE, guidance.largest_speed, 1, PERIOD)
+    clutch = Clutch(coupling.motion_scale, [0.0] * 3, [], PERIOD)
     blocks: dict[str, Network] = {
         "hand": Network.of(StudyHand()),
         "device": Network.of(LeaderDevice(device, PERIOD)),
-        "clutch": Network.of(Clutch(coupling.motion_scale, [0.0] * 3, [], PERIOD), ["opened"]),
+        "clutch": Network.of(clutch, ["opened", "orientation"]),
         "leader": Network.of(TeleoperationPort("leader", coupling, of_leader)),
         "motor": Network.of(Linear(coupling.force_scale * np.eye(3))),
         "felt": Network.of(Linear(np.eye(3, 6) / coupling.force_scale)),

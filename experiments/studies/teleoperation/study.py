@@ -30,6 +30,7 @@ _PLAIN = {
     "waves": CouplingParameters(impedance=_IMPEDANCE, smoothing=_SMOOTHING),
     "position-force": CouplingParameters("position_force", passive=False, smoothing=_SMOOTHING),
     "four-channel": CouplingParameters("four_channel", passive=False, smoothing=_SMOOTHING),
+    "four-channel, passive": CouplingParameters("four_channel", smoothing=_SMOOTHING),
 }
 _SEQUENCES = {
     "waves": CouplingParameters(impedance=_IMPEDANCE, smoothing=_JITTER_SMOOTHING),

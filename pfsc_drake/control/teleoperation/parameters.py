@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+import casadi as ca
+
 from pfsc_drake.errors import require, require_one_of, require_positive
 
 COUPLINGS = ("waves", "position_force", "four_channel")
@@ -35,6 +37,29 @@ class PortTankParameters:
 
 
 @dataclass
+class RotationParameters:
+    """How turns are coupled, three axes more, about those of the world.
+
+    Attributes:
+        impedance: ``b`` of their waves [Nm s/rad].
+        stiffness: K of the other couplings [Nm/rad].
+        damping: D of the other couplings [Nm s/rad].
+        scale: How far the follower turns by the leader's turn.
+    """
+
+    impedance: float = 1.0
+    stiffness: float = 20.0
+    damping: float = 1.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        for key in ("impedance", "stiffness", "scale"):
+            require_positive(key, getattr(self, key))
+        good = 0.0 <= self.damping < math.inf
+        require(good, "damping", self.damping, "zero or a positive number")
+
+
+@dataclass
 class CouplingParameters:
     """How leader and follower are coupled, in lengths and forces of the follower.
 
@@ -54,6 +79,7 @@ class CouplingParameters:
             about half the jitter.
         velocity_smoothing: Time constant [s] of the side's own velocity.
         tank: What one side may give.
+        rotation: How turns are coupled; null for three axes.
     """
 
     coupling: str = "waves"
@@ -67,6 +93,7 @@ class CouplingParameters:
     smoothing: float = 0.01
     velocity_smoothing: float = 0.004
     tank: PortTankParameters = field(default_factory=PortTankParameters)
+    rotation: RotationParameters | None = None
 
     def __post_init__(self) -> None:
         require_one_of("coupling", self.coupling, COUPLINGS)
@@ -78,6 +105,36 @@ class CouplingParameters:
         good = 0.0 <= self.force_share <= 1.0
         require(good, "force_share", self.force_share, "0 to 1")
 
+    @property
+    def axes(self) -> int:
+        """Axes of leader and follower, 3 or 6."""
+        return 3 if self.rotation is None else 6
+
+    @property
+    def moment_scale(self) -> float:
+        """What the leader feels of the follower's moments.
+
+        Work at the leader is then in one ratio to that at the follower, whatever turns or moves.
+        """
+        turned = 1.0 if self.rotation is None else self.rotation.scale
+        return self.force_scale * turned / self.motion_scale
+
+    def per_axis(self, name: str) -> ca.DM:
+        """Return a number for each axis, shape (axes,).
+
+        Args:
+            name: ``impedance``, ``stiffness`` or ``damping``; ``wave``: ``sqrt(2b)``; ``refill``:
+                damping where a tank is empty, for turns in the ratio of the impedances.
+        """
+        if name == "wave":
+            return ca.sqrt(2.0 * self.per_axis("impedance"))
+        linear = self.tank.refill if name == "refill" else getattr(self, name)
+        if self.rotation is None:
+            return ca.DM([linear] * 3)
+        ratio = self.rotation.impedance / self.impedance
+        turning = ratio * linear if name == "refill" else getattr(self.rotation, name)
+        return ca.DM([linear] * 3 + [turning] * 3)
+
 
 @dataclass(frozen=True)
 class PortLimits:
@@ -88,6 +145,8 @@ class PortLimits:
         speed: Largest speed of what it moves [m/s].
         ticks_late: Ticks after which its force acts.
         period: Sampling time [s].
+        moment: Largest moment that it gives [Nm], where it turns something.
+        turning: Largest angular velocity of what it moves [rad/s].
 
     Raises:
         InputError: If a number is out of range.
@@ -97,16 +156,22 @@ class PortLimits:
     speed: float
     ticks_late: int
     period: float
+    moment: float = 0.0
+    turning: float = 0.0
 
     def __post_init__(self) -> None:
         for key in ("force", "speed", "period"):
             require_positive(key, getattr(self, key))
+        for key in ("moment", "turning"):
+            value = getattr(self, key)
+            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
         require(0 <= self.ticks_late <= 10, "ticks_late", self.ticks_late, "0 to 10")
 
     @property
     def reserve(self) -> float:
         """Most energy that forces take which are given and still to act [J]."""
-        return self.force * self.speed * self.period * (1 + self.ticks_late)
+        power = self.force * self.speed + self.moment * self.turning
+        return power * self.period * (1 + self.ticks_late)
 
     @property
     def pledged(self) -> float:

@@ -8,7 +8,8 @@ import numpy as np
 import scipy.linalg
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.blocks.cases import where
+from pfsc_drake.control.teleoperation.coordinates import LINEAR, TURNING, MovedBody, MovedPoint
 from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE, UNITS
 from pfsc_drake.control.teleoperation.parameters import CouplingParameters, PortLimits
 
@@ -17,17 +18,22 @@ SIDES = ("leader", "follower")
 _REPAID, _LASTS = 0.1, 0.5
 _NOTHING = 1e-30  # J s
 _RECORD = {"force": 3, "position": 3, "tank": 1, "sent": 1, "received": 1, "share": 1}
-_ENDS = np.cumsum(list(_RECORD.values())).tolist()
-RECORD = {
-    name: slice(end - size, end) for (name, size), end in zip(_RECORD.items(), _ENDS, strict=True)
+_TURNING = {"moment": 3, "turn": 3}
+_ENDS = np.cumsum([*_RECORD.values(), *_TURNING.values()]).tolist()
+_ROWS = {
+    name: slice(end - size, end)
+    for (name, size), end in zip((_RECORD | _TURNING).items(), _ENDS, strict=True)
 }
+RECORD = {name: _ROWS[name] for name in _RECORD}
+# with six axes the record goes on
+TURNING_RECORD = {name: _ROWS[name] for name in _TURNING}
 
 
 class TeleoperationPort(Block):
     r"""A force on what a side moves, from what the other side tells, paid from a tank.
 
-    Both sides are alike. With x the position of what is moved and v its velocity, by
-    ``coupling``::
+    Both sides are alike. With x the coordinates of what is moved, see :mod:`coordinates`, and v
+    their rates, by ``coupling``, each axis for itself, turns with numbers of their own::
 
         waves            F = sqrt(2b) a - b v,     out: O = sqrt(2b) x - A
         position_force   follower  F = K (x_o - x) + D (v_o - v),  out: x, F
@@ -55,23 +61,27 @@ class TeleoperationPort(Block):
 
     Where E is below its initial content, damping ``-d_r v`` fills it.
 
+    With six axes F is a force and a moment, of which the tank pays for both; its work is that
+    of a held moment over the turn of its tick.
+
     Ports:
-        position (input): x, in the world of the follower [m], shape (3,).
-        message (input): What arrived last from the other side, shape (8,), see :data:`FIELDS`;
+        position (input): Of what is moved, in the world of the follower [m], shape (3,).
+        orientation (input, six axes): R by rows, shape (9,).
+        message (input): What arrived last from the other side, shape (14,), see :data:`FIELDS`;
             zero if nothing did.
-        felt (input, optional): Force that the side feels, for the other one [N], shape (3,).
+        felt (input, optional): Force that the side feels, for the other one [N, Nm], shape (axes,).
         grip (input, optional): Share of the force that is given, shape (1,); 1 if not connected.
-        force (output): F [N], shape (3,); it acts ``ticks_late`` ticks later.
-        message (output): For the other side, shape (8,).
+        force (output): F, world axes [N, Nm], shape (axes,); it acts ``ticks_late`` ticks later.
+        message (output): For the other side, shape (14,).
         record (output): See :data:`RECORD`: the force that acts from this tick on, x since the
             start, what is left in the tank, all that was sent and received, and the share of the
-            force and of the wave that could be paid.
+            force and of the wave that could be paid; with six axes :data:`TURNING_RECORD`, too.
 
     State:
         tank; ``sent`` and ``received`` [J]; ``heard``, A or ``x_o``, and its ``rate``; ``given``,
-        what was sent of O; ``aim``, O at the last tick; ``origin``, ``last``: x at the start and at
-        the last tick; ``velocity``; ``forces`` and ``taken``: forces that are to act, and A that
-        they are of, oldest last.
+        what was sent of O; ``aim``, O at the last tick; what the coordinates remember;
+        ``velocity``; ``forces`` and ``taken``: forces that are to act, and A that they are of,
+        oldest last.
 
     Args:
         side: ``leader`` or ``follower``.
@@ -83,56 +93,60 @@ class TeleoperationPort(Block):
         self._side, self._coupling, self._limits = side, coupling, limits
         self._waves = coupling.coupling == "waves"
         self._takeover = _takeover(coupling.smoothing, limits.period)
-        count = 3 * (1 + limits.ticks_late)
-        self.inputs = {
-            "position": Port(3, "m"),
+        self._of = MovedPoint() if coupling.rotation is None else MovedBody()
+        axes = self._of.axes
+        count = axes * (1 + limits.ticks_late)
+        self.inputs = self._of.inputs | {
             "message": Port(MESSAGE, UNITS),
-            "felt": Port(3, "N", optional=True),
+            "felt": Port(axes, "N, Nm", optional=True),
             "grip": Port(1, optional=True),
         }
         self.outputs = {
-            "force": Port(3, "N"),
+            "force": Port(axes, "N, Nm"),
             "message": Port(MESSAGE, UNITS),
-            "record": Port(_ENDS[-1], "N, m, J, 1"),
+            "record": Port(_ENDS[-1] if axes > 3 else RECORD["share"].stop, "N, m, J, 1, Nm, rad"),
         }
-        self.states = {
-            "tank": 1, "sent": 1, "received": 1, "heard": 3, "rate": 3, "given": 3, "aim": 3,
-            "origin": 3, "last": 3, "velocity": 3, "forces": count, "taken": count,
-        }  # fmt: skip
+        sizes = {"heard": axes, "rate": axes, "given": axes, "aim": axes, "velocity": axes}
+        self.states = {"tank": 1, "sent": 1, "received": 1} | sizes | self._of.states
+        self.states |= {"forces": count, "taken": count}
         self.inner = {f"{name}_after": size for name, size in self.states.items()}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero."""
-        return {"tank": self._coupling.tank.initial, "origin": u.position, "last": u.position}
+        return {"tank": self._coupling.tank.initial} | self._of.initial(u)
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        way, T = self._coupling, self._limits.period
-        position = where(all_finite(u.position), u.position, x.last)
-        there = position - x.origin
-        step = position - x.last
+        way, T, axes = self._coupling, self._limits.period, self._of.axes
+        moved = self._of.moved(x, u)
         fade = 1.0 - math.exp(-T / way.velocity_smoothing) if way.velocity_smoothing > 0.0 else 1.0
-        velocity = x.velocity + fade * (step / T - x.velocity)
-        signal, energy = u.message[FIELDS["signal"]], u.message[FIELDS["energy"]]
+        velocity = x.velocity + fade * (moved.step / T - x.velocity)
+        signal, energy = u.message[FIELDS["signal"]][:axes], u.message[FIELDS["energy"]]
         heard, slope = ca.horzsplit(ca.horzcat(signal - x.heard, x.rate) @ self._takeover)
         heard, rate = x.heard + heard, heard / T
-        tank = x.tank - ca.dot(x.forces[-3:], step) + energy - x.received
+        tank = x.tank - ca.dot(x.forces[-axes:], moved.way) + energy - x.received
         tank = ca.fmin(tank, way.tank.capacity) if way.passive else tank
-        aim = math.sqrt(2.0 * way.impedance) * there - x.taken[-3:]
+        aim = way.per_axis("wave") * moved.there - x.taken[-axes:]
         given, sent, paid = self._send(x, aim, tank)
         left = tank - sent
-        force, share = self._affordable(x, u, self._force(x, u, there, velocity, rate, tank), left)
-        felt = u.felt if u.felt is not None else ca.DM.zeros(3)
+        force = self._force(heard - moved.there, velocity, rate, tank)
+        force = self._of.wrench(moved.there, force) + self._told_force(u)
+        force, share = self._affordable(x, u, force, left)
+        felt = u.felt if u.felt is not None else ca.DM.zeros(axes)
         felt = force if way.coupling == "position_force" else felt
-        told = given if self._waves else there
-        forces = ca.vertcat(force, x.forces)
-        message = ca.vertcat(t + 1.0, told, felt, x.sent + sent)
-        record = ca.vertcat(forces[-6:-3], there, left, x.sent + sent, energy, ca.fmin(share, paid))
+        told = given if self._waves else moved.there
+        forces, none = ca.vertcat(force, x.forces), ca.DM.zeros(6 - axes)
+        message = ca.vertcat(t + 1.0, told, none, felt, none, x.sent + sent)
+        acting, sent = forces[-2 * axes : -axes], x.sent + sent
+        record = ca.vertcat(
+            acting[LINEAR], moved.there[LINEAR], left, sent, energy, ca.fmin(share, paid),
+            acting[TURNING], moved.there[TURNING],
+        )  # fmt: skip
         after = {
-            "tank": left, "sent": x.sent + sent, "received": energy, "heard": heard, "rate": slope,
-            "given": given, "aim": aim, "origin": x.origin, "last": position, "velocity": velocity,
-            "forces": forces[:-3], "taken": ca.vertcat(heard, x.taken)[:-3],
-        }  # fmt: skip
+            "tank": left, "sent": sent, "received": energy, "heard": heard, "rate": slope,
+            "given": given, "aim": aim, "velocity": velocity,
+            "forces": forces[:-axes], "taken": ca.vertcat(heard, x.taken)[:-axes],
+        } | moved.after  # fmt: skip
         outputs = {"force": force, "message": message, "record": record}
         return outputs | {f"{name}_after": value for name, value in after.items()}
 
@@ -140,21 +154,24 @@ class TeleoperationPort(Block):
         """Return what is remembered at the next tick; what is left out stays."""
         return {name: getattr(y, f"{name}_after") for name in self.states}
 
-    def _force(self, x: Values, u: Values, there: Any, velocity: Any, rate: Any, tank: Any) -> Any:
-        """Return the force that the coupling wants [N], shape (3,)."""
-        way, felt = self._coupling, u.message[FIELDS["felt"]]
+    def _force(self, apart: Any, velocity: Any, rate: Any, tank: Any) -> Any:
+        """Return the force on the coordinates that the coupling wants, shape (axes,)."""
+        way, force = self._coupling, ca.DM.zeros(self._of.axes)
         if self._waves:
-            force = math.sqrt(2.0 * way.impedance) * rate - way.impedance * velocity
-        elif way.coupling == "position_force" and self._side == "leader":
-            force = -felt
-        else:
-            force = way.stiffness * (x.heard - there) + way.damping * (rate - velocity)
-            if way.coupling == "four_channel":
-                force += way.force_share * felt
+            force = way.per_axis("wave") * rate - way.per_axis("impedance") * velocity
+        elif way.coupling == "four_channel" or self._side == "follower":
+            force = way.per_axis("stiffness") * apart + way.per_axis("damping") * (rate - velocity)
         if way.passive:
             lack = ca.fmax(0.0, ca.fmin(1.0, 1.0 - tank / way.tank.initial))
-            force -= way.tank.refill * lack * velocity
+            force -= way.per_axis("refill") * lack * velocity
         return force
+
+    def _told_force(self, u: Values) -> Any:
+        """Return the force that the other side feels, as far as the coupling gives it [N, Nm]."""
+        way, felt = self._coupling, u.message[FIELDS["felt"]][: self._of.axes]
+        if way.coupling == "four_channel":
+            return way.force_share * felt
+        return -felt if way.coupling == "position_force" and self._side == "leader" else 0.0
 
     def _send(self, x: Values, aim: Any, tank: Any) -> tuple[Any, Any, Any]:
         """Return what was sent of O by now, energy that goes with it [J], and the share of it.
@@ -181,17 +198,31 @@ class TeleoperationPort(Block):
         return x.given + wave, ca.sumsqr(wave) / (2.0 * T), share
 
     def _affordable(self, x: Values, u: Values, force: Any, left: Any) -> tuple[Any, Any]:
-        """Return the force that is given [N], and its share of what is wanted."""
-        limits = self._limits
-        size, most = ca.norm_2(force), limits.force
+        """Return the force that is given [N, Nm], and its share of what is wanted."""
+        limits, axes = self._limits, self._of.axes
+        share = _share(ca.norm_2(force[LINEAR]), limits.force)
+        if axes > 3:
+            share = ca.fmin(share, _share(ca.norm_2(force[TURNING]), limits.moment))
         if self._coupling.passive:
             pending = ca.fmax(0.0, left) / (limits.speed * limits.period)
             for k in range(limits.ticks_late):
-                pending -= ca.norm_2(x.forces[3 * k : 3 * k + 3])
-            most = ca.fmin(most, ca.fmax(0.0, pending))
-        share = where(size > most, most / size, 1.0)
+                pending -= self._costs(x.forces[axes * k : axes * (k + 1)])
+            share = ca.fmin(share, _share(self._costs(force), ca.fmax(0.0, pending)))
         grip = ca.DM(1.0) if u.grip is None else ca.fmax(0.0, ca.fmin(1.0, u.grip))
         return grip * share * force, share
+
+    def _costs(self, force: Any) -> Any:
+        """Return the force that takes as much energy at the largest speeds [N]."""
+        size = ca.norm_2(force[LINEAR])
+        if self._of.axes > 3:
+            per_moment = self._limits.turning / self._limits.speed
+            size += per_moment * ca.norm_2(force[TURNING])
+        return size
+
+
+def _share(size: Any, most: Any) -> Any:
+    """Return what of a size is within a limit."""
+    return where(size > most, most / size, 1.0)
 
 
 def _takeover(smoothing: float, period: float) -> ca.DM:

@@ -4,16 +4,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from diagrams.builder import build_station
 from diagrams.scenario import HandParameters, HandWaypoint
 from diagrams.scenario.schema import driven
 from diagrams.scenario.teleoperation import TeleoperationParameters
+from diagrams.station_parts import make_task
 from experiments.results.run_signals import collect_log
 from experiments.results.teleoperation import teleoperation_metrics
 from experiments.simulation import simulate
+from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
+from pfsc_drake.control.teleoperation.parameters import RotationParameters
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.leader_device import ClutchParameters
+from pfsc_drake.physics.channel import ChannelParameters
+from pfsc_drake.physics.leader_clutch import ClutchParameters
 from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"
@@ -76,6 +81,52 @@ def test_along_a_path_the_follower_moves_farther_by_the_scale():
     np.testing.assert_array_equal(log["leader_force"].values[opened], 0.0)
 
 
+def test_the_tool_turns_as_the_hand_does():
+    """A hand that turns by 0.15 rad within half a second, and a wrist that turns twice as far."""
+    settings = shipped_scenario("teleop_path")
+    way = settings.teleoperation
+    way.channel = ChannelParameters(0.02)
+    way.clutch, way.motion_scale, way.force_scale = [], 1.0, 1.0
+    way.rotation = RotationParameters(impedance=2.0, scale=0.5)
+    settings.compliance.rotational = CoordinateImpedance(Profile(0.1), Profile(2.0), Profile(0.0))
+    task = make_task(settings, SCENARIOS)
+    R_0 = Rotation.from_matrix(task.start(np.zeros(3)).target.R_e)
+    wanted = Rotation.from_rotvec([0.09, 0.0, 0.12]) * R_0
+    settings.hand.waypoints = [
+        HandWaypoint(time, [0.05, 0, 0], R.as_euler("ZYX", degrees=True))
+        for time, R in ((0.4, R_0), (0.9, wanted))
+    ]
+    settings.hand.rotational_stiffness, settings.hand.tremor = 10.0, 0.0
+    _, log = run(settings, 1.7)
+    ends = {
+        name: Rotation.from_matrix(log[name].values[-1].reshape(3, 3))
+        for name in ("R_e", "led_orientation", "leader_orientation")
+    }
+    turned = (ends["R_e"] * R_0.inv()).as_rotvec()
+    np.testing.assert_allclose(turned, [0.09, 0.0, 0.12], atol=0.015)
+    handle = ends["leader_orientation"].as_rotvec()
+    led = (ends["led_orientation"] * R_0.inv()).as_rotvec()
+    np.testing.assert_allclose(led, 0.5 * handle, atol=2e-3)
+    metrics = teleoperation_metrics(log, settings)
+    assert metrics["led_turn_end"].value < 0.02
+    assert metrics["audit_ports"].value < 1e-12
+    assert metrics["energy_margin"].value >= 0.0
+    # motors of the wrist by those of the port: force scale by motion scale, times that of turns
+    felt, given = log["leader_moment"].values, log["port_moment"].values[:, :3]
+    np.testing.assert_allclose(felt, 0.5 * given, atol=1e-12)
+    assert np.abs(felt).max() > 0.05
+
+
+def test_turns_need_a_tool_that_yields_and_a_hand_that_turns_a_wrist():
+    settings = region(rotation=RotationParameters())
+    with pytest.raises(InputError, match=r"teleoperation.rotation = given"):
+        build_station(settings, SCENARIOS)
+    settings = region()
+    settings.hand.rotational_stiffness = 5.0
+    with pytest.raises(InputError, match=r"hand.rotational_stiffness = 5.0"):
+        build_station(settings, SCENARIOS)
+
+
 @pytest.mark.parametrize("coupling", ["position_force", "four_channel"])
 def test_other_couplings_lead_the_tool_too(coupling):
     settings = region(coupling=coupling)
@@ -129,6 +180,11 @@ def test_wrong_teleoperations_are_refused(wrong, key):
         TeleoperationParameters(**wrong)
 
 
-def test_a_robot_elsewhere_is_not_led_from_a_third_place():
-    with pytest.raises(InputError, match="teleoperation"):
-        driven(shipped_scenario("teleop_region"))
+def test_a_robot_elsewhere_is_led_over_a_bus():
+    settings = shipped_scenario("teleop_region")
+    with pytest.raises(InputError, match=r"teleoperation.lcm = ''"):
+        driven(settings)
+    settings.teleoperation.lcm = "memq://"
+    left, said = driven(settings)
+    assert left.hand is None
+    assert said[0] == "left to the leader: hand"

@@ -44,10 +44,10 @@ def show(tmp_path):
         each.close()
 
 
-def guided(count):
+def guided(count, **options):
     """Return the status of a session with regions at its fullest, and its pages."""
     pages, status = Pages(), LiveStatus("a_scenario_with_a_long_name")
-    panel = Panel(pages, 45.0, TUNED, [f"plane_{i + 1}" for i in range(count)])
+    panel = Panel(pages, 45.0, TUNED, [f"plane_{i + 1}" for i in range(count)], **options)
     status.phase, status.time, status.factor = "running", 1234.5, 0.97
     status.mode, status.limit, status.recording = "moves freely", "axis 3 near its end", 1200.0
     status.progress = {"x": 0.1, "y": 0.2, "z": 0.3}
@@ -88,6 +88,26 @@ def test_nothing_lies_upon_another(show):
     # what comes and goes is on the scene
     for name in ("limit", "recording"):
         assert boxes(browser, f"#{name}")[0][0] >= sides[2]
+
+
+def test_a_leader_is_dragged_by_the_way_of_the_mouse(show):
+    """From wherever in the pad it is taken hold of; half of the pad is 0.15 m."""
+    status, pages = guided(5, drags=True)
+    browser = show(status, pages)
+    assert browser.evaluate("at('pulls-title').textContent") == "Drag the leader"
+    (left, top, right, bottom), (x, y) = boxes(browser, "#pad")[0], browser.middle("#pad")
+    until(lambda: browser.evaluate("leads"))
+    begin = (x + 20.0, y + 10.0)
+    browser.mouse("mousePressed", begin)
+    until(lambda: pages.heard().hand == {"drag x [m]": 0.0, "drag y [m]": 0.0})
+    browser.mouse("mouseMoved", (x - 25.0, y - 20.0))
+    until(lambda: pages.heard().hand.get("drag x [m]", 0.0) > 0.0)
+    hand = pages.heard().hand
+    assert hand["drag x [m]"] == pytest.approx(0.15 * 2 * 30.0 / (bottom - top), rel=1e-3)
+    assert hand["drag y [m]"] == pytest.approx(0.15 * 2 * 45.0 / (right - left), rel=1e-3)
+    browser.mouse("mouseReleased", (x - 25.0, y - 20.0))
+    until(lambda: pages.heard().hand == {})
+    assert browser.errors == []
 
 
 def test_dragging_selects_no_label(show):

@@ -101,6 +101,29 @@ def test_a_hand_that_is_silent_has_let_go_of_everything(panel, pages, clock):
     assert controls["hold"] == 0.0
 
 
+def test_a_device_is_dragged_from_where_the_hand_took_hold_of_it(pages, clock):
+    panel = Panel(pages, 45.0, TUNED, REGIONS, drags=True)
+    assert panel.content()["drag"] == 0.15
+    say(pages, {"drag y [m]": 0.05})
+    controls = read(panel)
+    assert controls["hold"] == 1.0
+    assert [controls[f"target_{axis}"] for axis in "xyz"] == pytest.approx([0.8, 0.15, 0.9])
+    say(pages, {"drag y [m]": 0.1, "drag z [m]": -7.0})
+    controls = read(panel, TOOL + 0.02)  # the tool has moved meanwhile
+    assert [controls[f"target_{axis}"] for axis in "xyz"] == pytest.approx([0.8, 0.2, 0.6])
+    assert [controls[f"push_{axis}"] for axis in "xyz"] == [0.0, 0.0, 0.0]
+    say(pages)
+    assert read(panel)["hold"] == 0.0
+    say(pages, {"drag x [m]": 0.01})
+    assert read(panel, TOOL + 0.02)["target_x"] == pytest.approx(TOOL[0] + 0.03)
+    clock.now += 0.31
+    assert read(panel)["hold"] == 0.0
+
+
+def test_a_tool_at_hand_is_pulled(panel):
+    assert panel.content()["drag"] is None
+
+
 def test_a_hand_takes_hold_where_the_tool_is(panel, pages):
     say(pages, **{"hold dx [m]": 0.1, "hold (T, G)": 1.0})
     controls = read(panel)

@@ -19,6 +19,7 @@ from experiments.scenario_file import read_scenario
 from reporting.progress import NoProgress
 
 RESET, RECORD, END = "reset (X)", "record (C)", "end (Q)"
+_OF_HAND = ("pull", "drag")
 BARE = ("--no-figures", "--no-recording")
 
 
@@ -42,9 +43,10 @@ class Rehearsal:
         )
 
     def _say(self, changes):
-        """A hand keeps pulling, until it pulls otherwise or a reset takes it off."""
-        settings = {name: changes[name] for name in changes if not name.startswith("pull")}
+        """A hand keeps pulling, until it pulls otherwise, lets go or a reset takes it off."""
+        settings = {name: changes[name] for name in changes if not name.startswith(_OF_HAND)}
         self._hand |= {name: changes[name] for name in changes.keys() - settings.keys()}
+        self._hand = {name: value for name, value in self._hand.items() if value is not None}
         if RESET in settings:
             self._hand = {}
         message = {"client": "a", "hand": self._hand, "set": settings}
@@ -182,6 +184,26 @@ def test_a_person_afar_leads_the_tool_a_channel_later(tmp_path):
     again = tmp_path / "again"
     assert main(["run", str(folder / "scenario.yaml"), "--out", str(again), *BARE]) == 0
     assert_same(log, datasets(again)[0])
+
+
+def test_a_leader_is_dragged_to_where_the_hand_is(tmp_path):
+    """By 4 cm, let go of, and dragged on from there: the tool comes along."""
+    rehearsal = Rehearsal(
+        tmp_path / "takes",
+        "teleop_region",
+        "teleoperation.channel={delay: 0.02}",
+    )
+    rehearsal.play(
+        at(0.5, **{"drag y [m]": 0.04}),
+        at(1.1, **{"drag y [m]": None}),
+        at(1.2, **{"drag y [m]": 0.03}),
+        at(1.9, **{END: True}),
+    )
+    assert rehearsal.session._panel.content()["drag"] == 0.15
+    log, _ = datasets(rehearsal.session.kept[0].folder)
+    y = log["y_t"][:, 1]
+    assert y[-1] - y[0] == pytest.approx(0.07, abs=0.01)
+    assert np.ptp(log["y_t"][:, 2]) < 2e-3
 
 
 def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):

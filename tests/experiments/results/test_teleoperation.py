@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from experiments.figures.all import draw_figures
@@ -77,6 +78,64 @@ def test_an_honest_log_passes_the_audit(log, settings):
     assert metrics["audit_channel"].value == 0.0
     assert metrics["least_port_tank"].value == 0.5
     assert metrics["energy_margin"].value == pytest.approx(1.0)
+
+
+@pytest.fixture(name="turning")
+def fixture_turning(log):
+    """The same, and the leader turns about an axis that is not fixed; the tool does so later.
+
+    The hand holds a moment m, the port -m, so that the tank gets its work over the turns.
+    """
+    angle = 0.3 * np.sin(0.7 * TIME) ** 2
+    turn = np.stack([angle, 0.5 * angle**2, -0.4 * angle], axis=1)
+    late = np.vstack([np.zeros((LATE, 3)), turn[:-LATE]])
+    moment = np.tile([0.5, -0.2, 0.3], (len(TIME), 1))
+    R = Rotation.from_rotvec(turn)
+    steps = np.sum(moment[:-1] * (R[1:] * R[:-1].inv()).as_rotvec(), axis=1)
+    taken = np.concatenate([[0.0], np.cumsum(steps)])
+    arrived = np.concatenate([np.zeros(LATE), taken[:-LATE]])
+    turning = RunLog(TIME)
+    for name, signal in log.signals.items():
+        turning.add(name, signal.values.copy(), signal.unit, signal.labels)
+    turning["port_sent"].values[:, 0] += taken
+    turning["port_received"].values[:, 1] += arrived
+    turning["port_tank"].values[:, 1] += arrived
+    turning.add("port_moment", np.hstack([-moment, 0.0 * moment]))
+    turning.add("port_turn", np.hstack([turn, late]))
+    turning.add("leader_orientation", R.as_matrix().reshape(-1, 9))
+    turning.add("leader_hand_moment", moment)
+    turning.add("leader_moment", -moment)
+    R_0 = Rotation.from_rotvec([1.0, 2.0, 0.0])
+    turning.add("led_orientation", (R * R_0).as_matrix().reshape(-1, 9))
+    turning.add("R_e", (Rotation.from_rotvec(late) * R_0).as_matrix().reshape(-1, 9))
+    return turning
+
+
+def test_moments_do_work_too(turning, settings):
+    metrics = teleoperation_metrics(turning, settings)
+    assert metrics["audit_ports"].value < 1e-12
+    ends = [Rotation.from_rotvec(turning["port_turn"].values[-1, k : k + 3]) for k in (0, 3)]
+    apart = (ends[0] * ends[1].inv()).magnitude()
+    assert metrics["led_turn_end"].value == pytest.approx(apart)
+    assert metrics["largest_felt_moment"].value == pytest.approx(np.sqrt(0.38))
+    turning["port_moment"].values[1000] *= 1.1
+    assert teleoperation_metrics(turning, settings)["audit_ports"].value > 1e-6
+
+
+def test_the_bound_counts_what_a_hand_turns(turning):
+    """Done by a hand that pushes with 3 N and holds a moment, both as the port takes them."""
+    taken = turning["port_sent"].values[:, 0]
+    np.testing.assert_allclose(energy_above_bound(turning, 1.0), 1.0 + taken, atol=1e-12)
+
+
+def test_how_it_is_turned_is_drawn(turning):
+    turning.add("eta", turning["y_t"].values, "m")
+    assert "led_turns" in [drawing.name for drawing in draw_figures(turning, [])]
+
+
+def test_metrics_of_six_axes_are_those_of_the_registry(turning, settings):
+    found = set(teleoperation_metrics(turning, settings))
+    assert found == set(names_about(turning, "port_force", "led_point", "led_orientation"))
 
 
 def test_energy_from_nowhere_is_found(log, settings):
