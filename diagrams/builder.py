@@ -174,7 +174,9 @@ def build_station(
     )
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
-    around = place.signals | {"joint_state": true_state, "manifold_point": beside}
+    around = place.signals | {"joint_state": true_state}
+    if held is None:
+        around["manifold_point"] = beside
     operator = None
     if scenario.operator is not None:
         operator = add_operator(
@@ -183,7 +185,17 @@ def build_station(
     afar = add_afar(builder, scenario, operator, task, start)
     at_tool = operator if afar is None else None
     forces = add_surroundings(
-        builder, part, task, outside(scenario), around, start, at_tool, mounting, spring
+        builder,
+        part,
+        task,
+        outside(scenario),
+        around,
+        start,
+        at_tool,
+        mounting,
+        spring,
+        law_manifold(task, held),
+        None if holder is None else holder.reaction,
     )
     if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
@@ -191,6 +203,8 @@ def build_station(
         forces |= add_sensor(builder, part, scenario.sensor, failure, period, states | forces)
         if mounting is not None:
             forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
+        if holder is not None and holder.reaction is not None:
+            holder.reaction.tell(builder, forces["wrench_measured"], place.world_pose)
     led = {} if operator is None else operator.requests
     if afar is not None:
         led = led | {"wrench_led": afar.lead(builder, forces)}

@@ -1,5 +1,6 @@
 """The robot of a station that holds the workpiece, with its controller, and what it tells."""
 
+import dataclasses as dc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ from diagrams.station_parts import (
 )
 from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
+from diagrams.surroundings.held_reaction import HeldReaction, add_held_reaction
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import HeldFrame
@@ -69,6 +71,7 @@ class Holder:
         warn: Tells what there is to say, one sentence each.
         projector: Name of what finds the workpiece's place on its path.
         measured: System and port that the measured joint state comes from, by name.
+        reaction: What it bears of the process on the workpiece, if there is one.
     """
 
     parameters: HolderParameters
@@ -84,6 +87,7 @@ class Holder:
     warn: Callable[[], list[str]]
     projector: str
     measured: tuple[str, str]
+    reaction: HeldReaction | None = None
 
     def set_start(self, blocks: BlockAccess, root: Context) -> None:
         """Put the robot at its start.
@@ -177,7 +181,12 @@ def add_holder(
             following_options(own), believed, task, law, q_J, on_motors, friction, carries=True
         )
         place = add_place(named, following, links.joint_state)
-        controller, made = add_law(named, following, place, {})
+        reaction, told = None, own.controller.external_torque.source
+        if scenario.forces:
+            seen = place.signals["tool_pose"] if told == "measured" else None
+            reaction = add_held_reaction(named, part, true_state, seen, period)
+        forces = {} if reaction is None else reaction.forces
+        controller, made = add_law(named, following, place, forces)
     drive = controller.GetOutputPort(controller.drive_port)
     if links.drive_torque is not None:
         builder.Connect(drive, links.drive_torque)
@@ -186,7 +195,7 @@ def add_holder(
     rubs = add_friction(named, part, true_state, rubbing, [controller.GetOutputPort("fault")])
     motion = _add_motion(named, holder, following, order, controller)
     pose = np.array(pose_function(part.robot)(q_J)).ravel()
-    logged = place.signals | made | rubs | {"frame_jet": motion}
+    logged = place.signals | made | rubs | forces | {"frame_jet": motion}
     logged |= states_to_log(true_state, place.signals["joint_state"])
     source = measured.get_system().get_name(), measured.get_name()
     planned = [] if task.drive_plan is None else task.drive_plan.said
@@ -195,7 +204,7 @@ def add_holder(
     def warn() -> list[str]:
         said = task.warnings + own.model_error.warnings + planned
         said += part.start_warnings(own.start, q_J, start.target)
-        said += controller_warnings(own, task, part, law, link_state, rest())
+        said += controller_warnings(_alone(own), task, part, law, link_state, rest())
         return [f"the robot that holds the workpiece: {line}" for line in said]
 
     made_holder = Holder(
@@ -212,6 +221,7 @@ def add_holder(
         warn,
         place.projector.get_name(),
         source,
+        reaction,
     )
     return made_holder, controller
 
@@ -246,6 +256,15 @@ def naming_holder() -> Iterator[None]:
         raise InputError(
             message if message.startswith("holder.") else f"holder.{message}"
         ) from None
+
+
+def _alone(own: Scenario) -> Scenario:
+    """Return a holder's scenario for what is said of it: it has no force sensor of its own."""
+    torque = own.controller.external_torque
+    if torque.source != "measured":
+        return own
+    told = dc.replace(own.controller, external_torque=dc.replace(torque, source="known"))
+    return dc.replace(own, controller=told)
 
 
 def _check(holder: HolderParameters, period: float, order: int) -> None:

@@ -27,12 +27,13 @@ def holder_scenario(scenario: Scenario) -> Scenario:
         friction=holder.friction,
         encoders=holder.encoders,
         faults=holder.faults,
+        forces=scenario.forces,
     )
 
 
 # what acts where the world's axes or one robot alone are meant
 _BESIDE_HOLDER = (
-    *("forces", "pushes", "hand", "operator", "hold_back", "servo", "driver", "compliance"),
+    *("pushes", "hand", "operator", "hold_back", "servo", "driver", "compliance"),
     *("notch", "workpiece", "plate", "teleoperation", "obstacles"),
 )
 
@@ -53,8 +54,9 @@ def check_holder(scenario: Scenario) -> None:
     allowed = "path, trajectory or surface where a holder has the workpiece"
     require(manifold != "space", "controller.manifold", manifold, allowed)
     controller = scenario.controller
-    source = controller.external_torque.source
-    require(source == "none", "controller.external_torque.source", source, "none, with a holder")
+    for i, pulse in enumerate(scenario.forces):
+        allowed = "empty where a holder has the workpiece: forces are between it and the tool"
+        require(not pulse.link, f"forces[{i}].link", f"'{pulse.link}'", allowed)
     require(controller.delay is None, "controller.delay", controller.delay, "null, with a holder")
     speed, streamed = scenario.reference.speed, isinstance(scenario.path.shape, Streamed)
     require(speed == "asked", "reference.speed", speed, "asked, with a holder")

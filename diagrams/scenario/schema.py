@@ -169,7 +169,8 @@ class Scenario:
     @property
     def needs_sensor(self) -> bool:
         """Whether something acts on measured forces."""
-        measured = self.controller.external_torque.source == "measured"
+        controllers = [self.controller] + ([] if self.holder is None else [self.holder.controller])
+        measured = any(each.external_torque.source == "measured" for each in controllers)
         return measured or self.compliance.needs_sensor
 
 

@@ -91,6 +91,8 @@ def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]
     labels = [fault.name.lower() for fault in Fault]
     status = own["law"][:, layout.status]
     log.add(f"{HOLDER}fault", status[:, 0].astype(int), labels=labels)
+    if "wrench_ext" in own:
+        log.add(f"{HOLDER}wrench", own["wrench_ext"])
     log.add("frame_error", frame_error(own["frame_jet"], frames))
 
 
