@@ -19,6 +19,7 @@ from diagrams.drawing.recorded import RecordedMotion, RecordedPushes
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
+from pfsc_drake.geometry.rotation import placed_points
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.manifold_visualizer import signed_color
 from pfsc_drake.systems.drawing.obstacle_visualizer import ObstacleVisualizer
@@ -233,8 +234,13 @@ def _add_tool(
         source = add_source(builder, "distance", motion.times, distance.values[:, np.newaxis])
         builder.Connect(source, trail.GetInputPort("value"))
     if motion.tool_force is not None:
-        forces = RecordedPushes(points, motion.tool_force)
+        forces = RecordedPushes(_in_world(motion, points), motion.tool_force)
         _add_arrows(builder, "tool_force", motion, forces, meshcat, period)
+
+
+def _in_world(motion: RecordedMotion, points: np.ndarray) -> np.ndarray:
+    """Return where the tool is in the world [m], shape (frames, 3)."""
+    return points if motion.held is None else placed_points(points, motion.held.workpiece_pose)
 
 
 def _add_links(

@@ -273,7 +273,9 @@ def _add_pushes(
             builder.Connect(points, point.GetInputPort("whole"))
             builder.Connect(point.GetOutputPort("part"), source.GetInputPort("point"))
         else:
-            source = _add_script(builder, f"link_script_{k + 1}", push.pulses, followed, period, ports)
+            source = _add_script(
+                builder, f"link_script_{k + 1}", push.pulses, followed, period, ports
+            )
         builder.Connect(source.GetOutputPort("wrench"), wrenches.GetInputPort(f"wrench_{k + 1}"))
     return system, {
         "push_wrench": hold.GetOutputPort("held"),

@@ -8,6 +8,7 @@ from experiments.results.run_log import FloatArray, RunLog, peak
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.manifolds.carried import flange_motion_function
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
+from pfsc_drake.geometry.rotation import placed_points
 from reporting.metrics import Metrics
 
 
@@ -45,17 +46,6 @@ def seen_poses(pose: FloatArray, frames: FloatArray) -> FloatArray:
     y_C = np.einsum("kij,kj->ki", R_CW, pose[:, :3] - frames[:, :3])
     R_Ce = R_CW @ pose[:, 3:].reshape(-1, 3, 3)
     return np.hstack([y_C, R_Ce.reshape(-1, 9)])
-
-
-def placed_points(points: FloatArray, frames: FloatArray) -> FloatArray:
-    """Return points of a frame that moves in the world [m], shape (samples, 3).
-
-    Args:
-        points: In the frame [m], shape (samples, 3).
-        frames: ``[p_WC, R_WC by rows, ..]``, shape (samples, 12 or more).
-    """
-    R_WC = frames[:, 3:POSE_SIZE].reshape(-1, 3, 3)
-    return np.asarray(frames[:, :3] + np.einsum("kij,kj->ki", R_WC, points))
 
 
 def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
