@@ -33,13 +33,16 @@ from diagrams.surroundings.held_reaction import HeldReaction, add_held_reaction
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import HeldFrame
+from diagrams.tasks.motion_demand import MotionDemand
+from diagrams.tasks.planned_frame import planned_frame
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
-from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame
-from pfsc_drake.control.manifolds.moving_frame import frame_size
+from pfsc_drake.control.law.timed_reference import TimedReference
+from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame, PlannedFrame
+from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
@@ -166,9 +169,9 @@ def add_holder(
         friction = believed_friction(part, own.controller.friction.believed, rubbing)
         q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
         begun = CourseStart(rest().q_J, start.place)
-        keep_drive_limits(
-            own.reference, own.controller, scenario.duration, task, law, begun, friction
-        )
+        asked, chosen = own.reference, own.controller
+        keep_drive_limits(asked, chosen, scenario.duration, task, law, begun, friction)
+        demand = MotionDemand(asked, chosen, task, law, begun, friction)
         true_state = part.joint_state(named)
         failure = own.simulation.sensor_failure
         measured = add_joint_state(
@@ -193,7 +196,7 @@ def add_holder(
     ports = place.signals | {"drive": drive}
     add_drives(named, part, None, DriverParameters(), period, ports, state)
     rubs = add_friction(named, part, true_state, rubbing, [controller.GetOutputPort("fault")])
-    motion = _add_motion(named, holder, following, order, controller)
+    motion = _add_motion(named, holder, following, order, controller, demand)
     pose = np.array(pose_function(part.robot)(q_J)).ravel()
     logged = place.signals | made | rubs | forces | {"frame_jet": motion}
     logged |= states_to_log(true_state, place.signals["joint_state"])
@@ -283,15 +286,16 @@ def _add_motion(
     following: Following,
     order: int,
     controller: FollowingController,
+    demand: MotionDemand,
 ) -> OutputPort:
     """Add what tells the workpiece's motion, and return its port."""
-    robot, period = following.robot, controller.period
+    robot, period, placement = following.robot, controller.period, _placement(holder)
     highest = order if holder.derivatives == "known" else 0
     flange = FlangeFrame(
         robot,
         following.law.linearization.relative_degree,
         order,
-        _placement(holder),
+        placement,
         min(highest, holder.highest),
     )
     frame = builder.AddNamedSystem("flange_frame", BlockSystem(flange, period))
@@ -302,6 +306,16 @@ def _add_motion(
         guess = builder.AddNamedSystem("differenced_frame", BlockSystem(block, period))
         builder.Connect(told, guess.GetInputPort("frame_jet"))
         told = guess.GetOutputPort("differenced")
+    elif holder.derivatives == "planned":
+        with naming_holder():
+            plan = planned_frame(demand, following.task.motion, placement)
+        timed = BlockSystem(TimedReference(plan, order, POSE_SIZE, period), period)
+        builder.AddNamedSystem("planned_motion", timed)
+        mix = BlockSystem(PlannedFrame(order, holder.highest), period)
+        builder.AddNamedSystem("planned_frame", mix)
+        builder.Connect(told, mix.GetInputPort("frame_jet"))
+        builder.Connect(timed.GetOutputPort("reference"), mix.GetInputPort("planned"))
+        told = mix.GetOutputPort("mixed")
     assert told.size() == frame_size(order)
     return told
 

@@ -1,10 +1,8 @@
 """Whether the drives can follow the reference, and a slower one if they cannot."""
 
 from dataclasses import replace
-from math import factorial
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from diagrams.scenario import ReferenceParameters
 from diagrams.scenario.checks import require
@@ -34,8 +32,8 @@ _LONGEST, _MOST = 1000.0, 100_000
 _OF_RADIUS, _OF_RAMP = 1.0 / 12.0, 1.0 / 6.0
 # s of the asked time, over which a change of pace is smoothed
 _SMOOTHING = 0.04
-# s, between the knots of a slowed reference, and its degree
-_KNOTS, _DEGREE = 2e-3, 7
+# s, between the knots of a slowed reference
+_KNOTS = 2e-3
 # of the pace, from which on a place counts as slowed
 _SLOW = 0.99
 
@@ -223,8 +221,4 @@ def _retimed(motion: PiecewisePolynomialCurve, clock: Clock) -> PiecewisePolynom
     even = np.linspace(0.0, clock.end, int(np.ceil(clock.end / _KNOTS)) + 1)
     asked = np.minimum(clock.tau(even), motion.domain[1])
     values = motion.derivatives(asked, 0)[:, 0]
-    rest = [(k, np.zeros(values.shape[1])) for k in range(1, (_DEGREE + 1) // 2)]
-    spline = make_interp_spline(even, values, k=_DEGREE, bc_type=(rest, rest))
-    table = [spline(even[:-1], k) / factorial(k) for k in range(_DEGREE + 1)]
-    coefficients = np.array(table).transpose(1, 0, 2)
-    return PiecewisePolynomialCurve(even, coefficients, closed=False, known_smoothness=_DEGREE - 1)
+    return PiecewisePolynomialCurve.between_rests(even, values)

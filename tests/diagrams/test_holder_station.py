@@ -120,6 +120,20 @@ def test_what_is_not_told_of_the_motion_costs(known):
     assert deviation[0] > 50.0 * deviation[2]
 
 
+def test_planned_derivatives_are_those_of_the_pose(known):
+    """As differences of the true poses say, of a holder that is where it was planned to be."""
+    station, root, log = run(exact(derivatives="planned"), like=known[0])
+    moving = log.time >= BEGIN
+    assert np.linalg.norm(log["xi"].values[moving], axis=1).max() < 1e-6
+    _, raw = station.log.read(root)
+    told, pose = raw["holder_frame_jet"], log["workpiece_pose"].values
+    middle = np.flatnonzero(moving)[1:-1]
+    slope = (pose[middle + 1] - pose[middle - 1]) / 2e-3
+    bend = (pose[middle + 1] - 2.0 * pose[middle] + pose[middle - 1]) / 1e-6
+    assert np.abs(told[middle, 12:24] - slope).max() < 1e-4 * np.abs(slope).max()
+    assert np.abs(told[middle, 24:36] - bend).max() < 3e-3 * np.abs(bend).max()
+
+
 @pytest.mark.parametrize("failing", ["follower", "holder"])
 def test_a_fault_of_one_stops_both(known, failing):
     """The other one at the same tick or the next; both come to rest."""
