@@ -133,17 +133,17 @@ def build_station(
         following_options(scenario), believed, task, law, start_posture, on_motors, friction, held
     )
     crossing = scenario.obstacles
-    if held is None:
-        begun = CourseStart(rest().q_J, start.place)
-        asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
-        keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress)
-        if like is not None:
-            following = replace(following, waiting=like.waiting)
-        elif crossing is not None:
-            given, allowed = scenario.compliance.is_given, "left out where progress waits"
-            require(not given, "compliance", "given", allowed)
-            waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
-            following = replace(following, waiting=waiting)
+    begun = CourseStart(rest().q_J, start.place)
+    asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
+    carrier_plan = None if holder is None else holder.plan
+    keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress, carrier_plan)
+    if like is not None:
+        following = replace(following, waiting=like.waiting)
+    elif crossing is not None:
+        given, allowed = scenario.compliance.is_given, "left out where progress waits"
+        require(not given, "compliance", "given", allowed)
+        waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
+        following = replace(following, waiting=waiting)
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation

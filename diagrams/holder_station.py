@@ -46,6 +46,7 @@ from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
+from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.systems.block_system import BlockSystem
@@ -70,6 +71,7 @@ class Holder:
         start: Where the workpiece is at the start.
         on_motors: Whether its law acts on the pose of the motors.
         frame: The workpiece's frame, and its motion as the other controller knows it.
+        plan: Returns its motion as it is planned, see :func:`planned_frame`.
         signals: What to log, by names with the prefix.
         warn: Tells what there is to say, one sentence each.
         projector: Name of what finds the workpiece's place on its path.
@@ -86,6 +88,7 @@ class Holder:
     start: StartPoint
     on_motors: bool
     frame: HeldFrame
+    plan: Callable[[], PiecewisePolynomialCurve]
     signals: dict[str, OutputPort]
     warn: Callable[[], list[str]]
     projector: str
@@ -172,6 +175,7 @@ def add_holder(
         asked, chosen = own.reference, own.controller
         keep_drive_limits(asked, chosen, scenario.duration, task, law, begun, friction)
         demand = MotionDemand(asked, chosen, task, law, begun, friction)
+        plan = cache(lambda: planned_frame(demand, task.motion, _placement(holder)))
         true_state = part.joint_state(named)
         failure = own.simulation.sensor_failure
         measured = add_joint_state(
@@ -196,7 +200,7 @@ def add_holder(
     ports = place.signals | {"drive": drive}
     add_drives(named, part, None, DriverParameters(), period, ports, state)
     rubs = add_friction(named, part, true_state, rubbing, [controller.GetOutputPort("fault")])
-    motion = _add_motion(named, holder, following, order, controller, demand)
+    motion = _add_motion(named, holder, following, order, controller, plan)
     pose = np.array(pose_function(part.robot)(q_J)).ravel()
     logged = place.signals | made | rubs | forces | {"frame_jet": motion}
     logged |= states_to_log(true_state, place.signals["joint_state"])
@@ -220,6 +224,7 @@ def add_holder(
         start,
         on_motors,
         HeldFrame(pose, order, motion),
+        plan,
         {f"{HOLDER}{name}": port for name, port in logged.items()},
         warn,
         place.projector.get_name(),
@@ -286,16 +291,16 @@ def _add_motion(
     following: Following,
     order: int,
     controller: FollowingController,
-    demand: MotionDemand,
+    plan: Callable[[], PiecewisePolynomialCurve],
 ) -> OutputPort:
     """Add what tells the workpiece's motion, and return its port."""
-    robot, period, placement = following.robot, controller.period, _placement(holder)
+    robot, period = following.robot, controller.period
     highest = order if holder.derivatives == "known" else 0
     flange = FlangeFrame(
         robot,
         following.law.linearization.relative_degree,
         order,
-        placement,
+        _placement(holder),
         min(highest, holder.highest),
     )
     frame = builder.AddNamedSystem("flange_frame", BlockSystem(flange, period))
@@ -308,8 +313,7 @@ def _add_motion(
         told = guess.GetOutputPort("differenced")
     elif holder.derivatives == "planned":
         with naming_holder():
-            plan = planned_frame(demand, following.task.motion, placement)
-        timed = BlockSystem(TimedReference(plan, order, POSE_SIZE, period), period)
+            timed = BlockSystem(TimedReference(plan(), order, POSE_SIZE, period), period)
         builder.AddNamedSystem("planned_motion", timed)
         mix = BlockSystem(PlannedFrame(order, holder.highest), period)
         builder.AddNamedSystem("planned_frame", mix)
