@@ -17,6 +17,7 @@ from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.tasks.waiting import Waiting
+from diagrams.turntable_station import Turntable
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
@@ -58,6 +59,7 @@ class Station:
         holder: The robot that holds the workpiece which the path is on, if one does.
         pen: Where way points enter that a person draws, if one does.
         waiting: How progress waits for obstacles, if it does.
+        turntable: The turntable that carries the workpiece which the path is on, if one does.
     """
 
     diagram: Diagram
@@ -81,6 +83,7 @@ class Station:
     holder: Holder | None = None
     pen: OperatorPanel | None = None
     waiting: Waiting | None = None
+    turntable: Turntable | None = None
 
     @property
     def robot(self) -> RobotModel:

@@ -64,8 +64,9 @@ def build_replay(
     points = np.concatenate(manifold.outline())
     if held is not None and motion.held is not None:
         points = held_points(points, motion.held)
-        others = body_origins(held.robot.plant, motion.held.positions[0])
-        bodies = np.vstack([bodies, others])
+        if held.robot is not None and motion.held.positions is not None:
+            others = body_origins(held.robot.plant, motion.held.positions[0])
+            bodies = np.vstack([bodies, others])
     meshcat.SetCameraPose(*camera_and_target(points, bodies))
     if workpiece is not None:
         look_down_at(meshcat, points.mean(axis=0))
@@ -75,7 +76,9 @@ def build_replay(
         _add_mounting(builder, mounting, motion, meshcat, period)
     if held is not None and motion.held is not None:
         pose = add_source(builder, "workpiece_pose", motion.times, motion.held.workpiece_pose)
-        holder = add_source(builder, "holder_positions", motion.times, motion.held.positions)
+        joints, holder = motion.held.positions, None
+        if joints is not None:
+            holder = add_source(builder, "holder_positions", motion.times, joints)
         add_held_drawing(builder, held, pose, holder, meshcat, period)
     visualizer = RobotVisualizer(robot.plant, robot.parts, meshcat, period)
     body = builder.AddNamedSystem("robot_visualizer", visualizer)
