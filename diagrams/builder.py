@@ -25,7 +25,7 @@ from diagrams.robots.joint_state import add_joint_state, add_link_state, states_
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from diagrams.scenario.pair import check_holder
+from diagrams.scenario.pair import check_carrier
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.station_parts import (
@@ -52,6 +52,7 @@ from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import law_manifold
 from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.waiting import plan_waiting
+from diagrams.turntable_station import add_turntable
 from diagrams.warnings.law_warnings import MODES
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.following.law import make_law
@@ -94,11 +95,13 @@ def build_station(
         InputError: If the scenario cannot be built.
     """
     builder = DiagramBuilder()
-    if scenario.holder is not None:
+    for carrier_key in ("holder", "turntable"):
+        if getattr(scenario, carrier_key) is None:
+            continue
         alone = remote or parametric or with_slope
         allowed = "null where margins are told, or a robot is driven elsewhere"
-        require(not alone, "holder", "given", allowed)
-        check_holder(scenario)
+        require(not alone, carrier_key, "given", allowed)
+        check_carrier(scenario)
     task = make_task(scenario, folder, progress) if like is None else like.task
     workpiece, mounting = make_workpiece(scenario, task), choose_mounting(scenario, task)
     spring = make_spring(scenario, workpiece) if with_slope else None
@@ -109,11 +112,15 @@ def build_station(
         part = replace(part, belief=part.belief.with_symbols())
     task.require_joints(part.robot.dimension)
     believed = part.belief.robot
-    holder = held = carrier = None
+    holder = held = carrier = turntable = None
     if scenario.holder is not None:
         order, built = task.manifold.layout.order, None if like is None else like.holder
         holder, carrier = add_holder(builder, scenario, order, folder, progress, built)
         held = holder.frame
+    elif scenario.turntable is not None:
+        period, order = scenario.controller.sampling_time, task.manifold.layout.order
+        turntable = add_turntable(builder, scenario.turntable, order, period)
+        held = turntable.frame
     begin = cache(
         lambda: (
             find_start(scenario.start, task, part, workpiece, mounting, held)
@@ -133,17 +140,18 @@ def build_station(
         following_options(scenario), believed, task, law, start_posture, on_motors, friction, held
     )
     crossing = scenario.obstacles
-    if held is None:
-        begun = CourseStart(rest().q_J, start.place)
-        asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
-        keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress)
-        if like is not None:
-            following = replace(following, waiting=like.waiting)
-        elif crossing is not None:
-            given, allowed = scenario.compliance.is_given, "left out where progress waits"
-            require(not given, "compliance", "given", allowed)
-            waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
-            following = replace(following, waiting=waiting)
+    begun = CourseStart(rest().q_J, start.place)
+    asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
+    plans = [each.plan for each in (holder, turntable) if each is not None]
+    carrier_plan = plans[0] if plans else None
+    keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress, carrier_plan)
+    if like is not None:
+        following = replace(following, waiting=like.waiting)
+    elif crossing is not None:
+        given, allowed = scenario.compliance.is_given, "left out where progress waits"
+        require(not given, "compliance", "given", allowed)
+        waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
+        following = replace(following, waiting=waiting)
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation
@@ -174,7 +182,9 @@ def build_station(
     )
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
-    around = place.signals | {"joint_state": true_state, "manifold_point": beside}
+    around = place.signals | {"joint_state": true_state}
+    if held is None:
+        around["manifold_point"] = beside
     operator = None
     if scenario.operator is not None:
         operator = add_operator(
@@ -183,7 +193,17 @@ def build_station(
     afar = add_afar(builder, scenario, operator, task, start, paced=not remote)
     at_tool = operator if afar is None else None
     forces = add_surroundings(
-        builder, part, task, outside(scenario), around, start, at_tool, mounting, spring
+        builder,
+        part,
+        task,
+        outside(scenario),
+        around,
+        start,
+        at_tool,
+        mounting,
+        spring,
+        law_manifold(task, held),
+        None if holder is None else holder.reaction,
     )
     if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
@@ -191,6 +211,8 @@ def build_station(
         forces |= add_sensor(builder, part, scenario.sensor, failure, period, states | forces)
         if mounting is not None:
             forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
+        if holder is not None and holder.reaction is not None:
+            holder.reaction.tell(builder, forces["wrench_measured"], place.world_pose)
     led = {} if operator is None else operator.requests
     if afar is not None:
         led = led | {"wrench_led": afar.lead(builder, forces)}
@@ -228,6 +250,8 @@ def build_station(
     if holder is not None and carrier is not None:
         stop_both(builder, controller, carrier)
         signals |= holder.signals
+    if turntable is not None:
+        signals |= turntable.signals
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)
@@ -271,6 +295,7 @@ def build_station(
         place.pen,
         following.waiting,
         None if afar is None else afar.link,
+        turntable,
     )
 
 
@@ -318,7 +343,7 @@ def build_station_replay(
     assert drawing is not None  # draw_station knows every other robot
     plates = None if station.mounting is None else mounting_look(station.mounting)
     held = None
-    if settings.holder is not None and station.holder is not None:
-        assert drawing.holder is not None  # draw_station knows it
-        held = held_look(settings.holder.workpiece, drawing.holder)
+    carrier = settings.holder or settings.turntable
+    if carrier is not None:
+        held = held_look(carrier.workpiece, drawing.holder)
     return build_replay(drawing, drawn, motion, meshcat, period, look, plates, held)

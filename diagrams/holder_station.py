@@ -1,5 +1,6 @@
 """The robot of a station that holds the workpiece, with its controller, and what it tells."""
 
+import dataclasses as dc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,19 +29,24 @@ from diagrams.station_parts import (
 )
 from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
+from diagrams.surroundings.held_reaction import HeldReaction, add_held_reaction
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import HeldFrame
+from diagrams.tasks.motion_demand import MotionDemand
+from diagrams.tasks.planned_frame import planned_frame
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
-from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame
-from pfsc_drake.control.manifolds.moving_frame import frame_size
+from pfsc_drake.control.law.timed_reference import TimedReference
+from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame, PlannedFrame
+from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
+from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.systems.block_system import BlockSystem
@@ -65,10 +71,12 @@ class Holder:
         start: Where the workpiece is at the start.
         on_motors: Whether its law acts on the pose of the motors.
         frame: The workpiece's frame, and its motion as the other controller knows it.
+        plan: Returns its motion as it is planned, see :func:`planned_frame`.
         signals: What to log, by names with the prefix.
         warn: Tells what there is to say, one sentence each.
         projector: Name of what finds the workpiece's place on its path.
         measured: System and port that the measured joint state comes from, by name.
+        reaction: What it bears of the process on the workpiece, if there is one.
     """
 
     parameters: HolderParameters
@@ -80,10 +88,12 @@ class Holder:
     start: StartPoint
     on_motors: bool
     frame: HeldFrame
+    plan: Callable[[], PiecewisePolynomialCurve]
     signals: dict[str, OutputPort]
     warn: Callable[[], list[str]]
     projector: str
     measured: tuple[str, str]
+    reaction: HeldReaction | None = None
 
     def set_start(self, blocks: BlockAccess, root: Context) -> None:
         """Put the robot at its start.
@@ -162,9 +172,10 @@ def add_holder(
         friction = believed_friction(part, own.controller.friction.believed, rubbing)
         q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
         begun = CourseStart(rest().q_J, start.place)
-        keep_drive_limits(
-            own.reference, own.controller, scenario.duration, task, law, begun, friction
-        )
+        asked, chosen = own.reference, own.controller
+        keep_drive_limits(asked, chosen, scenario.duration, task, law, begun, friction)
+        demand = MotionDemand(asked, chosen, task, law, begun, friction)
+        plan = cache(lambda: planned_frame(demand, task.motion, _placement(holder)))
         true_state = part.joint_state(named)
         failure = own.simulation.sensor_failure
         measured = add_joint_state(
@@ -177,16 +188,21 @@ def add_holder(
             following_options(own), believed, task, law, q_J, on_motors, friction, carries=True
         )
         place = add_place(named, following, links.joint_state)
-        controller, made = add_law(named, following, place, {})
+        reaction, told = None, own.controller.external_torque.source
+        if scenario.forces:
+            seen = place.signals["tool_pose"] if told == "measured" else None
+            reaction = add_held_reaction(named, part, true_state, seen, period)
+        forces = {} if reaction is None else reaction.forces
+        controller, made = add_law(named, following, place, forces)
     drive = controller.GetOutputPort(controller.drive_port)
     if links.drive_torque is not None:
         builder.Connect(drive, links.drive_torque)
     ports = place.signals | {"drive": drive}
     add_drives(named, part, None, DriverParameters(), period, ports, state)
     rubs = add_friction(named, part, true_state, rubbing, [controller.GetOutputPort("fault")])
-    motion = _add_motion(named, holder, following, order, controller)
+    motion = _add_motion(named, holder, following, order, controller, plan)
     pose = np.array(pose_function(part.robot)(q_J)).ravel()
-    logged = place.signals | made | rubs | {"frame_jet": motion}
+    logged = place.signals | made | rubs | forces | {"frame_jet": motion}
     logged |= states_to_log(true_state, place.signals["joint_state"])
     source = measured.get_system().get_name(), measured.get_name()
     planned = [] if task.drive_plan is None else task.drive_plan.said
@@ -195,7 +211,7 @@ def add_holder(
     def warn() -> list[str]:
         said = task.warnings + own.model_error.warnings + planned
         said += part.start_warnings(own.start, q_J, start.target)
-        said += controller_warnings(own, task, part, law, link_state, rest())
+        said += controller_warnings(_alone(own), task, part, law, link_state, rest())
         return [f"the robot that holds the workpiece: {line}" for line in said]
 
     made_holder = Holder(
@@ -208,10 +224,12 @@ def add_holder(
         start,
         on_motors,
         HeldFrame(pose, order, motion),
+        plan,
         {f"{HOLDER}{name}": port for name, port in logged.items()},
         warn,
         place.projector.get_name(),
         source,
+        reaction,
     )
     return made_holder, controller
 
@@ -248,6 +266,15 @@ def naming_holder() -> Iterator[None]:
         ) from None
 
 
+def _alone(own: Scenario) -> Scenario:
+    """Return a holder's scenario for what is said of it: it has no force sensor of its own."""
+    torque = own.controller.external_torque
+    if torque.source != "measured":
+        return own
+    told = dc.replace(own.controller, external_torque=dc.replace(torque, source="known"))
+    return dc.replace(own, controller=told)
+
+
 def _check(holder: HolderParameters, period: float, order: int) -> None:
     """Refuse what no holder can be."""
     model, own, law = holder.robot.model, holder.controller.sampling_time, holder.controller.law
@@ -264,6 +291,7 @@ def _add_motion(
     following: Following,
     order: int,
     controller: FollowingController,
+    plan: Callable[[], PiecewisePolynomialCurve],
 ) -> OutputPort:
     """Add what tells the workpiece's motion, and return its port."""
     robot, period = following.robot, controller.period
@@ -283,6 +311,15 @@ def _add_motion(
         guess = builder.AddNamedSystem("differenced_frame", BlockSystem(block, period))
         builder.Connect(told, guess.GetInputPort("frame_jet"))
         told = guess.GetOutputPort("differenced")
+    elif holder.derivatives == "planned":
+        with naming_holder():
+            timed = BlockSystem(TimedReference(plan(), order, POSE_SIZE, period), period)
+        builder.AddNamedSystem("planned_motion", timed)
+        mix = BlockSystem(PlannedFrame(order, holder.highest), period)
+        builder.AddNamedSystem("planned_frame", mix)
+        builder.Connect(told, mix.GetInputPort("frame_jet"))
+        builder.Connect(timed.GetOutputPort("reference"), mix.GetInputPort("planned"))
+        told = mix.GetOutputPort("mixed")
     assert told.size() == frame_size(order)
     return told
 

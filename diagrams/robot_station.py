@@ -139,7 +139,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     Raises:
         InputError: If the scenario cannot be built, or needs a controller beside the robot.
     """
-    for key in ("plate", "operator", "holder"):
+    for key in ("plate", "operator", "holder", "turntable"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the controller is elsewhere")
     model = scenario.robot.model

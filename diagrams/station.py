@@ -17,6 +17,7 @@ from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.tasks.waiting import Waiting
+from diagrams.turntable_station import Turntable
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
@@ -60,6 +61,7 @@ class Station:
         pen: Where way points enter that a person draws, if one does.
         waiting: How progress waits for obstacles, if it does.
         leader: Link to who leads the tool in another process, if somebody does.
+        turntable: The turntable that carries the workpiece which the path is on, if one does.
     """
 
     diagram: Diagram
@@ -84,6 +86,7 @@ class Station:
     pen: OperatorPanel | None = None
     waiting: Waiting | None = None
     leader: TeleoperationEnd | None = None
+    turntable: Turntable | None = None
 
     @property
     def robot(self) -> RobotModel:

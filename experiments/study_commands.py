@@ -40,6 +40,7 @@ _STUDIES = {
     "teleoperation": "couplings of leader and follower over a channel: felt, stable, passive",
     "fastest": "the fastest motion on ten paths, and how near it is to the best",
     "crossings": "300 persons who walk across a path at random",
+    "two_arms": "what must be known of a workpiece's motion, over the speed of two arms",
     "peers": "path following beside impedance control and Toppra",
     IDENTIFICATION: "from robots to their models and back",
     TEACH_IN: "a path taught by hand, and followed",
@@ -76,6 +77,7 @@ def study_command(
     from experiments.studies.stiffness import write_study
     from experiments.studies.teleoperation.study import write_teleoperation
     from experiments.studies.tracking import write_tracking
+    from experiments.studies.two_arms import write_two_arms
     from experiments.teaching.teach import write_teach_in
 
     studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
@@ -87,6 +89,7 @@ def study_command(
         "teleoperation": write_teleoperation,
         "fastest": write_fastest,
         "crossings": write_crossings,
+        "two_arms": write_two_arms,
         "peers": write_peers,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,

@@ -23,19 +23,19 @@ class HeldLook:
 
     Attributes:
         parts: What the workpiece consists of, in its frame.
-        robot: The robot.
+        robot: The robot; None where a turntable carries the workpiece.
     """
 
     parts: list[ToolPart]
-    robot: RobotDrawing
+    robot: RobotDrawing | None
 
 
-def held_look(workpiece: HeldWorkpieceParameters, robot: RobotDrawing) -> HeldLook:
+def held_look(workpiece: HeldWorkpieceParameters, robot: RobotDrawing | None) -> HeldLook:
     """Return how a workpiece and the robot that holds it are drawn.
 
     Args:
         workpiece: The workpiece.
-        robot: How the robot is drawn.
+        robot: How the robot is drawn, if one holds it.
     """
     parts = [
         ToolPart(f"solid_{k}", _shape(solid), _METAL, solid.pose.transform())
@@ -63,7 +63,7 @@ def add_held_drawing(
     builder: DiagramBuilder,
     look: HeldLook,
     workpiece_pose: OutputPort,
-    positions: OutputPort,
+    positions: OutputPort | None,
     meshcat: Meshcat,
     period: float,
 ) -> None:
@@ -73,7 +73,7 @@ def add_held_drawing(
         builder: Builder of the replay.
         look: How they are drawn.
         workpiece_pose: ``[p_WC, R_WC by rows]``.
-        positions: Positions of the robot's plant.
+        positions: Positions of the robot's plant, if a robot holds it.
         meshcat: Where to draw.
         period: Time between frames [s].
     """
@@ -82,6 +82,8 @@ def add_held_drawing(
         carried = ToolVisualizer(parts, meshcat, period, root)
         system = builder.AddNamedSystem(f"{root}_carried", carried)
         builder.Connect(workpiece_pose, system.GetInputPort("tool_pose"))
+    if look.robot is None or positions is None:
+        return
     plant, drawn = look.robot.plant, look.robot.parts
     robot = RobotVisualizer(plant, drawn, meshcat, period, "holder")
     body = builder.AddNamedSystem("holder_visualizer", robot)

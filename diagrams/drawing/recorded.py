@@ -36,14 +36,14 @@ class RecordedDistance:
 
 @dataclass(frozen=True)
 class RecordedHolder:
-    """A robot that holds the workpiece, at the recording's frames.
+    """A workpiece that moves and the robot that holds it, at the recording's frames.
 
     Attributes:
-        positions: Positions of its plant, shape (frames, nq).
+        positions: Positions of its plant, shape (frames, nq); None where a turntable carries it.
         workpiece_pose: ``[p_WC, R_WC by rows]`` of the workpiece, shape (frames, 12).
     """
 
-    positions: np.ndarray
+    positions: np.ndarray | None
     workpiece_pose: np.ndarray
 
 

@@ -19,6 +19,7 @@ from diagrams.drawing.recorded import RecordedMotion, RecordedPushes
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
+from pfsc_drake.geometry.rotation import placed_points
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.manifold_visualizer import signed_color
 from pfsc_drake.systems.drawing.obstacle_visualizer import ObstacleVisualizer
@@ -63,8 +64,9 @@ def build_replay(
     points = np.concatenate(manifold.outline())
     if held is not None and motion.held is not None:
         points = held_points(points, motion.held)
-        others = body_origins(held.robot.plant, motion.held.positions[0])
-        bodies = np.vstack([bodies, others])
+        if held.robot is not None and motion.held.positions is not None:
+            others = body_origins(held.robot.plant, motion.held.positions[0])
+            bodies = np.vstack([bodies, others])
     meshcat.SetCameraPose(*camera_and_target(points, bodies))
     if workpiece is not None:
         look_down_at(meshcat, points.mean(axis=0))
@@ -74,7 +76,9 @@ def build_replay(
         _add_mounting(builder, mounting, motion, meshcat, period)
     if held is not None and motion.held is not None:
         pose = add_source(builder, "workpiece_pose", motion.times, motion.held.workpiece_pose)
-        holder = add_source(builder, "holder_positions", motion.times, motion.held.positions)
+        joints, holder = motion.held.positions, None
+        if joints is not None:
+            holder = add_source(builder, "holder_positions", motion.times, joints)
         add_held_drawing(builder, held, pose, holder, meshcat, period)
     visualizer = RobotVisualizer(robot.plant, robot.parts, meshcat, period)
     body = builder.AddNamedSystem("robot_visualizer", visualizer)
@@ -233,8 +237,13 @@ def _add_tool(
         source = add_source(builder, "distance", motion.times, distance.values[:, np.newaxis])
         builder.Connect(source, trail.GetInputPort("value"))
     if motion.tool_force is not None:
-        forces = RecordedPushes(points, motion.tool_force)
+        forces = RecordedPushes(_in_world(motion, points), motion.tool_force)
         _add_arrows(builder, "tool_force", motion, forces, meshcat, period)
+
+
+def _in_world(motion: RecordedMotion, points: np.ndarray) -> np.ndarray:
+    """Return where the tool is in the world [m], shape (frames, 3)."""
+    return points if motion.held is None else placed_points(points, motion.held.workpiece_pose)
 
 
 def _add_links(

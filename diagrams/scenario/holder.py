@@ -19,7 +19,7 @@ from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 
 _SMALLEST, _LARGEST, _HEAVIEST = 1e-4, 10.0, 1e3  # m, m, kg
-DERIVATIVES = ("known", "differenced", "none")
+DERIVATIVES = ("known", "planned", "differenced", "none")
 
 
 @dc.dataclass
@@ -99,9 +99,9 @@ class HolderParameters:
         faults: What is a fault, and how it ends. A fault of one robot stops both.
         sensor_failure: One of its sensors that fails on the way.
         derivatives: What the other robot's controller knows of the workpiece's motion: ``known``:
-            all derivatives that its law needs; for comparison ``differenced``, from the poses of
-            the last ticks, or ``none``, the pose alone.
-        highest: Highest derivative that is known or differenced, 0 to 4.
+            all derivatives that its law needs; for comparison ``planned``, those of the reference;
+            ``differenced``, from the poses of the last ticks; or ``none``, the pose alone.
+        highest: Highest derivative that is known, planned or differenced, 0 to 4.
     """
 
     robot: RobotParameters = dc.field(default_factory=RobotParameters)

@@ -27,35 +27,45 @@ def holder_scenario(scenario: Scenario) -> Scenario:
         friction=holder.friction,
         encoders=holder.encoders,
         faults=holder.faults,
+        forces=scenario.forces,
     )
 
 
 # what acts where the world's axes or one robot alone are meant
 _BESIDE_HOLDER = (
-    *("forces", "pushes", "hand", "operator", "hold_back", "servo", "driver", "compliance"),
+    *("pushes", "hand", "operator", "hold_back", "servo", "driver", "compliance"),
     *("notch", "workpiece", "plate", "teleoperation", "obstacles"),
 )
 
 
-def check_holder(scenario: Scenario) -> None:
-    """Refuse what does not go with a robot that holds the workpiece.
+def check_carrier(scenario: Scenario) -> None:
+    """Refuse what does not go with a workpiece that moves.
 
     Args:
-        scenario: One with a holder.
+        scenario: One with a holder or a turntable.
 
     Raises:
         InputError: If there is something of the kind.
     """
     plain, manifold = Scenario(), scenario.controller.manifold
+    both = scenario.holder is not None and scenario.turntable is not None
+    require(not both, "turntable", "given", "null where a holder has the workpiece")
+    carrier = "holder" if scenario.turntable is None else "turntable"
     for key in _BESIDE_HOLDER:
         given = getattr(scenario, key) != getattr(plain, key)
-        require(not given, key, "given", "left out where a holder has the workpiece")
-    allowed = "path, trajectory or surface where a holder has the workpiece"
+        require(not given, key, "given", f"left out where a {carrier} has the workpiece")
+    allowed = f"path, trajectory or surface where a {carrier} has the workpiece"
     require(manifold != "space", "controller.manifold", manifold, allowed)
     controller = scenario.controller
-    source = controller.external_torque.source
-    require(source == "none", "controller.external_torque.source", source, "none, with a holder")
-    require(controller.delay is None, "controller.delay", controller.delay, "null, with a holder")
+    for i, pulse in enumerate(scenario.forces):
+        allowed = f"empty where a {carrier} has the workpiece: forces are between it and the tool"
+        require(not pulse.link, f"forces[{i}].link", f"'{pulse.link}'", allowed)
+    allowed = f"null, with a {carrier}"
+    require(controller.delay is None, "controller.delay", controller.delay, allowed)
     speed, streamed = scenario.reference.speed, isinstance(scenario.path.shape, Streamed)
-    require(speed == "asked", "reference.speed", speed, "asked, with a holder")
-    require(not streamed, "path.shape", "!Streamed", "a path that is known, with a holder")
+    require(speed == "asked", "reference.speed", speed, f"asked, with a {carrier}")
+    known = f"a path that is known, with a {carrier}"
+    require(not streamed, "path.shape", "!Streamed", known)
+    if scenario.holder is not None:
+        own = isinstance(scenario.holder.path.shape, Streamed)
+        require(not own, "holder.path.shape", "!Streamed", known)

@@ -33,6 +33,7 @@ from diagrams.scenario.simulation import (
 from diagrams.scenario.streamed import Streamed
 from diagrams.scenario.surface import SurfaceParameters
 from diagrams.scenario.teleoperation import TeleoperationParameters
+from diagrams.scenario.turntable import TurntableParameters
 from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.compliance import ComplianceParameters
@@ -98,6 +99,8 @@ class Scenario:
         workpiece: Workpiece under the surface, and a ball on the tool that presses on it. None
             without the block.
         holder: Second robot, which holds the workpiece that the path is on. None without the block.
+        turntable: Turntable that carries the workpiece which the path is on. None without the
+            block.
         plate: Plate with pins that a gripper takes from a magazine and mounts into a frame. None
             without the block.
         obstacles: What moves across the path, for which progress waits. None without the block.
@@ -137,6 +140,7 @@ class Scenario:
     notch: NotchParameters | None = None
     workpiece: WorkpieceParameters | None = None
     holder: HolderParameters | None = None
+    turntable: TurntableParameters | None = None
     plate: PlateParameters | None = None
     obstacles: CrossingParameters | None = None
     duration: float = 0.0
@@ -169,7 +173,8 @@ class Scenario:
     @property
     def needs_sensor(self) -> bool:
         """Whether something acts on measured forces."""
-        measured = self.controller.external_torque.source == "measured"
+        controllers = [self.controller] + ([] if self.holder is None else [self.holder.controller])
+        measured = any(each.external_torque.source == "measured" for each in controllers)
         return measured or self.compliance.needs_sensor
 
 
@@ -206,7 +211,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         InputError: If it needs what only a simulation knows.
     """
     left, plain = deepcopy(scenario), Scenario()
-    for key in ("plate", "operator", "holder", "obstacles"):
+    for key in ("plate", "operator", "holder", "turntable", "obstacles"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
     if scenario.teleoperation is not None:

@@ -10,12 +10,13 @@ from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import ForcePulse, HandParameters, HoldBackParameters
 from diagrams.scenario.checks import require
+from diagrams.surroundings.held_reaction import HeldReaction
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_parts import add_hand, add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows, Sum
-from pfsc_drake.control.manifolds.manifold import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import Manifold, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.link_forces import LinkForces, LinkHand, LinkHandParameters
@@ -57,6 +58,8 @@ def add_surroundings(
     operator: Operator | None = None,
     mounting: Mounting | None = None,
     spring: SurfaceSpring | None = None,
+    manifold: Manifold | None = None,
+    reaction: HeldReaction | None = None,
 ) -> dict[str, OutputPort]:
     """Add forces on the robot, and return their signals for the log.
 
@@ -70,6 +73,8 @@ def add_surroundings(
         operator: A person who guides the tool, if there is one.
         mounting: Plates that are mounted, if there are any.
         spring: What the tool touches in place of contact in the plant, if it does.
+        manifold: That of ``manifold_point``, if it is not the task's.
+        reaction: What bears the opposite of what acts on the tool, if anything does.
 
     Returns:
         ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there; if
@@ -80,13 +85,14 @@ def add_surroundings(
         InputError: If a force does not suit the robot, or it has no such link.
     """
     period, joint_state = outside.period, ports["joint_state"]
-    sources = _scripted(builder, part, task, outside, ports)
+    followed = task.manifold if manifold is None else manifold
+    sources = _scripted(builder, part, task, followed, outside, ports)
     mounts = mounting is not None and mounting.parameters.operator is not None
     if outside.hand is not None and not mounts:
         sources.append(add_hand(builder, part.robot, task, outside.hand, period, joint_state))
     if operator is not None:
         sources.append(add_live_hand(builder, part.robot, operator, joint_state))
-    pushes, signals = _add_pushes(builder, part, task, outside, ports)
+    pushes, signals = _add_pushes(builder, part, followed, outside, ports)
     if mounting is not None:
         wrenches, mounted = add_mounting(
             builder, mounting, part, task, outside.hand, period, start, joint_state
@@ -96,8 +102,7 @@ def add_surroundings(
     held: OutputPort | None = None
     if part.contact is not None:
         # the law's own pose is what encoders make of it, or that of the motors
-        view = _add_view(builder, part, period)
-        builder.Connect(ports["joint_state"], view.GetInputPort("joint_state"))
+        view = _add_view(builder, part, period, ports["joint_state"])
         builder.Connect(view.GetOutputPort("tool_pose"), part.contact.GetInputPort("tool_pose"))
         acting.append(part.contact.GetOutputPort("wrench"))
     if sources:
@@ -107,6 +112,9 @@ def add_surroundings(
         builder.Connect(total, hold.GetInputPort("value"))
         held = hold.GetOutputPort("held")
         acting.append(held)
+        if reaction is not None:
+            view = _add_view(builder, part, period, ports["joint_state"])
+            reaction.act(builder, total, view.GetOutputPort("tool_pose"))
     if spring is not None:
         # what is stiff follows the tool within a tick, too
         touching = _add_spring(builder, part, spring, period, ports["joint_state"])
@@ -129,23 +137,27 @@ def _add_spring(
     joint_state: OutputPort,
 ) -> OutputPort:
     """Add what the tool touches, and return its wrench on the tool."""
-    view = _add_view(builder, part, period)
-    builder.Connect(joint_state, view.GetInputPort("joint_state"))
+    view = _add_view(builder, part, period, joint_state)
     builder.AddNamedSystem("surface_spring", spring)
     builder.Connect(view.GetOutputPort("tool_pose"), spring.GetInputPort("tool_pose"))
     return spring.GetOutputPort("wrench")
 
 
-def _add_view(builder: DiagramBuilder, part: RobotPart, period: float) -> BlockSystem:
+def _add_view(
+    builder: DiagramBuilder, part: RobotPart, period: float, joint_state: OutputPort
+) -> BlockSystem:
     """Add what tells where the tool truly is."""
     view = BlockSystem(ToolKinematics(part.robot), period)
-    return builder.AddNamedSystem("contact_view", view)
+    builder.AddNamedSystem("contact_view", view)
+    builder.Connect(joint_state, view.GetInputPort("joint_state"))
+    return view
 
 
 def _scripted(
     builder: DiagramBuilder,
     part: RobotPart,
     task: Task,
+    followed: Manifold,
     outside: Outside,
     ports: dict[str, OutputPort],
 ) -> list[OutputPort]:
@@ -153,7 +165,7 @@ def _scripted(
     period, sources = outside.period, []
     pulses = [pulse for pulse in outside.forces if not pulse.link]
     if pulses:
-        operator = _add_script(builder, "operator", pulses, task, period, ports)
+        operator = _add_script(builder, "operator", pulses, followed, period, ports)
         sources.append(operator.GetOutputPort("wrench"))
     pulse = outside.hold_back
     if pulse.force != 0.0:
@@ -177,13 +189,13 @@ def _add_script(
     builder: DiagramBuilder,
     name: str,
     pulses: list[ForcePulse],
-    task: Task,
+    followed: Manifold,
     period: float,
     ports: dict[str, OutputPort],
 ) -> BlockSystem:
     """Add forces at one point that are written down beforehand."""
     profile = ForceProfile(pulses)
-    script = BlockSystem(ScriptedForce(profile, task.manifold, period), period)
+    script = BlockSystem(ScriptedForce(profile, followed, period), period)
     builder.AddNamedSystem(name, script)
     if profile.needs_manifold:
         builder.Connect(ports["manifold_point"], script.GetInputPort("manifold_point"))
@@ -229,7 +241,7 @@ class _Push:
 def _add_pushes(
     builder: DiagramBuilder,
     part: RobotPart,
-    task: Task,
+    followed: Manifold,
     outside: Outside,
     ports: dict[str, OutputPort],
 ) -> tuple[LinkPushes | None, dict[str, OutputPort]]:
@@ -261,7 +273,9 @@ def _add_pushes(
             builder.Connect(points, point.GetInputPort("whole"))
             builder.Connect(point.GetOutputPort("part"), source.GetInputPort("point"))
         else:
-            source = _add_script(builder, f"link_script_{k + 1}", push.pulses, task, period, ports)
+            source = _add_script(
+                builder, f"link_script_{k + 1}", push.pulses, followed, period, ports
+            )
         builder.Connect(source.GetOutputPort("wrench"), wrenches.GetInputPort(f"wrench_{k + 1}"))
     return system, {
         "push_wrench": hold.GetOutputPort("held"),

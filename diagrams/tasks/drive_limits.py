@@ -1,10 +1,9 @@
 """Whether the drives can follow the reference, and a slower one if they cannot."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from math import factorial
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from diagrams.scenario import ReferenceParameters
 from diagrams.scenario.checks import require
@@ -34,8 +33,10 @@ _LONGEST, _MOST = 1000.0, 100_000
 _OF_RADIUS, _OF_RAMP = 1.0 / 12.0, 1.0 / 6.0
 # s of the asked time, over which a change of pace is smoothed
 _SMOOTHING = 0.04
-# s, between the knots of a slowed reference, and its degree
-_KNOTS, _DEGREE = 2e-3, 7
+# to which the pace is found at which two robots would fit
+_OF_PACE = 5e-3
+# s, between the knots of a slowed reference
+_KNOTS = 2e-3
 # of the pace, from which on a place counts as slowed
 _SLOW = 0.99
 
@@ -49,6 +50,7 @@ def keep_drive_limits(
     start: CourseStart,
     friction: tuple[np.ndarray, np.ndarray] | None,
     progress: Progress | None = None,
+    carrier: Callable[[], PiecewisePolynomialCurve] | None = None,
 ) -> None:
     """Give a task its plan, and the reference that the drives can follow, unless it has them.
 
@@ -65,6 +67,8 @@ def keep_drive_limits(
         friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
             are believed.
         progress: Told the fraction done and what is done, where that takes its time.
+        carrier: Returns the planned motion of the frame that carries the task's manifold, if one
+            does, see :class:`MotionDemand`; nothing is slowed down then.
 
     Raises:
         InputError: If the fastest motion is asked for, and there is none.
@@ -78,11 +82,16 @@ def keep_drive_limits(
         require(not fastest, "reference.speed", "fastest", "asked; where a hand leads nobody plans")
         return
     if fastest:
-        known = reference, controller, task, law, start, friction
-        task.drive_plan = FastestPlanner(*known).plan(progress=progress)
+        planner = FastestPlanner(reference, controller, task, law, start, friction)
+        task.drive_plan = planner.plan(progress=progress)
     elif task.motion.domain[1] <= _LONGEST:
-        planner = DrivePlanner(reference, controller, duration, task, law, start, friction)
-        task.drive_plan = planner.plan()
+        known = reference, controller, duration, task, law, start, friction
+        try:
+            frame = None if carrier is None else carrier()
+        except InputError as error:
+            task.drive_plan = DrivePlanner(*known).unknown(str(error))
+            return
+        task.drive_plan = DrivePlanner(*known, frame).plan()
     else:
         return
     task.motion = task.drive_plan.motion
@@ -100,8 +109,9 @@ class DrivePlanner(MotionDemand):
         law: FollowingLaw,
         start: CourseStart,
         friction: tuple[np.ndarray, np.ndarray] | None,
+        carrier: PiecewisePolynomialCurve | None = None,
     ) -> None:
-        super().__init__(reference, controller, task, law, start, friction)
+        super().__init__(reference, controller, task, law, start, friction, carrier)
         self._run_duration = duration
 
     @once_per_content()
@@ -124,6 +134,8 @@ class DrivePlanner(MotionDemand):
         asked = DrivePlan(times, demand, demand, self.limits, ones, motion, [])
         if fits:
             return asked
+        if self._carrier is not None:
+            return self.told_of_both(asked, course)
         if self._reference.limits == "warn":
             return self.warned(asked, course)
         return self.slowed(asked, course, step)
@@ -196,6 +208,28 @@ class DrivePlanner(MotionDemand):
         said = f"{excess}; reference.limits: respect would slow it down there"
         return replace(asked, said=[said])
 
+    def told_of_both(self, asked: DrivePlan, course: np.ndarray) -> DrivePlan:
+        """Return a plan as asked for on what moves, with the pace at which it would fit.
+
+        Slowed alone it would meet what carries the manifold elsewhere. At a pace c of both, speeds
+        are c and accelerations c^2 of those asked for, and the joints go the same way.
+        """
+        allowed, fits, exceeds = self.allowed(course), 0.0, 1.0
+        rates = np.zeros((len(course), 4))
+        while exceeds - fits > _OF_PACE:
+            rates[:, 0] = 0.5 * (fits + exceeds)
+            demand = np.abs(self.demand.of(with_pace(course, rates)))
+            fits, exceeds = (
+                (rates[0, 0], exceeds) if np.all(demand <= allowed) else (fits, rates[0, 0])
+            )
+        advice = "; neither would it at any other pace of both robots"
+        if fits > 0.0:
+            advice = (
+                f"; it fits with {fits:.2f} of the velocities and {fits**2:.2f} of the "
+                "accelerations of both robots"
+            )
+        return replace(asked, said=[self._excess(asked, allowed) + advice])
+
     def _rates(self, time: float) -> np.ndarray:
         return self._task.motion.derivatives(np.array([time]), 1)[0, 1]
 
@@ -223,8 +257,4 @@ def _retimed(motion: PiecewisePolynomialCurve, clock: Clock) -> PiecewisePolynom
     even = np.linspace(0.0, clock.end, int(np.ceil(clock.end / _KNOTS)) + 1)
     asked = np.minimum(clock.tau(even), motion.domain[1])
     values = motion.derivatives(asked, 0)[:, 0]
-    rest = [(k, np.zeros(values.shape[1])) for k in range(1, (_DEGREE + 1) // 2)]
-    spline = make_interp_spline(even, values, k=_DEGREE, bc_type=(rest, rest))
-    table = [spline(even[:-1], k) / factorial(k) for k in range(_DEGREE + 1)]
-    coefficients = np.array(table).transpose(1, 0, 2)
-    return PiecewisePolynomialCurve(even, coefficients, closed=False, known_smoothness=_DEGREE - 1)
+    return PiecewisePolynomialCurve.between_rests(even, values)

@@ -103,6 +103,7 @@ class ToolOnManifold:
         predictor: What foretells ``joint_state``, if anything does.
         signals: ``joint_state``, ``tool_pose``, ``manifold_point``; of progress that waits
             ``clock`` and ``watch``.
+        world_pose: ``[y_t, R_e by rows]`` in the world, also where ``tool_pose`` is in a frame.
         stream: What makes the path, where its way points come while the tool moves.
         pen: Where way points enter that a person draws, if one does.
     """
@@ -112,6 +113,7 @@ class ToolOnManifold:
     believed: Believed
     predictor: BlockSystem | None
     signals: dict[str, OutputPort]
+    world_pose: OutputPort
     stream: Stream | None = None
     pen: OperatorPanel | None = None
 
@@ -180,7 +182,10 @@ def add_place(
     }
     if stream is not None:
         signals["stream"] = stream.stream
-    return ToolOnManifold(place.projector, desired, believed, predictor, signals, stream, pen)
+    world_pose = kinematics.GetOutputPort("tool_pose")
+    return ToolOnManifold(
+        place.projector, desired, believed, predictor, signals, world_pose, stream, pen
+    )
 
 
 def _swung(

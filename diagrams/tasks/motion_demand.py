@@ -32,6 +32,8 @@ class MotionDemand:
         start: Where the robot starts, near the first place of the reference.
         friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
             are believed.
+        carrier: ``[p_WC, R_WC by rows]`` over time of the frame that carries the task's manifold,
+            if one does; at rest at the ends.
 
     Attributes:
         robot: The robot as it is believed, N joints.
@@ -47,7 +49,9 @@ class MotionDemand:
         law: FollowingLaw,
         start: CourseStart,
         friction: tuple[np.ndarray, np.ndarray] | None,
+        carrier: PiecewisePolynomialCurve | None = None,
     ) -> None:
+        self._carrier = carrier
         self._reference, self._period = reference, controller.sampling_time
         self._task, self._law, self._start = task, law, start
         self.robot, reserve = law.robot, reference.reserve
@@ -56,7 +60,8 @@ class MotionDemand:
         self.demand = DriveDemand(
             self.robot, controller.law, f_v, np.array(damping) if damping else None
         )
-        self._finder = CourseFinder(self.robot, task.place, task.evaluate, law.inverse, law.posture)
+        found = task.place, task.evaluate, law.inverse, law.posture
+        self._finder = CourseFinder(self.robot, *found, carried=carrier is not None)
         effort = self.robot.gather("effort_limit") * controller.effort_scale
         effort = np.maximum(effort - f_c, 1e-3 * effort)
         speed = largest_speeds(self.robot)
@@ -79,8 +84,19 @@ class MotionDemand:
             InputError: If the joints cannot follow.
         """
         times, reference = self._sampled(motion, step)
-        course = self._finder.find(self._start, reference, times, still=still)
+        frames = self._frames(times)
+        course = self._finder.find(self._start, reference, times, still=still, frames=frames)
         return float(times[1]), self._continued(course, times[1])
+
+    def _frames(self, times: np.ndarray) -> np.ndarray | None:
+        """Return the motion of what carries the manifold, at rest after its end."""
+        carrier = self._carrier
+        if carrier is None:
+            return None
+        order, end = self._law.linearization.relative_degree, carrier.domain[1]
+        frames = carrier.derivatives(np.minimum(times, end), order)
+        frames[times > end, 1:] = 0.0
+        return np.asarray(frames.reshape(len(times), -1))
 
     def _sampled(
         self, motion: PiecewisePolynomialCurve, step: float

@@ -32,10 +32,17 @@ def draw_two_arms(log: RunLog) -> Drawing:
     draw_components(turning, time, turned.T, ["x axis", "y axis", "z axis"])
     turning.set(ylabel="angle in deg", title="How far the workpiece's axes are from the start")
     place_legend(turning)
-    own = log["holder_xi"].values
-    scale, unit = fitting_unit(own, "m")
-    draw_components(slope, time, scale * own, [r"$\xi_1$", r"$\xi_2$"])
-    slope.set(ylabel=f"deviation in {unit}", title="The workpiece beside its own path, as measured")
+    if "holder_xi" in log:
+        own = log["holder_xi"].values
+        scale, unit = fitting_unit(own, "m")
+        draw_components(slope, time, scale * own, [r"$\xi_1$", r"$\xi_2$"])
+        title = "The workpiece beside its own path, as measured"
+        slope.set(ylabel=f"deviation in {unit}", title=title)
+    else:
+        angles = np.rad2deg(log["turntable_angles"].values)
+        labels = [f"axis {k + 1}" for k in range(angles.shape[1])]
+        draw_components(slope, time, angles, labels)
+        slope.set(ylabel="angle in deg", title="Axes of the turntable")
     place_legend(slope)
     error = log["frame_error"].values
     scale, unit = fitting_unit(error[:, :1], "m")
@@ -43,8 +50,7 @@ def draw_two_arms(log: RunLog) -> Drawing:
     belief.set(ylabel=f"distance in {unit}", title="Where it is against where its motion is told")
     caption = (
         "Speeds of the tool on the workpiece and of both in the world, how the workpiece turns, "
-        "how far the robot that holds it is beside its own path, and what the other controller "
-        "cannot know of where it is."
+        "what carries it, and what the tool's controller cannot know of where it is."
     )
     return Drawing("two_arms", "Two arms", caption, canvas)
 

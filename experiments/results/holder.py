@@ -1,13 +1,15 @@
-"""Signals and metrics of two robots: one that holds a workpiece, and how the other one sees it."""
+"""Signals and metrics of a workpiece that moves: who carries it, and how the robot sees it."""
 
 import numpy as np
 
 from diagrams.holder_station import HOLDER
 from diagrams.station import Station
+from diagrams.turntable_station import TURNTABLE
 from experiments.results.run_log import FloatArray, RunLog, peak
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.manifolds.carried import flange_motion_function
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
+from pfsc_drake.geometry.rotation import placed_points
 from reporting.metrics import Metrics
 
 
@@ -20,9 +22,16 @@ def workpiece_motion(station: Station, raw: dict[str, np.ndarray]) -> FloatArray
 
     Returns:
         Derivatives 0..r of ``[p_WC, R_WC by rows]``, those from the second on zero, shape
-        (samples, 12 (r + 1)); None of a station without a robot that holds one.
+        (samples, 12 (r + 1)); None of a station where nothing carries one.
     """
-    holder = station.holder
+    holder, turntable = station.holder, station.turntable
+    if turntable is not None:
+        angles = raw[f"{TURNTABLE}motion"]
+        motion = np.zeros((len(angles), frame_size(turntable.frame.order)))
+        if len(angles):
+            mapped = turntable.motion.map(len(angles))
+            motion[:, : 2 * POSE_SIZE] = np.array(mapped(angles.T)).T
+        return motion
     if holder is None:
         return None
     state = raw[f"{HOLDER}joint_state"]
@@ -47,17 +56,6 @@ def seen_poses(pose: FloatArray, frames: FloatArray) -> FloatArray:
     return np.hstack([y_C, R_Ce.reshape(-1, 9)])
 
 
-def placed_points(points: FloatArray, frames: FloatArray) -> FloatArray:
-    """Return points of a frame that moves in the world [m], shape (samples, 3).
-
-    Args:
-        points: In the frame [m], shape (samples, 3).
-        frames: ``[p_WC, R_WC by rows, ..]``, shape (samples, 12 or more).
-    """
-    R_WC = frames[:, 3:POSE_SIZE].reshape(-1, 3, 3)
-    return np.asarray(frames[:, :3] + np.einsum("kij,kj->ki", R_WC, points))
-
-
 def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
     """Add where the workpiece is, and what the robot does that holds it.
 
@@ -67,7 +65,15 @@ def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]
         raw: What it logged.
     """
     holder, frames = station.holder, workpiece_motion(station, raw)
-    if holder is None or frames is None:
+    if frames is None:
+        return
+    if holder is None:
+        log.add("workpiece_pose", frames[:, :POSE_SIZE])
+        log.add("y_t_world", placed_points(log["y_t"].values, frames))
+        angles, rates = np.hsplit(raw[f"{TURNTABLE}motion"], 2)
+        log.add("turntable_angles", angles)
+        log.add("turntable_rates", rates)
+        log.add("frame_error", frame_error(raw[f"{TURNTABLE}frame_jet"], frames))
         return
     own = {name.removeprefix(HOLDER): x for name, x in raw.items() if name.startswith(HOLDER)}
     log.add("workpiece_pose", frames[:, :POSE_SIZE])
@@ -91,6 +97,8 @@ def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]
     labels = [fault.name.lower() for fault in Fault]
     status = own["law"][:, layout.status]
     log.add(f"{HOLDER}fault", status[:, 0].astype(int), labels=labels)
+    if "wrench_ext" in own:
+        log.add(f"{HOLDER}wrench", own["wrench_ext"])
     log.add("frame_error", frame_error(own["frame_jet"], frames))
 
 
@@ -126,11 +134,15 @@ def holder_metrics(log: RunLog, begin: float) -> Metrics:
     )
     metrics.add("peak_workpiece_turning", peak(turning / np.diff(time)))
     metrics.add("peak_tool_speed_world", peak(_speeds(time, log["y_t_world"].values)))
-    xi = np.linalg.norm(log[f"{HOLDER}xi"].values, axis=1)
-    metrics.add("max_workpiece_deviation", peak(xi[counting]))
+    held = f"{HOLDER}xi" in log
+    if held:
+        xi = np.linalg.norm(log[f"{HOLDER}xi"].values, axis=1)
+        metrics.add("max_workpiece_deviation", peak(xi[counting]))
     error = log["frame_error"].values
     metrics.add("max_frame_error", peak(error[counting, 0]))
     metrics.add("max_frame_angle", peak(error[counting, 1]))
+    if not held:
+        return metrics
     for axis, torque in enumerate(np.abs(log[f"{HOLDER}tau_d"].values).max(axis=0), start=1):
         metrics.add(f"peak_holder_torque_{axis}", float(torque), log[f"{HOLDER}tau_d"].unit)
     return metrics

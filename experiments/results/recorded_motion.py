@@ -73,7 +73,9 @@ def collect_motion(
 def _holder(
     station: Station, raw: dict[str, FloatArray], log: RunLog, frames: NDArray[np.int_]
 ) -> RecordedHolder | None:
-    """Return what a robot does that holds the workpiece, if one does."""
+    """Return how the workpiece moves, if it does, and what a robot does that holds it."""
+    if station.turntable is not None:
+        return RecordedHolder(None, log["workpiece_pose"].values[frames])
     if station.holder is None:
         return None
     coordinates = station.holder.part.coordinates

@@ -222,7 +222,8 @@ def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) 
     n, linearization = station.robot.dimension, station.law.linearization
     if len(points) == 0:
         return np.zeros((0, 2, linearization.num_outputs))
-    place = station.task.place if station.holder is None else linearization.manifold
+    carried = station.holder is not None or station.turntable is not None
+    place = linearization.manifold if carried else station.task.place
     function = virtual_output_function(station.robot, place).map(len(points))
     Y = np.array(function(joint_state[:, :n].T, joint_state[:, n : 2 * n].T, points.T))
     return Y.T.reshape(len(points), 2, linearization.num_outputs)

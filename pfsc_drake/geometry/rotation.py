@@ -271,3 +271,14 @@ def _euler_to_matrix(sequence: str, angles: ArrayLike) -> np.ndarray:
         raise InputError("Euler angles: not finite; finite values in rad are required")
     rotation = Rotation.from_euler(sequence, values.reshape(-1, 3))
     return rotation.as_matrix().reshape(*values.shape[:-1], 3, 3)
+
+
+def placed_points(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return points of a frame C that moves in the world [m], shape (samples, 3).
+
+    Args:
+        points: In the frame [m], shape (samples, 3).
+        frames: ``[p_WC, R_WC by rows, ..]``, shape (samples, 12 or more).
+    """
+    R_WC = frames[:, 3:12].reshape(-1, 3, 3)
+    return np.asarray(frames[:, :3] + np.einsum("kij,kj->ki", R_WC, points))

@@ -92,6 +92,42 @@ def test_rates_are_those_of_the_true_coordinates(known):
     assert np.abs(rate - log["eta_dot"].values[:, 0])[5:-5].max() < 2e-5
 
 
+def test_what_the_drives_are_asked_for_is_known_beforehand(known):
+    """Of both robots: torques and speeds of the plan are those of Drake's plants."""
+    station, _, log = known
+    for part, prefix in ((station, ""), (station.holder, HOLDER)):
+        plan, last = part.task.drive_plan, part.law.robot.dimension - 1
+        assert not plan.said
+        at = np.flatnonzero((plan.times >= BEGIN) & (plan.times <= END))
+        ticks = np.rint(plan.times[at] / 1e-3).astype(int)
+        torque, speed = np.hsplit(plan.demand[at], 2)
+        true = log[f"{prefix}tau_d"].values[ticks]
+        # the torch may turn about its axis as it likes
+        off = np.abs(torque - true)[:, :last]
+        assert np.all(off < 0.02 * np.abs(true).max(axis=0)[:last] + 0.05)
+        assert np.abs(speed - log[f"{prefix}v_M"].values[ticks])[:, :last].max() < 0.02
+
+
+def test_two_robots_that_are_too_fast_are_warned_of():
+    """With a pace of both at which they are not."""
+
+    def built(pace):
+        settings = exact()
+        for own in (settings, settings.holder):
+            own.reference.limits = "warn"
+            own.reference.velocity *= pace
+            own.reference.acceleration *= pace**2
+        return build_station(settings, SCENARIO_DIRECTORY)
+
+    station = built(3.0)
+    (said,) = station.task.drive_plan.said
+    assert said.startswith("as asked for it takes 94 % of the torque of axis 2 at eta = 0.45")
+    assert said in station.warnings and not station.task.drive_plan.is_slowed
+    pace = float(said.split("it fits with ")[1].split()[0])
+    assert f"{pace**2:.2f} of the accelerations of both robots" in said
+    assert not built(3.0 * pace - 0.03).task.drive_plan.said
+
+
 def test_an_error_of_placement_is_seen_one_to_one(known):
     """No controller knows of it: as measured the tool is on the seam, and in truth beside it."""
     error = PoseParameters(position=[0.1e-3, 0.2e-3, -0.1e-3], zyx_deg=[0.0, 0.02, 0.0])
@@ -118,6 +154,20 @@ def test_what_is_not_told_of_the_motion_costs(known):
     }
     assert deviation[2] > 2e-7
     assert deviation[0] > 50.0 * deviation[2]
+
+
+def test_planned_derivatives_are_those_of_the_pose(known):
+    """As differences of the true poses say, of a holder that is where it was planned to be."""
+    station, root, log = run(exact(derivatives="planned"), like=known[0])
+    moving = log.time >= BEGIN
+    assert np.linalg.norm(log["xi"].values[moving], axis=1).max() < 1e-6
+    _, raw = station.log.read(root)
+    told, pose = raw["holder_frame_jet"], log["workpiece_pose"].values
+    middle = np.flatnonzero(moving)[1:-1]
+    slope = (pose[middle + 1] - pose[middle - 1]) / 2e-3
+    bend = (pose[middle + 1] - 2.0 * pose[middle] + pose[middle - 1]) / 1e-6
+    assert np.abs(told[middle, 12:24] - slope).max() < 1e-4 * np.abs(slope).max()
+    assert np.abs(told[middle, 24:36] - bend).max() < 3e-3 * np.abs(bend).max()
 
 
 @pytest.mark.parametrize("failing", ["follower", "holder"])

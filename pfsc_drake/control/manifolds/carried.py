@@ -1,4 +1,4 @@
-"""What carries a manifold: the motion of its frame, as known, as differenced, or as prescribed."""
+"""What carries a manifold: the motion of its frame, as known, as differenced, or as planned."""
 
 import math
 from typing import Any
@@ -130,6 +130,32 @@ class DifferencedFrame(Block):
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
         return {"poses": ca.vertcat(x.poses[POSE_SIZE:], u.frame_jet[:POSE_SIZE])}
+
+
+class PlannedFrame(Block):
+    """A frame where it is measured to be, with the derivatives of where it was planned to be.
+
+    Ports:
+        frame_jet (input): Of which the pose alone is used, shape (12 (k + 1),).
+        planned (input): Derivatives 0..k of the plan, shape (12 (k + 1),).
+        mixed (output): The measured pose, and the plan's derivatives.
+
+    Args:
+        order: Highest derivative k, of which those above ``highest`` are taken to be zero.
+        highest: Highest derivative that is taken from the plan.
+    """
+
+    def __init__(self, order: int, highest: int) -> None:
+        self._told = POSE_SIZE * (min(highest, order) + 1)
+        size = frame_size(order)
+        self.inputs = {"frame_jet": Port(size), "planned": Port(size)}
+        self.outputs, self.states = {"mixed": Port(size)}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        planned = u.planned[POSE_SIZE : self._told]
+        untold = ca.DM.zeros(u.planned.shape[0] - self._told)
+        return {"mixed": ca.vertcat(u.frame_jet[:POSE_SIZE], planned, untold)}
 
 
 class SeenTool(Block):

@@ -12,7 +12,8 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.actuation import joint_jets
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare, scale_of
 from pfsc_drake.control.law.posture import Posture, posture_expressions
-from pfsc_drake.control.manifolds.manifold import PlaceManifold
+from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
+from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, MovingFrameManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
@@ -52,6 +53,7 @@ class CourseFinder:
         projection: Finds the place on it.
         inverse: Inverts the decoupling matrix.
         posture: Posture of a robot with more joints than outputs.
+        carried: Whether the manifold is one in a frame that moves.
     """
 
     def __init__(
@@ -61,15 +63,24 @@ class CourseFinder:
         projection: Projection,
         inverse: DecouplingInverse,
         posture: Posture | None = None,
+        *,
+        carried: bool = False,
     ) -> None:
         self._n, self._order = robot.dimension, manifold.layout.order
         self._memory, self._projection = manifold.layout.memory, projection
         self._pose = BoundFunction(pose_function(robot))
-        self._correction = BoundFunction(_correction_function(robot, manifold, inverse, posture))
+        seen: Manifold = MovingFrameManifold(manifold) if carried else manifold
+        self._correction = BoundFunction(_correction_function(robot, seen, inverse, posture))
 
     @once_per_content(30)
     def find(
-        self, start: CourseStart, reference: np.ndarray, times: np.ndarray, *, still: bool = False
+        self,
+        start: CourseStart,
+        reference: np.ndarray,
+        times: np.ndarray,
+        *,
+        still: bool = False,
+        frames: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the joints' coordinates and derivatives 0..r, shape (samples, r + 1, N).
 
@@ -80,6 +91,8 @@ class CourseFinder:
             times: Times of the samples, evenly spaced [s], shape (samples,).
             still: Whether joints beyond the outputs only move with them, as little as they can.
                 The posture's own motion needs samples as close as those of the law.
+            frames: Derivatives 0..r of the frame that carries the manifold, if one does, shape
+                (samples, 12 (r + 1)), see :func:`frame_jets`.
 
         Raises:
             InputError: If a place cannot be found, or is singular.
@@ -90,12 +103,14 @@ class CourseFinder:
         step = float(times[1] - times[0]) if len(times) > 1 else 0.0
         advance = _advance(self._order, step)
         for i in range(len(times)):
-            if i == 0 or not _rests(q, reference[i - 1 : i + 1]):
+            waits = frames is None or not frames[i - 1 : i + 1, POSE_SIZE:].any()
+            if i == 0 or not (waits and _rests(q, reference[i - 1 : i + 1])):
                 if i > 0:
                     q = advance @ q
                 if still:
                     q[1:] = 0.0
-                memory = self._correct(q, None if still else q_0, reference[i], memory)
+                frame = None if frames is None else frames[i]
+                memory = self._correct(q, None if still else q_0, reference[i], memory, frame)
             course[i] = q
         return course
 
@@ -115,7 +130,12 @@ class CourseFinder:
         return found
 
     def _correct(
-        self, q: np.ndarray, q_0: np.ndarray | None, wanted: np.ndarray, memory: np.ndarray
+        self,
+        q: np.ndarray,
+        q_0: np.ndarray | None,
+        wanted: np.ndarray,
+        memory: np.ndarray,
+        frame: np.ndarray | None = None,
     ) -> np.ndarray:
         """Correct the derivatives in their place, and return the memory of the place found."""
         arguments, results = self._correction.arguments, self._correction.results
@@ -135,8 +155,14 @@ class CourseFinder:
         for _ in range(_STEPS):
             self._pose.arguments["q"][:] = q[0]
             self._pose.evaluate()
-            point = self._projection(self._pose.results["pose"][:3], memory)
-            arguments["manifold_point"][:] = point
+            y = self._pose.results["pose"][:3]
+            if frame is None:
+                point = self._projection(y, memory)
+                arguments["manifold_point"][:] = point
+            else:
+                R_WC = frame[3:POSE_SIZE].reshape(3, 3)
+                point = self._projection(R_WC.T @ (y - frame[:3]), memory)
+                arguments["manifold_point"][:] = np.concatenate([point, frame])
             if not np.max(np.abs(correct(0))) > _FOUND:
                 break
         else:
@@ -170,7 +196,7 @@ def _advance(order: int, step: float) -> np.ndarray:
 @once_per_content()
 def _correction_function(
     robot: RobotModel,
-    manifold: PlaceManifold,
+    manifold: Manifold,
     inverse: DecouplingInverse,
     posture: Posture | None,
 ) -> ca.Function:

@@ -6,6 +6,7 @@ from bisect import bisect_right
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import make_interp_spline
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
@@ -15,6 +16,8 @@ _RELATIVE_JUMP = 1e-9
 # ... and would move the curve by more than this part of its size over one segment.
 _ROUNDING = 1e-12
 _FAST_TERMS = 8
+# of curves between rests
+_DEGREE = 7
 
 
 class PiecewisePolynomialCurve(Curve):
@@ -92,6 +95,23 @@ class PiecewisePolynomialCurve(Curve):
                 f"line: from {a.tolist()} to {b.tolist()}; two different finite points required"
             )
         return cls([0.0, length], [[a, (b - a) / length]])
+
+    @classmethod
+    def between_rests(cls, theta: np.ndarray, points: np.ndarray) -> "PiecewisePolynomialCurve":
+        """Curve of class C^6 through points, at rest at both ends.
+
+        Args:
+            theta: Parameters of the points, evenly spaced [points].
+            points: Points [points, dimension].
+
+        Returns:
+            Open curve of degree 7; derivatives 1 to 3 are zero at its ends.
+        """
+        rest = [(k, np.zeros(points.shape[1])) for k in range(1, (_DEGREE + 1) // 2)]
+        spline = make_interp_spline(theta, points, k=_DEGREE, bc_type=(rest, rest))
+        table = [spline(theta[:-1], k) / math.factorial(k) for k in range(_DEGREE + 1)]
+        coefficients = np.array(table).transpose(1, 0, 2)
+        return cls(theta, coefficients, closed=False, known_smoothness=_DEGREE - 1)
 
     @property
     def degree(self) -> int:

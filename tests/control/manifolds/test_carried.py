@@ -11,6 +11,7 @@ from pfsc_drake.control.manifolds.carried import (
     DifferencedFrame,
     FlangeFrame,
     FramedPoint,
+    PlannedFrame,
     SeenTool,
     flange_motion_function,
 )
@@ -103,6 +104,16 @@ def test_differences_above_the_highest_are_zero():
     block.step(frame_jet=frame)
     told = block.step(frame_jet=frame + 1.0)["differenced"]
     assert np.allclose(told[POSE_SIZE : 2 * POSE_SIZE], 1.0 / SMALL) and not told[24:].any()
+
+
+@pytest.mark.parametrize("highest", [0, 1, 4])
+def test_a_plan_tells_the_derivatives_of_a_measured_pose(highest):
+    measured, planned = np.arange(36.0), -np.arange(1.0, 37.0)
+    told = output(PlannedFrame(2, highest), frame_jet=measured, planned=planned).reshape(3, -1)
+    assert np.array_equal(told[0], measured[:POSE_SIZE])
+    last = min(highest, 2)
+    assert np.array_equal(told[1 : last + 1], planned.reshape(3, -1)[1 : last + 1])
+    assert not told[last + 1 :].any()
 
 
 def test_a_tool_in_a_frame():

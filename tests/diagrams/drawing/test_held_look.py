@@ -54,7 +54,10 @@ def test_everything_on_the_workpiece_moves_with_it(held, load_arm):
     evaluator = path.evaluator(2)
     points = np.array([evaluator([0.0, 0.04 * k, 0.1], 0.0) for k in range(3)])
     tool = np.array([np.append([0.0, 0.04 * k, 0.1], np.eye(3)) for k in range(3)])
-    motion = RecordedMotion(PERIOD * np.arange(3), np.zeros((3, 6)), tool, points, held=held)
+    force = np.tile([0.0, 0.0, 60.0], (3, 1))
+    motion = RecordedMotion(
+        PERIOD * np.arange(3), np.zeros((3, 6)), tool, points, tool_force=force, held=held
+    )
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     layout = PathPointLayout(2, oriented=False)
     diagram = build_replay(drawing, PathDrawing(path, layout), motion, meshcat, PERIOD, held=look)
@@ -68,6 +71,11 @@ def test_everything_on_the_workpiece_moves_with_it(held, load_arm):
     # what a browser is told last
     X_WC = system_pose(diagram, simulator)
     assert np.allclose(X_WC[:3], [0.9, 0.1, 0.7], rtol=0, atol=1e-12)
+    # forces are those of the world, and act where the tool is in it
+    arrows = diagram.GetSubsystemByName("tool_force_arrows")
+    context = arrows.GetMyContextFromRoot(simulator.get_context())
+    place = zyx_to_matrix([0.4, 0.0, 0.0]) @ [0.0, 0.08, 0.1] + X_WC[:3]
+    assert np.allclose(arrows.GetInputPort("points").Eval(context), place, rtol=0, atol=1e-12)
 
 
 def system_pose(diagram, simulator):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.results.holder import frame_error, holder_metrics, placed_points, seen_poses
+from experiments.results.holder import frame_error, holder_metrics, seen_poses
 from experiments.results.run_log import RunLog
+from pfsc_drake.geometry.rotation import placed_points
 
 
 def pose(position, rotvec):

@@ -74,6 +74,19 @@ def test_line_is_parametrized_by_arc_length() -> None:
     np.testing.assert_allclose(line.derivatives(2.5, 2), [[1, 1.5, 4], [0, 0.6, 0.8], [0, 0, 0]])
 
 
+def test_between_rests_goes_through_its_points_and_rests_at_its_ends() -> None:
+    theta = np.linspace(0.0, 2.0, 81)
+    smooth = np.sin(np.pi * theta / 4.0) ** 4
+    curve = PiecewisePolynomialCurve.between_rests(theta, np.column_stack([smooth, 2.0 * smooth]))
+    assert np.abs(curve.derivatives(theta, 0)[:, 0, 0] - smooth).max() < 1e-13
+    assert np.abs(curve.derivatives(curve.domain, 3)[:, 1:]).max() < 1e-8
+    # sin^4 of x is 3/8 - cos(2 x) / 2 + cos(4 x) / 8
+    at, w = 0.7313, np.pi / 4.0
+    fourth = (4.0 * w) ** 4 * np.cos(4.0 * w * at) / 8.0 - (2.0 * w) ** 4 * np.cos(2.0 * w * at) / 2
+    assert abs(curve.derivatives(at, 4)[4, 1] - 2.0 * fourth) < 1e-4
+    assert curve.smoothness == 6
+
+
 def test_errors() -> None:
     with pytest.raises(InputError, match=r"jump of position at theta = 1;"):
         PiecewisePolynomialCurve([0, 1, 2], [[[0.0], [1.0]], [[2.0], [1.0]]])
