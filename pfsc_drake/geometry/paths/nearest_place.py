@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.geometry.paths.path import Path
 
@@ -45,6 +46,27 @@ class NearestPlace:
         """Return the parameter of the nearest place of all of a point [m], shape (3,)."""
         curve, theta = self._path.position, self._path.evaluator(1).find(y)
         return theta if curve.closed else ca.fmin(ca.fmax(theta, curve.domain[0]), curve.domain[1])
+
+    def distances(self, points: np.ndarray) -> np.ndarray:
+        """Return the distances from the path along the way of a point.
+
+        Args:
+            points: Where it is at each tick [m], shape (n, 3); NaN where that is not known.
+
+        Returns:
+            Distances [m], shape (n,).
+        """
+        step, distances = BoundFunction(self.function), np.full(len(points), np.nan)
+        theta = math.nan
+        for tick, y in enumerate(points):
+            if math.isnan(theta):
+                theta = float(self.nearest(y))
+            step.arguments["y"][:], step.arguments["last"][:] = y, theta
+            step.arguments["tick"][:] = tick
+            step.evaluate()
+            theta = float(step.results["theta"][0])
+            distances[tick] = np.linalg.norm(y - step.results["position"])
+        return distances
 
     @cached_property
     def function(self) -> ca.Function:

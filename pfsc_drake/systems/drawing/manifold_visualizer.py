@@ -83,6 +83,7 @@ class PathVisualizer(LineVisualizer):
 
 
 _SKIN = Rgba(0.45, 0.65, 0.95, 0.35)
+_TUBE = Rgba(0.95, 0.65, 0.2, 0.22)
 
 
 class SurfaceVisualizer(LeafSystem):
@@ -147,6 +148,20 @@ def draw_surface(
     meshcat.SetTriangleMesh(f"{root}/skin", vertices.T, both.T, _SKIN)
     for i, line in enumerate(lines):
         meshcat.SetLine(f"{root}/line_{i}", line.T, 1.0, _LINE)
+
+
+def draw_guide(meshcat: Meshcat, root: str, line: np.ndarray, tube: np.ndarray) -> None:
+    """Draw a path that attracts, and a tube round it that one can see through.
+
+    Args:
+        meshcat: Where to draw.
+        root: Meshcat path of what is drawn.
+        line: Points of the path [m], shape (points, 3).
+        tube: Points round it on a grid [m], shape (rows, columns, 3).
+    """
+    vertices, faces = _triangles(tube)
+    meshcat.SetTriangleMesh(f"{root}/tube", vertices.T, faces.T, _TUBE)
+    meshcat.SetLine(f"{root}/line", line.T, 4.0, _LINE)
 
 
 def _triangles(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
