@@ -21,7 +21,8 @@ class NearestPlace:
 
     At each tick the search begins at the last place or at the nearest of some samples of the path,
     other ones at each tick, all of them in 16; Newton's method leads on from there. So a part of
-    the path that comes nearer than the one that was followed is found within 16 ticks.
+    the path that comes nearer than the one that was followed is found within 16 ticks, once it is
+    nearer by what half the way between two samples is worth.
 
     The distance from the new place is never above that from the last one, whether Newton's method
     converges or not. An open path ends where it ends.
