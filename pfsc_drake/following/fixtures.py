@@ -152,8 +152,8 @@ def make_guidance(
             )
         if tool.guides is not None:
             raise InputError(
-                f"guides: {len(tool.guides)} given; must be none with fixtures.guidance.rules = "
-                "printed, which know of no paths that attract"
+                f"fixtures.guidance.rules = printed: {len(tool.guides)} guides given; must be "
+                "program, which alone knows of paths that attract"
             )
         return PrintedGuidance(tool, parameters.printed)
     stiffness = [fixture.stiffness for fixture in guided.fixtures]
