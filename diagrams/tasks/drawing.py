@@ -35,6 +35,7 @@ _POINTS = 600
 _LINES, _LINE_POINTS = 11, 61
 # of the tube round a guide, along it and round it
 _TUBE_POINTS, _AROUND = 160, 17
+_CORE = 2.5e-3  # m, radius of what stands for the guide itself
 
 
 class ManifoldDrawing(Protocol):
@@ -141,12 +142,13 @@ class SpaceDrawing:
         """Return lines that show the manifold [m], each (points, 3)."""
         surfaces = [surface for fixture in self.fixtures for surface in fixture.surfaces]
         lines = [line for surface in surfaces for line in skin_and_lines(surface)[1]]
-        return lines + [_line_and_tube(guide)[0] for guide in self.guides]
+        return lines + [_tube(guide, 0.0)[0] for guide in self.guides]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
         """Add what draws it."""
         for k, guide in enumerate(self.guides):
-            draw_guide(meshcat, f"guides/{k}", *_line_and_tube(guide))
+            tubes = _tube(guide, _CORE), _tube(guide, guide.strongest)
+            draw_guide(meshcat, f"guides/{k}", *tubes)
         shapes: list[tuple[np.ndarray, list[np.ndarray]]] = []
         placements, firsts = {}, []
         for fixture in self.fixtures:
@@ -164,15 +166,15 @@ class SpaceDrawing:
         return drawing.GetInputPort("manifold_point")
 
 
-def _line_and_tube(guide: Guide) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of a guide [m], shape (points, 3), and around it where it pulls the most."""
+def _tube(guide: Guide, radius: float) -> np.ndarray:
+    """Return points at a radius [m] round a guide [m], shape (around, along, 3)."""
     curve = guide.path.position
     theta = np.linspace(*curve.domain, _TUBE_POINTS)
     line = curve.derivatives(theta, 0)[:, 0]
     angle = np.linspace(0.0, 2.0 * np.pi, _AROUND)[:, None, None]
     e_perp, e_cross = guide.path.frame.normals(theta)
     across = np.cos(angle) * e_perp + np.sin(angle) * e_cross
-    return line, line + guide.strongest * across
+    return line + radius * across
 
 
 # to who looks at the regions from their side with the robot to the left, and that one's right
