@@ -84,27 +84,34 @@ class NearestPlace:
         evaluator, curve = self._path.evaluator(1), self._path.position
         layout = evaluator.layout
 
-        def place(theta: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
-            """Return eta, position and squared distance at a parameter."""
-            point = evaluator.at(theta)
-            sigma = point[layout.position][:3]
-            return point[layout.eta], sigma, ca.sumsqr(y - sigma)
+        def away(point: ca.MX) -> ca.MX:
+            """Return the squared distance of a point of the path."""
+            return ca.sumsqr(y - point[layout.position][:3])
 
-        other, away = self._sample(y, tick)
+        other, distance = self._sample(y, tick)
         if curve.closed:  # on the same lap
             other += curve.period * ca.floor((last - other) / curve.period + 0.5)
-        begin = ca.if_else(away < place(last)[2], other, last)
-        found = evaluator.evaluate(y, begin)[layout.theta]
-        if not curve.closed:
-            found = ca.fmin(ca.fmax(found, curve.domain[0]), curve.domain[1])
-        at_begin, at_found = place(begin), place(found)
+        at_last = away(evaluator.at(last))
+        begin, least = ca.if_else(distance < at_last, other, last), ca.fmin(distance, at_last)
+        point = evaluator.evaluate(y, begin)
+        ends = (-math.inf, math.inf) if curve.closed else curve.domain
+        theta = point[layout.theta]
+        inside = ca.logic_and(theta >= ends[0], theta <= ends[1])
         # also where it is no number
-        nearer = at_found[2] <= at_begin[2]
-        eta, sigma = (ca.if_else(nearer, at_found[k], at_begin[k]) for k in range(2))
+        good = ca.logic_and(inside, away(point) <= least)
+        # beyond an end it is that end, unless where it began is nearer
+        at = ca.MX.sym("at"), ca.MX.sym("begin"), ca.MX.sym("least"), ca.MX.sym("y", 3)
+        end = ca.fmin(ca.fmax(at[0], ends[0]), ends[1])
+        of_end = ca.sumsqr(at[3] - evaluator.at(end)[layout.position][:3]) <= at[2]
+        told = evaluator.at(ca.if_else(of_end, end, at[1]))
+        rare = ca.Function("rare", [*at, ca.MX.sym("point", point.numel())], [told])
+        known = ca.MX.sym("point", point.numel())
+        usual = ca.Function("usual", [*at, known], [known])
+        point = ca.Function.if_else("place", usual, rare)(good, theta, begin, least, y, point)
         return ca.Function(
             "nearest_place",
             [y, last, tick],
-            [ca.if_else(nearer, found, begin), eta, sigma],
+            [point[layout.theta], point[layout.eta], point[layout.position][:3]],
             ["y", "last", "tick"],
             ["theta", "eta", "position"],
         )
