@@ -58,12 +58,13 @@ def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = 
         degree, lead = RELATIVE_DEGREE[controller.law], choose_lead(scenario)
         regions = scenario.fixtures or FixtureParameters()
         return SpaceTask(regions, degree, motion, lead, start, scenario.duration, folder, progress)
-    given = [] if scenario.fixtures is None else scenario.fixtures.regions
-    allowed = (
-        f"none with controller.manifold = {controller.manifold}; only a tool led through space is "
-        "kept out of regions"
-    )
-    require(not given, "fixtures.regions", f"{len(given)} given", allowed)
+    for key, why in {"regions": "kept out of regions", "guides": "pulled to guides"}.items():
+        given = getattr(scenario.fixtures, key, [])
+        allowed = (
+            f"none with controller.manifold = {controller.manifold}; only a tool led through space "
+            f"is {why}"
+        )
+        require(not given, f"fixtures.{key}", f"{len(given)} given", allowed)
     if controller.manifold == "surface":
         return SurfaceTask(scenario.surface, controller, reference, start, folder, progress)
     if isinstance(scenario.path.shape, Streamed):

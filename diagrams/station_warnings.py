@@ -9,11 +9,11 @@ from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
+from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
 from diagrams.warnings.law_warnings import (
     law_warnings,
     observed_force_warnings,
     servo_warnings,
-    stiff_regions,
     unused_parameters,
 )
 from diagrams.warnings.obstacles import obstacle_warnings
@@ -29,6 +29,8 @@ from diagrams.warnings.untold_forces import (
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.following.law import sampled_robot
+from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.physics.operator_hand import LiveHandParameters
 
 
 def controller_warnings(
@@ -65,7 +67,8 @@ def controller_warnings(
     said += rest_warnings(scenario.teleoperation, scenario.hand, scenario.duration)
     said += unused_parameters(parameters, law)
     if scenario.fixtures is not None and isinstance(task, SpaceTask):
-        said += stiff_regions(scenario.fixtures.regions, task.guided)
+        said += stiff_fixtures(scenario.fixtures, task.guided)
+        said += firm_guides(task.guides, [hand.force_limit for hand in _hands(scenario)])
     if scenario.needs_sensor:
         if scenario.compliance.needs_sensor:
             said += taring_warnings(scenario.sensor.taring_time, scenario.reference.dwell)
@@ -80,14 +83,18 @@ def expected_forces(scenario: Scenario) -> ExpectedForces:
     Args:
         scenario: The scenario.
     """
-    hands = [scenario.hand, scenario.operator and scenario.operator.hand]
-    if scenario.teleoperation is not None:
-        hands = []
+    hands = [] if scenario.teleoperation is not None else _hands(scenario)
     return ExpectedForces(
-        largest_force(scenario.forces, [hand for hand in hands if hand]),
+        largest_force(scenario.forces, hands),
         bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces),
         scenario.hold_back.force != 0.0,
     )
+
+
+def _hands(scenario: Scenario) -> list[HandParameters | LiveHandParameters]:
+    """Return the hands that act on the tool."""
+    hands = [scenario.hand, scenario.operator and scenario.operator.hand]
+    return [hand for hand in hands if hand]
 
 
 def sensor_loop(scenario: Scenario) -> SensorLoop:

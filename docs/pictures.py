@@ -65,6 +65,7 @@ MOMENTS = {
     "vf_hard_spline": 8.5,
     "vf_many_surfaces": 10.0,
     "vf_moving_region": 7.0,
+    "vf_nearest_path": 10.4,
     "vf_seven_axes": 7.0,
     "vf_soft_circle": 7.2,
     "vf_soft_region": 7.0,
@@ -79,6 +80,7 @@ LEFT_OUT = {
     "pfc_delta_notch_stiff": _NOTCH,
     "plate_mounting": _PLATE,
     "plate_return": _PLATE,
+    "vf_nearest_path": ("visualizer",),
     "vf_many_surfaces": ("visualizer",),
 }
 _LARGEST = 60_000  # bytes of a picture

@@ -29,6 +29,7 @@ from experiments.results.drives import (
 from experiments.results.fastest import given_metrics
 from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
+from experiments.results.guides import guide_metrics
 from experiments.results.holder import holder_metrics
 from experiments.results.mounting import mounting_metrics
 from experiments.results.obstacles import obstacle_metrics
@@ -225,6 +226,7 @@ def _measure(
     )
     metrics.update(press_metrics(log))
     metrics.update(guidance_metrics(log))
+    metrics.update(guide_metrics(log))
     metrics.update(limit_metrics(log))
     metrics.update(_guidance_audit(log, settings))
     metrics.update(teleoperation_metrics(log, settings))
@@ -269,10 +271,10 @@ def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
         return Metrics()
     motion = free_motion(settings.compliance, settings.controller.sampling_time)
     guidance = fixtures.guidance
+    guides = tuple((guide.stiffness, guide.reach) for guide in fixtures.guides)
     damping = motion.damping if settings.operator is None else None
-    return audit(
-        log, GuidanceRules(motion.mass, damping, guidance.largest_speed, guidance.tank.capacity)
-    )
+    numbers = motion.mass, damping, guidance.largest_speed, guidance.tank.capacity, guides
+    return audit(log, GuidanceRules(*numbers))
 
 
 def _sensor_warnings(log: RunLog) -> list[str]:

@@ -34,6 +34,7 @@ _DOOR = {
     "Follower": "pfsc_drake.following.follower",
     "FollowerOptions": "pfsc_drake.following.options.follower",
     "GainParameters": "pfsc_drake.following.options.controller",
+    "Guide": "pfsc_drake.control.fixtures.guides",
     "GuidanceOptions": "pfsc_drake.following.guidance",
     "HalfSpace": "pfsc_drake.geometry.regions.shapes",
     "LawGains": "pfsc_drake.following.options.controller",

@@ -16,6 +16,7 @@ from diagrams.scenario.checks import (
     require_place,
     require_positive,
 )
+from diagrams.scenario.path import BentLemniscate, Circle, Intersection, Line, Waypoints
 from diagrams.scenario.surface import Extruded, Fitted, Revolved, SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import (
     Cone,
@@ -27,6 +28,7 @@ from diagrams.scenario.surface_shapes import (
     Torus,
     Turned,
 )
+from pfsc_drake.control.fixtures.guides import MOST_GUIDES, REACH, STIFFNESS
 from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.yaml.typed import equal
 
@@ -214,6 +216,31 @@ def encloses(shape: RegionShape) -> bool:
     return not isinstance(shape, Plane)
 
 
+# the first is what a shape without a tag means
+GuideShape = Union[Waypoints, BentLemniscate, Circle, Line, Intersection]  # noqa: UP007
+
+
+@dc.dataclass
+class GuideParameters:
+    """A path that attracts the tool, next to it like a spring and from its reach on not at all.
+
+    See :class:`~pfsc_drake.control.fixtures.guides.Guide`.
+
+    Attributes:
+        shape: ``!Line``, ``!Circle``, ``!Waypoints``, ``!Intersection`` or ``!BentLemniscate``.
+        stiffness: Stiffness next to the path [N/m].
+        reach: Distance from which on it does not attract [m].
+    """
+
+    shape: GuideShape = dc.field(default_factory=Line)
+    stiffness: float = 2000.0
+    reach: float = 0.06
+
+    def __post_init__(self) -> None:
+        require_between("stiffness", self.stiffness, *STIFFNESS, "N/m")
+        require_between("reach", self.reach, *REACH, "m")
+
+
 _START = ("refuse", "move_out")
 
 
@@ -226,6 +253,7 @@ class FixtureParameters(FixtureOptions):
 
     Attributes:
         regions: Where the tool may not go.
+        guides: Paths that attract it.
         orientation: That the tool keeps.
         start_inside: Start inside of a region that the tool starts in: ``refuse``, or ``move_out``
             slowly.
@@ -236,6 +264,7 @@ class FixtureParameters(FixtureOptions):
     """
 
     regions: list[RegionParameters] = dc.field(default_factory=list)
+    guides: list[GuideParameters] = dc.field(default_factory=list)
     orientation: SurfaceOrientationParameters = dc.field(
         default_factory=SurfaceOrientationParameters
     )
@@ -249,6 +278,12 @@ class FixtureParameters(FixtureOptions):
         kinds = (type(region.shape).__name__.lower() for region in self.regions)
         return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
 
+    @property
+    def guide_names(self) -> list[str]:
+        """What the guides are called, likewise."""
+        kinds = (type(guide.shape).__name__.lower() for guide in self.guides)
+        return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
+
     def lag_behind(self, bandwidth: float) -> float:
         """Return ``tau`` [s] of the servos as it is believed.
 
@@ -259,6 +294,8 @@ class FixtureParameters(FixtureOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        most = f"{MOST_GUIDES} or fewer"
+        require(len(self.guides) <= MOST_GUIDES, "guides", f"{len(self.guides)} given", most)
         require_one_of("start_inside", self.start_inside, _START)
         kind = self.orientation.kind
         require(kind != "normal", "orientation.kind", kind, "none, given")

@@ -159,10 +159,10 @@ class Scenario:
 
     @property
     def switched_regions(self) -> list[str]:
-        """Names of the regions that a person can switch on and off one by one."""
+        """Names of the regions, and then guides, that a person can switch on and off one by one."""
         if self.controller.manifold != "space" or self.fixtures is None:
             return []
-        return self.fixtures.names
+        return self.fixtures.names + self.fixtures.guide_names
 
     @property
     def encoder_period(self) -> float:

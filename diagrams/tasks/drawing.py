@@ -13,6 +13,7 @@ from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.fixtures import DrawnFixture
+from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry import Path, PathPointLayout
@@ -23,6 +24,7 @@ from pfsc_drake.systems.drawing.manifold_visualizer import (
     PathVisualizer,
     RegionVisualizer,
     SurfaceVisualizer,
+    draw_guide,
     draw_surface,
 )
 from pfsc_drake.systems.drawing.numbers import SceneNumber
@@ -31,6 +33,9 @@ from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer
 _POINTS = 600
 # of a surface, in each direction, and of the points of each line
 _LINES, _LINE_POINTS = 11, 61
+# of the tube round a guide, along it and round it
+_TUBE_POINTS, _AROUND = 160, 17
+_CORE = 2.5e-3  # m, radius of what stands for the guide itself
 
 
 class ManifoldDrawing(Protocol):
@@ -126,18 +131,24 @@ class SpaceDrawing:
     Attributes:
         fixtures: The regions.
         manifold: Space as the law sees it.
+        guides: Paths that attract the tool, drawn with where they pull the most.
     """
 
     fixtures: Sequence[DrawnFixture]
     manifold: SpaceManifold
+    guides: Sequence[Guide] = ()
 
     def outline(self) -> list[np.ndarray]:
         """Return lines that show the manifold [m], each (points, 3)."""
         surfaces = [surface for fixture in self.fixtures for surface in fixture.surfaces]
-        return [line for surface in surfaces for line in skin_and_lines(surface)[1]]
+        lines = [line for surface in surfaces for line in skin_and_lines(surface)[1]]
+        return lines + [_tube(guide, 0.0)[0] for guide in self.guides]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
         """Add what draws it."""
+        for k, guide in enumerate(self.guides):
+            tubes = _tube(guide, _CORE), _tube(guide, guide.strongest)
+            draw_guide(meshcat, f"guides/{k}", *tubes)
         shapes: list[tuple[np.ndarray, list[np.ndarray]]] = []
         placements, firsts = {}, []
         for fixture in self.fixtures:
@@ -153,6 +164,17 @@ class SpaceDrawing:
             RegionVisualizer(shapes, placements, size, meshcat, period, numbers),
         )
         return drawing.GetInputPort("manifold_point")
+
+
+def _tube(guide: Guide, radius: float) -> np.ndarray:
+    """Return points at a radius [m] round a guide [m], shape (around, along, 3)."""
+    curve = guide.path.position
+    theta = np.linspace(*curve.domain, _TUBE_POINTS)
+    line = curve.derivatives(theta, 0)[:, 0]
+    angle = np.linspace(0.0, 2.0 * np.pi, _AROUND)[:, None, None]
+    e_perp, e_cross = guide.path.frame.normals(theta)
+    across = np.cos(angle) * e_perp + np.sin(angle) * e_cross
+    return line + radius * across
 
 
 # to who looks at the regions from their side with the robot to the left, and that one's right

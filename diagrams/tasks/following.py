@@ -36,7 +36,7 @@ from pfsc_drake.systems.following_controller import FollowingController
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 
 # what guidance tells, for the log
-_GUIDANCE = {"guidance": "record", "mode": "mode"}
+_GUIDANCE = {"guidance": "record", "mode": "mode", "guides": "guides"}
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,8 @@ def add_law(
     if desired is None:
         guidance = _add_guidance(builder, following, signals)
         desired = guidance.GetOutputPort("reference")
-        made |= {name: guidance.GetOutputPort(port) for name, port in _GUIDANCE.items()}
+        told = {name: port for name, port in _GUIDANCE.items() if guidance.HasOutputPort(port)}
+        made |= {name: guidance.GetOutputPort(port) for name, port in told.items()}
     task, transition = following.task, options.transition
     allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
     steady = transition == 0.0 or not law.linearization.manifold.follows_time

@@ -10,6 +10,7 @@ from diagrams.scenario.checks import require
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.drawing import SpaceDrawing
 from diagrams.tasks.fixtures import make_fixtures
+from diagrams.tasks.guides import make_guides
 from diagrams.tasks.manifold_warnings import euler_warnings
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
 from diagrams.tasks.task import StartPoint, Task
@@ -37,6 +38,7 @@ class SpaceTask(Task):
 
     Attributes:
         fixtures: The regions.
+        guides: Paths that attract the tool, by name.
         guided: All that it is led through.
 
     Raises:
@@ -68,8 +70,11 @@ class SpaceTask(Task):
         require(duration > 0.0, "duration", duration, "a positive number [s]")
         self.motion = PiecewisePolynomialCurve([0.0, duration], self._start[None, None])
         self.fixtures, self.warnings = make_fixtures(parameters, self._start, folder, progress)
+        self.guides = make_guides(parameters, folder, progress)
         speeds = [fixture.largest_speed(self._start) for fixture in self.fixtures]
-        self.guided = Guided(self.place, self.fixtures, speeds, motion, lead, parameters)
+        self.guided = Guided(
+            self.place, self.fixtures, speeds, motion, lead, parameters, [*self.guides.values()]
+        )
         if self.place.is_oriented:
             R_d = self.place.orientation(self.place.point(given)[None])
             self.warnings += euler_warnings(
@@ -92,7 +97,7 @@ class SpaceTask(Task):
     @property
     def drawing(self) -> SpaceDrawing:
         """How the manifold is drawn."""
-        return SpaceDrawing(self.fixtures, self.place)
+        return SpaceDrawing(self.fixtures, self.place, [*self.guides.values()])
 
     def start(self, shift: np.ndarray) -> StartPoint:
         """Return where the tool starts."""

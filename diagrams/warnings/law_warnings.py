@@ -1,19 +1,16 @@
 """What is said beforehand of a law, its robot and its guidance."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
 
 from diagrams.scenario import ComplianceParameters, ControllerParameters
-from diagrams.scenario.fixtures import RegionParameters
 from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_inertia_error,
     bearable_mass_error,
 )
-from pfsc_drake.control.fixtures.lead import ServoLead
-from pfsc_drake.control.fixtures.parameters import bearable_stiffness
 from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
@@ -21,7 +18,6 @@ from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.robot_model import RobotModel, joint_resonances
 from pfsc_drake.yaml.typed import spread
@@ -274,25 +270,3 @@ def _most(profile: Profile) -> float:
 
 # names of the values of the logged signal ``mode``
 MODES = tuple(mode.name.lower() for mode in Mode)
-
-
-def stiff_regions(regions: Sequence[RegionParameters], guided: Guided) -> list[str]:
-    """Return which soft regions may ring behind servos, one sentence each.
-
-    Args:
-        regions: What the regions are.
-        guided: All that the tool is led through.
-    """
-    motion, lead = guided.motion, guided.lead
-    if not isinstance(lead, ServoLead):
-        return []
-    lag = lead.lag
-    most = bearable_stiffness(motion, lag)
-    return [
-        f"fixtures.regions[{number}].stiffness = {region.stiffness:g} N/m: compliance.tangential "
-        f"with {motion.damping:g} N s/m bears {most:.2g} N/m where servos and bus, "
-        f"{1e3 * lag:.2g} ms, are later than believed by a fifth or a tick; a stiffer region may "
-        "ring: make it softer or hard, or the damping larger"
-        for number, region in enumerate(regions)
-        if region.stiffness is not None and region.stiffness > most
-    ]

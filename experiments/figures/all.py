@@ -41,6 +41,7 @@ from experiments.figures.guidance import (
     has_regions,
     held_by_robot,
 )
+from experiments.figures.guides import draw_guides
 from experiments.figures.links import draw_found_links
 from experiments.figures.mounting import draw_mounting, draw_use_case
 from experiments.figures.obstacles import draw_obstacles
@@ -124,6 +125,7 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "fastest": (draw_fastest, _always),
     "obstacles": (draw_obstacles, _always),
     "guidance": (draw_guidance, has_regions),
+    "guides": (draw_guides, _always),
     "contact": (draw_contact, has_contact),
     "energy": (draw_energy, gives_energy),
     "teleoperation": (draw_teleoperation, _always),

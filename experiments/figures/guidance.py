@@ -131,6 +131,8 @@ def _along(y_t: FloatArray, n: FloatArray) -> FloatArray:
 
 def gives_energy(log: RunLog) -> bool:
     """Whether regions moved or gave way, so that energy went back and forth."""
+    if "guide" in log:
+        return True
     if not has_regions(log):
         return False
     slots = log["near_regions"].values
@@ -146,7 +148,12 @@ def draw_energy(log: RunLog) -> Drawing:
     """Tank, springs, what the hand has given, and the pace of moving regions."""
     canvas, (stored, given, pace) = make_panels(3)
     stored.plot(log.time, log["tank"].values[:, 0], color=COLOURS[0], label="tank $x$")
-    stored.plot(log.time, log["spring_energy"].values[:, 0], color=COLOURS[1], label="springs $V$")
+    stored.plot(
+        log.time,
+        log["spring_energy"].values[:, 0],
+        color=COLOURS[1],
+        label="springs and guides $V$" if "guide" in log else "springs $V$",
+    )
     stored.set(title="Energy that is stored", ylabel="energy in J")
     period = float(np.median(np.diff(log.time)))
     power = np.sum(log["guiding_force"].values * log["velocity_command"].values, axis=1)

@@ -6,7 +6,9 @@ import numpy as np
 
 from diagrams.live_view import felt_force
 from diagrams.station import Station
+from diagrams.tasks.space_guidance import SpaceTask
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
+from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.manifolds.coordinate import Kind
@@ -40,8 +42,8 @@ class LiveStatus:
         factor: Simulated over real time.
         mode: Which mode the law is in, if it has several.
         limit: Which limit of the robot itself holds the hand, if one does.
-        deviation: Transversal coordinates, by name [m]; in space the distance from the nearest
-            region, if one is near.
+        deviation: Transversal coordinates, by name [m]; in space the distance from the path that
+            pulls, by its name, or from the nearest region, if one is near.
         progress: Tangential coordinates, by name [m].
         angles: Rotational coordinates, by name [rad].
         force: On the tool, or what a hand feels that is far away, world axes [N].
@@ -118,6 +120,8 @@ class LiveStatus:
             self.tank = float(signals["tank"][0])
         if "guidance" in signals:
             self._observe_guidance(signals["guidance"])
+        if "guides" in signals:
+            self._observe_guides(station, signals["guides"])
         self._observe_limit(station, signals)
         self.ready = "tared" not in signals or bool(signals["tared"][0] > 0.5)
         if "mode" in signals:
@@ -137,6 +141,15 @@ class LiveStatus:
         distances = near[is_region, SLOT.index("h")]
         if distances.size:
             self.deviation = {"nearest region": float(distances.min())}
+
+    def _observe_guides(self, station: Station, row: np.ndarray) -> None:
+        """Take over which of several paths pulls the tool, see :class:`GuideRecord`."""
+        assert isinstance(station.task, SpaceTask)
+        names = list(station.task.guides)
+        fields, active = GuideRecord(len(names)).fields, row[0]
+        if active >= 0.0:
+            distances = row[fields["distance"]]
+            self.deviation = {names[int(active)]: float(distances[int(active)])}
 
     def _observe_limit(self, station: Station, signals: dict[str, np.ndarray]) -> None:
         """Take over what of the robot itself holds the hand."""

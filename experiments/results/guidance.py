@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
+from experiments.results.guides import add_guides
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord, Mode
@@ -63,6 +64,7 @@ def add_guidance(
     log.add("region_distance", distances, labels=names)
     kinds, forces = limit_forces(rows["near"], len(names), station.robot.dimension)
     log.add("limit_force", forces, labels=kinds)
+    add_guides(log, task, raw, y_t)
 
 
 def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str], FloatArray]:

@@ -166,12 +166,14 @@ class GuidanceRules:
         damping: d [N s/m]; None where a person may change it, so that the log's counts.
         largest_speed: Largest speed of the free motion [m/s]; the log tells where it was lower.
         capacity: Capacity of the tank [J].
+        guides: Stiffness [N/m] and reach [m] of each path that attracts.
     """
 
     mass: float
     damping: float | None
     largest_speed: float
     capacity: float
+    guides: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -224,11 +226,12 @@ def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
     if promise.damping is not None:
         d = np.full(count, promise.damping)
     limit = np.minimum(log["speed_limit"].values[:count, 0], promise.largest_speed)
-    momentum = promise.mass * before + T * f
+    pulled = _guided(log, promise, count, T)
+    momentum = promise.mass * before + T * (f + pulled.kappa[:, None] * pulled.way)
     # a limit of speed is damping
     slowed = np.linalg.norm(momentum, axis=1) / np.maximum(limit, 1e-6)
-    inertia = np.maximum(promise.mass + T * d, slowed)
-    d = (inertia - promise.mass) / T
+    inertia = np.maximum(promise.mass + T * d + T**2 * pulled.kappa, slowed)
+    d = (inertia - promise.mass) / T - T * pulled.kappa
     held = T * np.sum((slots.used * slots.phi)[..., None] * slots.n, axis=1)
     missed = v - (momentum + held) / inertia[:, None]
     metrics.add("audit_stationarity", float(np.max(np.linalg.norm(missed, axis=1))))
@@ -242,17 +245,50 @@ def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
     )
     pressed = np.divide(slots.phi, slots.stiffness, out=np.zeros_like(slots.phi), where=slots.soft)
     after = np.sum(np.where(slots.soft, slots.stiffness * pressed**2, 0.0), axis=1) / 2
+    spring, after = spring + pulled.energy, after + pulled.energy_after
     kinetic = promise.mass / 2 * np.sum(v * v - before * before, axis=1)
     metrics.add("audit_energy", float(np.max(kinetic + after - spring - (work - lost + given))))
     tank = log["tank"].values[:count, 0]
     # what springs gain between ticks
-    paid = spring - np.concatenate([[0.0], after[:-1]])
+    paid = spring - np.concatenate([[pulled.energy[0]], after[:-1]])
     expected = np.minimum(promise.capacity, tank[:-1] - given[:-1] + lost[:-1] - paid[:-1])
     metrics.add("audit_tank", float(np.max(np.abs(expected - tank[1:]), initial=0.0)))
     bound = -(tank[0] + spring[0])
     metrics.add("audit_bound", float(np.min(np.cumsum(work)) - bound))
     metrics.add("audit_missed", float(_missed(log, slots, count)))
     return metrics
+
+
+@dataclass(frozen=True)
+class _Pulled:
+    """What guides do at each tick, from where the tool is pulled to and their numbers."""
+
+    kappa: FloatArray
+    way: FloatArray
+    energy: FloatArray
+    energy_after: FloatArray
+
+
+def _guided(log: RunLog, promise: GuidanceRules, count: int, period: float) -> _Pulled:
+    """Return what guides do [N/m, m, J], by their law."""
+    none = np.zeros(count)
+    if not promise.guides:
+        return _Pulled(none, np.zeros((count, 3)), none, none)
+    active = log["guide"].values[:count, 0]
+    share = log["guide_share"].values[:count, 0]
+    k, R = np.array([(0.0, 1.0), *promise.guides])[active].T
+    top = max(stiffness * reach**2 / 6.0 for stiffness, reach in promise.guides)
+    foot, z = (log[name].values[:count] for name in ("guide_foot", "rest_point"))
+    after = z + period * log["velocity_command"].values[:count]
+
+    def inside(point: FloatArray) -> FloatArray:
+        return np.maximum(1.0 - np.sum((point - foot) ** 2, axis=1) / R**2, 0.0)
+
+    def energy(point: FloatArray) -> FloatArray:
+        return np.asarray(share * (top - k * R**2 / 6.0 * inside(point) ** 3))
+
+    kappa = np.asarray(share * k * inside(z) ** 2)
+    return _Pulled(kappa, foot - z, energy(z), energy(after))
 
 
 def _read(values: FloatArray) -> _Slots:

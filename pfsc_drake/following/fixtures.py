@@ -9,6 +9,7 @@ from pfsc_drake.control.compliance.impedance_parameters import Profile
 from pfsc_drake.control.compliance.tuned_impedance import REQUESTS, requests_of
 from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
+from pfsc_drake.control.fixtures.guides import GuidePaths
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.near_regions import ScheduledRegions, near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance
@@ -98,7 +99,10 @@ def add_fixture_guidance(
         builder.Connect(system.GetOutputPort("place"), near.GetInputPort("place"))
         builder.Connect(near.GetOutputPort("near"), system.GetInputPort("near"))
         if "regions_on" in ports:
-            builder.Connect(ports["regions_on"], near.GetInputPort("active"))
+            of_regions = np.eye(count, guidance.tool.num_switches)
+            only = builder.AddNamedSystem("regions_on", BlockSystem(Linear(of_regions), period))
+            builder.Connect(ports["regions_on"], only.GetInputPort("vector"))
+            builder.Connect(only.GetOutputPort("product"), near.GetInputPort("active"))
     wrench, ready = force_ports(compliance, ports)
     builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
     builder.Connect(wrench, system.GetInputPort("wrench"))
@@ -138,12 +142,18 @@ def make_guidance(
         near_expression(guided),
         order,
         len(guided.place.coordinates),
+        GuidePaths(guided.guides, guided.motion.period) if guided.guides else None,
     )
     if parameters.rules == "printed":
         if not isinstance(guided.lead, ServoLead):
             raise InputError(
                 "fixtures.guidance.rules = printed: controller.law must be velocity_servo, as in "
                 "Sec. 5.2.4"
+            )
+        if tool.guides is not None:
+            raise InputError(
+                f"fixtures.guidance.rules = printed: {len(tool.guides)} guides given; must be "
+                "program, which alone knows of paths that attract"
             )
         return PrintedGuidance(tool, parameters.printed)
     stiffness = [fixture.stiffness for fixture in guided.fixtures]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
+from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.manifold import Manifold, Projector
@@ -29,6 +30,7 @@ class Guided:
         motion: The free motion.
         lead: What is between the velocity that is asked for and the tool.
         options: What else is chosen.
+        guides: Paths that attract it.
     """
 
     place: SpaceManifold
@@ -37,6 +39,7 @@ class Guided:
     motion: Admittance
     lead: Lead
     options: FixtureOptions
+    guides: Sequence[Guide] = ()
 
 
 @dataclass(frozen=True)

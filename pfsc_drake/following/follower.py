@@ -208,7 +208,10 @@ class Follower(Diagram):
         builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
         builder.ExportOutput(drive, controller.drive_port)
         builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
-        for name in ("reference", "manifold_force", "limit_force", "mode", "record", "stream"):
+        for name in (
+            *("reference", "manifold_force", "limit_force"),
+            *("mode", "record", "guides", "stream"),
+        ):
             if name in made:
                 builder.ExportOutput(made[name], name)
         builder.ExportOutput(ports["manifold_point"], "manifold_point")
@@ -273,7 +276,8 @@ class Follower(Diagram):
                 signals,
                 self.start_posture,
             )
-            told = {name: guidance.GetOutputPort(name) for name in ("mode", "record")}
+            names = [name for name in ("mode", "record", "guides") if guidance.HasOutputPort(name)]
+            told = {name: guidance.GetOutputPort(name) for name in names}
             return guidance.GetOutputPort("reference"), told
         m, motion, stream = linearization.num_outputs, followed.motion, options.stream
         block: TimedReference | StreamedReference

@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.checks import require_not_negative
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
+from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.parameters import Fixture
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import Projector
@@ -72,6 +73,7 @@ def add_guidance(
     regions: Sequence[Region | MovingRegion | Fixture] = (),
     law: str = "elastic",
     *,
+    guides: Sequence[Guide] = (),
     start: RigidTransform | None = None,
     oriented: bool = True,
     options: GuidanceOptions | None = None,
@@ -93,6 +95,8 @@ def add_guidance(
         regions: Where the tool point may be, each at rest or moving; hard, or as a
             :class:`~pfsc_drake.Fixture` with a stiffness.
         law: Which law follows, with its gains.
+        guides: Paths that attract the tool, see :class:`~pfsc_drake.Guide`: it follows the one that
+            the hand brings it to, until the hand pulls it away.
         start: Where the tool is at the start, in the world; where ``options.posture`` has it if
             omitted.
         oriented: Whether it keeps the orientation that it has at the start; False for robots of
@@ -126,7 +130,7 @@ def add_guidance(
             delay=chosen.servo_delay,
         )
         speeds = [fixture.largest_speed(y_t) for fixture in fixtures]
-        guided = Guided(place, fixtures, speeds, motion, lead, chosen.fixtures)
+        guided = Guided(place, fixtures, speeds, motion, lead, chosen.fixtures, guides)
         target = ToolTarget(y_t, R_e if oriented else None)
         return Followed(
             place, Projector(place), None, target, place.point(y_t.tolist()), guided=guided

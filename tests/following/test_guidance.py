@@ -9,12 +9,22 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from pfsc_drake import Fixture, FollowerOptions, GuidanceOptions, SphereRegion, add_guidance
+from pfsc_drake import (
+    Fixture,
+    FollowerOptions,
+    GuidanceOptions,
+    Guide,
+    Path,
+    SphereRegion,
+    add_guidance,
+)
+from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.guidance import _told
+from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.regions.moving import CurveCourse, ShiftedRegion
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.robot.models.files import models_directory
@@ -33,12 +43,12 @@ def load(builder, name="comau_racer_1_4"):
     return plant
 
 
-def led(regions, law="rigid", model="comau_racer_1_4", options=None, start=START):
+def led(regions, law="rigid", model="comau_racer_1_4", options=None, start=START, guides=()):
     """Return a led tool at the start."""
     builder = DiagramBuilder()
     plant = load(builder, model)
     follower = add_guidance(
-        builder, plant, "tool_point", regions, law, start=start, options=options
+        builder, plant, "tool_point", regions, law, guides=guides, start=start, options=options
     )
     return Pulled(builder, plant, follower)
 
@@ -110,6 +120,27 @@ def test_a_region_that_rises_lifts_the_tool():
     assert tool.fault() == Fault.NONE
     assert -6e-5 < lowest < 0.0  # what the law misses of the reference
     assert tool.pose().translation()[2] == pytest.approx(0.815, abs=1e-4)
+
+
+def test_a_path_attracts_the_tool_until_the_hand_pulls_it_away():
+    """Beside it the hand's 8 N are the spring's; along it they are the admittance's."""
+    p, aside = START.translation(), np.array([0.0, 0.3, 0.0])
+    line = Path(PiecewisePolynomialCurve.line(p - aside, p + aside))
+    guide = Guide(line, stiffness=3e3, reach=0.05)
+    tool = led([], guides=[guide])
+    tool.pull([0.0, 4.0, 8.0])
+    tool.run(0.6)
+    assert tool.fault() == Fault.NONE
+    fields, told = GuideRecord(1).fields, tool.read("guides")
+    assert told[fields["active"]][0] == 0.0
+    moved = tool.pose().translation() - p
+    d = moved[2]
+    assert 3e3 * d * (1.0 - d**2 / 0.05**2) ** 2 == pytest.approx(8.0, rel=0.02)
+    assert moved[1] > 0.01 and abs(moved[0]) < 2e-4
+    assert told[fields["eta"]][0] == pytest.approx(0.3 + moved[1], abs=2e-3)
+    tool.pull([0.0, 0.0, 1.8 * guide.largest_force])
+    tool.run(0.9)
+    assert tool.read("guides")[fields["active"]][0] == -1.0
 
 
 def test_without_the_hands_force_told_the_law_lets_it_push_the_tool():

@@ -83,6 +83,7 @@ class PathVisualizer(LineVisualizer):
 
 
 _SKIN = Rgba(0.45, 0.65, 0.95, 0.35)
+_CORE, _TUBE = Rgba(0.85, 0.35, 0.05), Rgba(0.95, 0.65, 0.2, 0.2)
 
 
 class SurfaceVisualizer(LeafSystem):
@@ -147,6 +148,21 @@ def draw_surface(
     meshcat.SetTriangleMesh(f"{root}/skin", vertices.T, both.T, _SKIN)
     for i, line in enumerate(lines):
         meshcat.SetLine(f"{root}/line_{i}", line.T, 1.0, _LINE)
+
+
+def draw_guide(meshcat: Meshcat, root: str, core: np.ndarray, tube: np.ndarray) -> None:
+    """Draw a path that attracts, and a tube round it that one can see through.
+
+    Args:
+        meshcat: Where to draw.
+        root: Meshcat path of what is drawn.
+        core: Points of a thin tube, the path itself, on a grid [m], shape (rows, columns, 3).
+        tube: Points of a wide one [m], likewise.
+    """
+    for name, grid, colour in (("path", core, _CORE), ("tube", tube, _TUBE)):
+        vertices, faces = _triangles(grid)
+        both = np.vstack([faces, faces[:, ::-1]])
+        meshcat.SetTriangleMesh(f"{root}/{name}", vertices.T, both.T, colour)
 
 
 def _triangles(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.simulation import OperatorParameters
 from diagrams.station_parts import make_task
 from diagrams.surroundings.operator import controls_text, idle_controls
-from diagrams.warnings.law_warnings import stiff_regions
+from diagrams.warnings.fixtures import stiff_fixtures
 from experiments.scenario_file import find_scenario
 from pfsc_drake.yaml.typed import load_file
 
@@ -36,7 +36,7 @@ def test_a_soft_region_that_is_stiffer_than_the_damping_bears(wedge):
     settings, folder = copy.deepcopy(wedge[0]), wedge[1]
 
     def warnings() -> list[str]:
-        return stiff_regions(settings.fixtures.regions, make_task(settings, folder).guided)
+        return stiff_fixtures(settings.fixtures, make_task(settings, folder).guided)
 
     assert warnings() == []
     settings.fixtures.regions[1].stiffness = 3e3

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from diagrams.station import Station
+from diagrams.tasks.space_guidance import SpaceTask
 from experiments.live.status import LiveStatus
+from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
@@ -76,6 +78,21 @@ def test_in_space_it_tells_the_nearest_region_and_what_leads():
     row[record.fields["near"]] = slots.ravel()
     status.observe(station, signals)
     assert status.deviation == {}
+
+
+def test_among_several_paths_it_tells_the_one_that_pulls():
+    task = object.__new__(SpaceTask)
+    task.guides = {"circle_1": None, "line_2": None}
+    station = SimpleNamespace(law=STATION.law, task=task)
+    record = GuideRecord(2)
+    row = np.zeros(record.size)
+    row[record.fields["active"]], row[record.fields["distance"]] = 1.0, [0.03, 0.01]
+    status = LiveStatus("mine")
+    for active, told in ((1.0, {"line_2": 0.01}), (-1.0, {"xi_1": 0.001, "xi_2": -0.002})):
+        row[record.fields["active"]] = active
+        signals = {"law": SIGNALS["law"], "wrench_ext": np.zeros(6), "guides": row}
+        status.observe(station, signals)
+        assert status.deviation == told
 
 
 def chain_at_its_end():
