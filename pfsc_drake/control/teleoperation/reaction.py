@@ -6,6 +6,7 @@ import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
@@ -15,23 +16,27 @@ class FixtureReaction(Block):
 
     Ports:
         record (input): Of the guidance, see :class:`GuidanceRecord`.
+        guides (input): Only with guides: their record, see :class:`GuideRecord`.
         wrench (input, optional): Of the surroundings on the tool as measured, shape (6,) [N, Nm].
         position (output): ``z`` [m], shape (3,), the last one that was finite.
-        felt (output): ``f + sum phi_i n_i`` [N], shape (3,).
+        felt (output): ``f + sum phi_i n_i``, and the pull of a guide [N], shape (3,).
 
     State:
         last: ``z`` [m].
 
     Args:
         num_regions: M.
+        num_guides: K.
     """
 
-    def __init__(self, num_regions: int) -> None:
-        self._record = GuidanceRecord(num_regions)
+    def __init__(self, num_regions: int, num_guides: int = 0) -> None:
+        self._record, self._guides = GuidanceRecord(num_regions), GuideRecord(num_guides).fields
         self.inputs = {
             "record": Port(self._record.size),
             "wrench": Port(6, "N, Nm", optional=True),
         }
+        if num_guides:
+            self.inputs["guides"] = Port(GuideRecord(num_guides).size)
         self.outputs = {"position": Port(3, "m"), "felt": Port(3, "N")}
         self.states = {"last": 3}
 
@@ -41,6 +46,9 @@ class FixtureReaction(Block):
         slots = ca.reshape(near, len(SLOT), -1).T
         n = slots[:, SLOT.index("n_x") : SLOT.index("n_z") + 1]
         felt = n.T @ slots[:, SLOT.index("phi")]
+        if "guides" in self.inputs:
+            foot, kappa = (u.guides[self._guides[name]] for name in ("foot", "kappa"))
+            felt += kappa * (foot - z)
         if u.wrench is not None:
             felt += u.wrench[:3]
         known = all_finite(z, felt)
