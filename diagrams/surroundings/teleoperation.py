@@ -68,11 +68,13 @@ class LedFromAfar:
             task: What the tool is to do.
             robot: The robot as it is believed.
             lag: Between what is asked of the tool and where it is [s].
-            ports: ``wrench_measured``, ``joint_state`` as measured; within regions ``guidance``.
+            ports: ``wrench_measured``, ``joint_state`` as measured; within regions ``guidance``,
+                and among paths that attract ``guides``.
         """
         if isinstance(task, SpaceTask):
-            seen: Block = FixtureReaction(len(task.fixtures), self.axes)
+            seen: Block = FixtureReaction(len(task.fixtures), self.axes, len(task.guides))
             source = {"record": ports["guidance"]}
+            source |= {"guides": ports["guides"]} if task.guides else {}
         else:
             seen, source = LedPoint(robot, lag, self.axes), {"joint_state": ports["joint_state"]}
         system = builder.AddNamedSystem("follower_view", BlockSystem(seen, self.period))

@@ -7,6 +7,7 @@ import casadi as ca
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.blocks.rotations import matrix_of, rotation_of, rows_of
+from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
@@ -16,9 +17,11 @@ class FixtureReaction(Block):
 
     Ports:
         record (input): Of the guidance, see :class:`GuidanceRecord`.
+        guides (input): Only with guides: their record, see :class:`GuideRecord`.
         wrench (input, optional): Of the surroundings on the tool as measured, shape (6,) [N, Nm].
         position (output): ``z`` [m], shape (3,), the last one that was finite.
-        felt (output): ``f + sum phi_i n_i``, and with six axes the moment, shape (axes,) [N, Nm].
+        felt (output): ``f + sum phi_i n_i`` and the pull of a guide, and with six axes the moment,
+            shape (axes,) [N, Nm].
 
     State:
         last: ``z`` [m].
@@ -26,14 +29,18 @@ class FixtureReaction(Block):
     Args:
         num_regions: M.
         axes: 3 or 6.
+        num_guides: K.
     """
 
-    def __init__(self, num_regions: int, axes: int = 3) -> None:
+    def __init__(self, num_regions: int, axes: int = 3, num_guides: int = 0) -> None:
         self._record, self._axes = GuidanceRecord(num_regions), axes
+        self._guides = GuideRecord(num_guides).fields
         self.inputs = {
             "record": Port(self._record.size),
             "wrench": Port(6, "N, Nm", optional=True),
         }
+        if num_guides:
+            self.inputs["guides"] = Port(GuideRecord(num_guides).size)
         self.outputs = {"position": Port(3, "m"), "felt": Port(axes, "N, Nm")}
         self.states = {"last": 3}
 
@@ -44,6 +51,9 @@ class FixtureReaction(Block):
         n = slots[:, SLOT.index("n_x") : SLOT.index("n_z") + 1]
         felt = n.T @ slots[:, SLOT.index("phi")]
         moment = ca.DM.zeros(3)
+        if "guides" in self.inputs:
+            foot, kappa = (u.guides[self._guides[name]] for name in ("foot", "kappa"))
+            felt += kappa * (foot - z)
         if u.wrench is not None:
             felt, moment = felt + u.wrench[:3], u.wrench[3:]
         felt = ca.vertcat(felt, moment)[: self._axes]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.teleoperation.reaction import FixtureReaction, LedPoint
@@ -28,6 +29,17 @@ def test_regions_and_surroundings_are_felt_together():
     row = stepper.step(record=record([0.1, 0.2, 0.3], slots), wrench=[1, 0, -2, 9, 9, 9])
     np.testing.assert_allclose(row["felt"], [1 + 3.0, 4.0, 5.0], atol=1e-12)
     np.testing.assert_allclose(row["position"], [0.1, 0.2, 0.3])
+
+
+def test_a_path_that_pulls_is_felt():
+    """2 kN/m, 3 mm beside it."""
+    layout = GuideRecord(3)
+    guides = np.zeros(layout.size)
+    guides[layout.fields["kappa"]], guides[layout.fields["foot"]] = 2e3, [0.1, 0.2, 0.303]
+    row = Stepper(FixtureReaction(2, num_guides=3)).step(
+        record=record([0.1, 0.2, 0.3], []), guides=guides
+    )
+    np.testing.assert_allclose(row["felt"], [0.0, 0.0, 6.0], atol=1e-9)
 
 
 def test_a_place_that_is_not_known_stays_the_last_one():
