@@ -132,7 +132,7 @@ def _picture(rows: Mapping[Case, RunRow]) -> Figure:
         columns = min(2, len(worlds))
         lines = -(-len(worlds) // columns)
         canvas = Canvas(figsize=(1.2 * WIDTH, 0.8 + 2.6 * lines))
-        panels = canvas.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        panels = canvas.subplots(lines, columns, sharex=True, squeeze=False).ravel()
         for panel, world in zip(panels, worlds, strict=False):
             for source, color in zip(sources, COLOURS, strict=False):
                 own = {c[2]: row for c, row in rows.items() if c[:2] == (world, source)}
