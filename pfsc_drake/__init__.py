@@ -26,6 +26,7 @@ __version__ = "0.1.0"
 
 # what users import, and the modules that are loaded when they do
 _DOOR = {
+    "Capsule": "pfsc_drake.control.obstacles.shapes",
     "ComplianceParameters": "pfsc_drake.following.options.compliance",
     "ControllerParameters": "pfsc_drake.following.options.controller",
     "CoordinateImpedance": "pfsc_drake.control.compliance.impedance_parameters",
@@ -38,11 +39,14 @@ _DOOR = {
     "GuidanceOptions": "pfsc_drake.following.guidance",
     "HalfSpace": "pfsc_drake.geometry.regions.shapes",
     "LawGains": "pfsc_drake.following.options.controller",
+    "ObstacleOptions": "pfsc_drake.following.options.follower",
+    "ObstacleShape": "pfsc_drake.control.obstacles.shapes",
     "Path": "pfsc_drake.geometry",
     "Profile": "pfsc_drake.control.compliance.impedance_parameters",
     "SphereRegion": "pfsc_drake.geometry.regions.shapes",
     "StreamLimits": "pfsc_drake.control.law.timed_reference",
     "StreamParameters": "pfsc_drake.control.streams.parameters",
+    "WatchParameters": "pfsc_drake.control.obstacles.parameters",
     "WaypointSender": "pfsc_drake.control.streams.messages",
     "WaypointTable": "pfsc_drake.geometry",
     "add_guidance": "pfsc_drake.following.guidance",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pfsc_drake.control.obstacles.clearance import ObstacleShape
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
 
 
 @dataclass(frozen=True)

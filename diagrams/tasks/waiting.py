@@ -15,20 +15,14 @@ from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.waiting_reference import WaitingReference
 from pfsc_drake.control.obstacles.elbow_room import ElbowRoom
-from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
+from pfsc_drake.control.obstacles.obstacle_watch import ArmAhead
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.control.planning.course import CourseStart
-from pfsc_drake.control.planning.stopping import stopping_bandwidth
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.waiting import COURSE_STEP, JointCourse, add_waiting, waiting_motion
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.outline import arm_outline, outline_points
 from pfsc_drake.systems.block_system import BlockSystem
-
-# s, from sample to sample of a course on which stops begin
-_CHECKED = 4e-3
-# of the planned pace, the most that may count as rest
-_MOST_REST = 0.2
 
 
 @dataclass(frozen=True)
@@ -83,30 +77,14 @@ def plan_waiting(
     watch = crossing.watch
     planner = DrivePlanner(reference, controller, 0.0, task, law, start, friction)
     try:
-        step, course = planner.course(_CHECKED)
+        step, course = planner.course(COURSE_STEP)
     except InputError as error:
         raise InputError(f"obstacles: the course of the reference is {error}") from None
-    order = law.linearization.relative_degree
     allowed_demand = planner.allowed(course, watch.reserve)
-    bandwidth = stopping_bandwidth(planner.demand, course, step, allowed_demand, order)
-    speed = float(np.abs(task.motion.derivatives(step * np.arange(len(course)), 1)[:, 1]).max())
-    resting = min(watch.resting_speed / speed, _MOST_REST)
-    return Waiting(
-        crossing,
-        _ahead(chain, watch.arm_radius, course[:, 0], step, watch.horizon / STEPS),
-        WaitingPace(order, bandwidth, resting),
-    )
-
-
-def _ahead(chain: SerialChain, radius: float, q: np.ndarray, fine: float, step: float) -> ArmAhead:
-    """Return where the arm will be, at steps of the horizon's length over their number [s]."""
-    end = fine * (len(q) - 1)
-    times = step * np.arange(int(np.ceil(end / step)) + 1)
-    known = fine * np.arange(len(q))
-    joints = np.array([np.interp(times, known, column) for column in q.T])
-    outline = arm_outline(chain, radius)
-    points = outline_points(chain, outline).map(len(times))(joints).full().T
-    return ArmAhead(chain, outline, 0.0, step, points)
+    joints = JointCourse(step, course, planner.demand, allowed_demand)
+    order = law.linearization.relative_degree
+    ahead, pace = waiting_motion(chain, watch, task.motion, order, joints)
+    return Waiting(crossing, ahead, pace)
 
 
 def add_waiting_reference(
@@ -132,14 +110,18 @@ def add_waiting_reference(
         ``posture_torque``.
     """
     timed = WaitingReference(task.motion, waiting.pace, outputs, period)
-    generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
     shapes = [obstacle.shape for obstacle in waiting.crossing.moving]
-    block = ObstacleWatch(waiting.ahead, shapes, waiting.crossing.watch, waiting.pace, period)
-    watch = builder.AddNamedSystem("obstacle_watch", BlockSystem(block, period))
-    builder.Connect(generator.GetOutputPort("clock"), watch.GetInputPort("clock"))
-    builder.Connect(ports["joint_state"], watch.GetInputPort("joint_state"))
+    generator, watch = add_waiting(
+        builder,
+        timed,
+        waiting.ahead,
+        shapes,
+        waiting.crossing.watch,
+        waiting.pace,
+        period,
+        ports["joint_state"],
+    )
     builder.Connect(ports["obstacles_measured"], watch.GetInputPort("obstacles"))
-    builder.Connect(watch.GetOutputPort("override"), generator.GetInputPort("override"))
     made = {}
     if waiting.crossing.elbow is not None:
         ahead, age = waiting.ahead, waiting.crossing.watch.latency

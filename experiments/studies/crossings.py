@@ -16,6 +16,7 @@ from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import COMPLETED, RunRow
+from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.physics.moving_obstacle import ObstacleParameters, Stride
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import open_results
@@ -31,8 +32,8 @@ _DESCRIPTION = (
     "while; they walk when the run begins. Robot, model errors, friction, encoders, noise and "
     "delay of the obstacle's sensor are those of the scenario; the seed of the sensor is another "
     "one each time. Left out are only those who would walk into the arm where it stands at the "
-    "start, and those who would run. Distances are the true ones, between the surfaces of person "
-    "and arm."
+    "start, who would run, or whose changes of speed are hastier than is reckoned with. Distances "
+    "are the true ones, between the surfaces of person and arm."
 )
 # of what is random: place on the path [m], direction [deg], speed [m/s], when [s]
 _PLACES, _DIRECTIONS, _SPEEDS, _TIMES = (-0.2, 0.6), (35.0, 80.0), (0.4, 1.4), (0.8, 3.4)
@@ -45,20 +46,19 @@ _CHANGES = (0.75, 1.15)
 # least distance from the arm at the start [m], and where that is in the plane
 _FREE = 0.3
 _START = np.array([[0.1, -0.11], [0.8, -0.7]])
-# s; and since when they walk
-_DURATION, _BEGIN = 6.0, -0.2
+# s; since when they walk; and how long they stand in the end
+_DURATION, _BEGIN, _STOOD = 6.0, -0.2, 1.0
 
 
 def random_way(
-    rng: np.random.Generator, radius: float, arm: float, largest_speed: float
+    rng: np.random.Generator, radius: float, watch: WatchParameters
 ) -> list[dict[str, Any]]:
     """Return a way across the path that does not come near the arm at the start.
 
     Args:
         rng: Source of random numbers.
         radius: Of the person [m].
-        arm: Radius of the arm [m].
-        largest_speed: That nobody exceeds [m/s].
+        watch: What nobody exceeds, and the radius of the arm.
 
     Returns:
         Places as a scenario has them.
@@ -75,11 +75,12 @@ def random_way(
         near = rng.uniform(*_TIMES) - _AROUND / speeds[1] - pauses[0]
         before = _AROUND + max(near - _BEGIN, 0.5) * speeds[0]
         stops = [across + way * ahead for way in (-before, -_AROUND, _AROUND, _AFTER)]
-        if _distance(stops[0], stops[-1], *_START) < radius + arm + _FREE:
+        if _distance(stops[0], stops[-1], *_START) < radius + watch.arm_radius + _FREE:
             continue
         way = _timed(stops, speeds, pauses, near)
         walk = ObstacleParameters(way=[Stride(x["time"], x["position"]) for x in way])
-        if walk.largest_speed <= largest_speed:
+        hastiest = watch.largest_acceleration or np.inf
+        if walk.largest_speed <= watch.largest_speed and walk.largest_acceleration <= hastiest:
             return way
 
 
@@ -95,7 +96,9 @@ def _timed(
         if k in (1, 2) and pauses[k - 1] > 0.0:
             time += pauses[k - 1]
             times.append((time, stop))
-        time += lasts[k] if k < len(lasts) else 0.0
+        time += lasts[k] if k < len(lasts) else _STOOD
+    # he stands where his way ends
+    times.append((time, stops[-1]))
     return [
         {"time": round(float(t), 4), "position": [*(round(float(c), 4) for c in p), 0.0]}
         for t, p in times
@@ -123,9 +126,7 @@ def random_crossings(count: int = COUNT, seed: int = SEED) -> dict[int, Scenario
     scenarios = {}
     for k in range(count):
         data = deepcopy(plain.data)
-        way = random_way(
-            np.random.default_rng((seed, k)), radius, watch.arm_radius, watch.largest_speed
-        )
+        way = random_way(np.random.default_rng((seed, k)), radius, watch)
         data["obstacles"]["moving"][0]["way"] = way
         data["obstacles"].setdefault("sensor", {})["seed"] = k + 1
         scenarios[k] = replace(plain, data=data)

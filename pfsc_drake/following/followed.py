@@ -12,6 +12,7 @@ from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.manifold import Manifold, Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.control.planning.course import Projection
 from pfsc_drake.control.streams.projector import StreamedProjector
 from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.following.streamed_path import StreamedPath
@@ -57,6 +58,7 @@ class Followed:
         length: Length of the path [m], if there is one.
         guided: What a hand leads the tool through, where one leads.
         streamed: The path, where its way points come while the tool moves.
+        projection: Finds the place on a path beforehand.
     """
 
     manifold: Manifold
@@ -68,6 +70,7 @@ class Followed:
     length: float = 0.0
     guided: Guided | None = None
     streamed: StreamedPath | None = None
+    projection: Projection | None = None
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from pfsc_drake.following.options.controller import (
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.prediction import add_prediction
 from pfsc_drake.following.streamed_path import StreamedPath, add_stream
+from pfsc_drake.following.waiting import add_waiting_motion
 from pfsc_drake.geometry.rotation import check_rotation_matrix
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import RobotModel
@@ -41,6 +42,7 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse
 
 Ports = dict[str, OutputPort]
+_TOLD = ("reference", "manifold_force", "limit_force", "mode", "record", "stream", "watch")
 
 
 class Follower(Diagram):
@@ -55,6 +57,8 @@ class Follower(Diagram):
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
         override (input, optional): Pace of the motion, shape (1,); see :class:`TimedReference`.
         goal (input): With ``stream``: arc length of the last way point [m], shape (1,), and
+        obstacles (input): With ``obstacles``: position and velocity of each as measured, shape
+            (6K,) [m, m/s]; what is no number stops the motion.
         speed (input, optional): how fast to go there [m/s]; see :class:`StreamedReference`.
         waypoints (input): On a path of way points that come: a message of the last of them, see
             :func:`~pfsc_drake.add_path_streaming`.
@@ -73,6 +77,7 @@ class Follower(Diagram):
         limit_force (output): Where a hand leads it along a manifold: by what forces the robot's
             limits hold it, see :class:`LedMotion`.
         mode, record (output): Where a hand leads it through space, see :class:`FixtureGuidance`.
+        watch (output): With ``obstacles``: what is seen of them, ``record`` of ObstacleWatch.
         stream (output): On a path of way points that come: what became of them.
         manifold_state (output): Derivatives 0..r-1 of the virtual output by rows, shape (r m,).
         manifold_point (output): Where on the manifold the tool is.
@@ -194,6 +199,8 @@ class Follower(Diagram):
         followed, robot = self.followed, self.robot
         if followed.streamed is not None:
             desired, made = self._streamed(followed.streamed, options, projector)
+        elif options.obstacles is not None:
+            desired, made = self._waiting(chosen.law, options, joint_state)
         else:
             desired, made = self._motion(options, signals)
         motion = followed.motion if options.stream is None else None
@@ -210,7 +217,7 @@ class Follower(Diagram):
         builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
         for name in (
             *("reference", "manifold_force", "limit_force"),
-            *("mode", "record", "guides", "stream"),
+            *("mode", "record", "guides", "stream", "watch"),
         ):
             if name in made:
                 builder.ExportOutput(made[name], name)
@@ -260,6 +267,18 @@ class Follower(Diagram):
         stream = add_stream(builder, path, projector, order, m, self.period)
         builder.ExportInput(stream.waypoints, "waypoints")
         return stream.reference, {"stream": stream.stream}
+
+    def _waiting(
+        self, law: str, options: FollowerOptions, joint_state: OutputPort
+    ) -> tuple[OutputPort, Ports]:
+        """Return the reference that waits for obstacles, and what is told of them."""
+        motion = add_waiting_motion(
+            self._builder, (self.law, law), self.followed, options, self.start_posture, joint_state
+        )
+        self._builder.ExportInput(motion.obstacles, "obstacles")
+        if options.override:
+            self._builder.ExportInput(motion.asked, "override")
+        return motion.reference, {"watch": motion.watch}
 
     def _motion(self, options: FollowerOptions, signals: Ports) -> tuple[OutputPort, Ports]:
         """Return the reference before it yields, and what else is told of it."""

@@ -74,7 +74,14 @@ def add_path_following(
         start = ToolTarget(point[manifold.layout.position][:3], R_e)
         lap = path.length if path.closed else None
         return Followed(
-            manifold, Projector(evaluator), along, start, point, lap=lap, length=path.length
+            manifold,
+            Projector(evaluator),
+            along,
+            start,
+            point,
+            lap=lap,
+            length=path.length,
+            projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
         )
 
     follower = Follower(plant, tool, law, followed, chosen)

@@ -12,13 +12,14 @@ from scipy.interpolate import PchipInterpolator
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.checks import require, require_not_negative, require_numbers, require_positive
-from pfsc_drake.control.obstacles.clearance import ObstacleShape
+from pfsc_drake.control.obstacles.shapes import Capsule, ObstacleShape
 from pfsc_drake.geometry.curves.polynomial import PieceTable
 from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS, noise_at
 
 # of its standard deviation, beyond which noise is cut
 NOISE_CUT = 3.0
 _FARTHEST = 1e3  # m
+_JERK = 1e-6  # m/s, change of velocity at once
 
 
 @dc.dataclass
@@ -41,6 +42,32 @@ class Stride:
 
 
 @dc.dataclass
+class ObstaclePart:
+    """A capsule, or a sphere where both ends are the same.
+
+    Attributes:
+        start: One end of its line, from the obstacle's position on, axes of the world [m].
+        end: The other one [m].
+        radius: [m].
+    """
+
+    start: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    end: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    radius: float = 0.1
+
+    def __post_init__(self) -> None:
+        for key in ("start", "end"):
+            require_numbers(key, getattr(self, key), 3)
+        self.capsule  # noqa: B018, which checks
+
+    @property
+    def capsule(self) -> Capsule:
+        """The capsule."""
+        (a, b, c), (d, e, f) = self.start, self.end
+        return Capsule((a, b, c), (d, e, f), self.radius)
+
+
+@dc.dataclass
 class ObstacleParameters:
     """An obstacle and its way, place to place without overshooting; before and after it stands.
 
@@ -48,19 +75,24 @@ class ObstacleParameters:
     Butland 1984), its velocity continuous in between; where two places are the same it stands.
 
     Attributes:
-        kind: ``sphere``, or ``column`` of all heights, as a person.
-        radius: [m].
+        kind: ``sphere``, ``column`` of all heights, ``person`` who stands on its position, or
+            ``capsules``, see :class:`~pfsc_drake.control.obstacles.shapes.ObstacleShape`.
+        radius: Of all but capsules [m].
+        height: Of a person [m].
+        parts: Of ``capsules``: which.
         way: Places, two or more, their times ascending.
     """
 
     kind: str = "column"
     radius: float = 0.25
+    height: float = 1.75
+    parts: list[ObstaclePart] = dc.field(default_factory=list)
     way: list[Stride] = dc.field(
         default_factory=lambda: [Stride(0.0, [3.0, 0.0, 0.0]), Stride(1.0, [3.0, 0.0, 0.0])]
     )
 
     def __post_init__(self) -> None:
-        self.shape  # noqa: B018, which checks kind and radius
+        self.shape  # noqa: B018, which checks what it looks like
         require(len(self.way) >= 2, "way", f"{len(self.way)} places", "two or more")
         times = [stride.time for stride in self.way]
         ascending = bool(np.all(np.diff(times) > 0.0))
@@ -69,7 +101,8 @@ class ObstacleParameters:
     @property
     def shape(self) -> ObstacleShape:
         """Its shape."""
-        return ObstacleShape(self.kind, self.radius)
+        parts = tuple(part.capsule for part in self.parts)
+        return ObstacleShape(self.kind, self.radius, self.height, parts)
 
     @property
     def curve(self) -> PchipInterpolator:
@@ -85,6 +118,21 @@ class ObstacleParameters:
             [np.linspace(a, b, 50) for a, b in zip(curve.x[:-1], curve.x[1:], strict=True)]
         )
         return float(np.linalg.norm(curve(times, 1), axis=1).max())
+
+    @property
+    def largest_acceleration(self) -> float:
+        """The largest acceleration on its way from time 0 on; infinite where it jerks [m/s^2]."""
+        curve = self.curve
+        ends = curve(curve.x[[0, -1]], 1)
+        begins = curve.x[0] >= 0.0 and np.linalg.norm(ends[0]) > _JERK
+        if begins or (curve.x[-1] >= 0.0 and np.linalg.norm(ends[1]) > _JERK):
+            return math.inf
+        # linear on each piece
+        knots = np.maximum(np.stack([curve.x[:-1], curve.x[1:]]), 0.0)
+        largest = np.linalg.norm(
+            6.0 * curve.c[0] * (knots - curve.x[:-1])[..., None] + 2.0 * curve.c[1], axis=2
+        )
+        return float(largest[:, curve.x[1:] > 0.0].max(initial=0.0))
 
 
 class MovingObstacles(Block):

@@ -43,6 +43,19 @@ def test_it_is_where_it_should_be_and_its_velocity_belongs_to_it():
     assert not states[1301:, 3:].any()
 
 
+def test_its_largest_acceleration_is_that_of_its_velocity():
+    stands = [*WAY, Stride(2.0, WAY[-1].position)]
+    soft = [Stride(-0.5, [-0.2, 0.0, 0.0]), *stands[1:]]
+    obstacle = ObstacleParameters(way=soft)
+    times = np.linspace(0.0, 2.0, 20001)
+    change = np.gradient(obstacle.curve(times, 1), times, axis=0)
+    largest = np.linalg.norm(change, axis=1).max()
+    assert obstacle.largest_acceleration == pytest.approx(largest, rel=2e-3)
+    # who sets off at once, or stops so
+    assert ObstacleParameters(way=stands).largest_acceleration == np.inf
+    assert ObstacleParameters(way=[*soft[:-1]]).largest_acceleration == np.inf
+
+
 def test_its_largest_speed_is_known_beforehand():
     largest = np.linalg.norm(_run()[:, 3:], axis=1).max()
     assert ObstacleParameters(way=WAY).largest_speed == pytest.approx(largest, rel=1e-3)

@@ -19,8 +19,9 @@ class WaitingReference(TimedReference):
     Ports:
         override (input): As there, shape (1,).
         reference (output): As there.
-        clock (output): Own time s, the pace ``z_1``, and where s comes to rest if nothing more is
-            asked for, see :class:`WaitingPace`, shape (3,) [s, 1, s].
+        clock (output): Own time s, the pace ``z_1``, where s comes to rest if nothing more is
+            asked for, and the lags ``z_2`` to ``z_r`` of the pace, see :class:`WaitingPace`, shape
+            (r + 2,) [s, 1, s, 1, ..].
 
     Args:
         eta_p: As there.
@@ -35,7 +36,7 @@ class WaitingReference(TimedReference):
         super().__init__(eta_p, pace.order, num_outputs, period, pace.bandwidth)
         self._waiting = pace
         self.inputs = {"override": Port(1)}
-        self.outputs = {**self.outputs, "clock": Port(3, "s, 1, s")}
+        self.outputs = {**self.outputs, "clock": Port(pace.order + 2, "s, 1, s, 1, ..")}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero; at rest."""
@@ -44,5 +45,6 @@ class WaitingReference(TimedReference):
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         s, *rates = ca.vertsplit(x.pace)
-        clock = ca.vertcat(s, rates[0], self._waiting.rest(s, rates))
+        lags = self._waiting.lags(rates)
+        clock = ca.vertcat(s, lags[0], self._waiting.rest(s, lags), *lags[1:])
         return {**super().output(x, u, t), "clock": clock}

@@ -1,39 +1,17 @@
-"""How far an arm is from obstacles, now and where they are expected."""
+"""How far an arm is from obstacles, when they can be near, and where they are expected."""
 
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.errors import require_one_of, require_positive
-from pfsc_drake.geometry.segments import to_point, to_segment
-
-KINDS = ("sphere", "column")
-
-
-@dataclass(frozen=True)
-class ObstacleShape:
-    """What moves: a sphere, or a column along z that has no end, as a person who stands.
-
-    Attributes:
-        kind: ``sphere`` or ``column``.
-        radius: [m].
-    """
-
-    kind: str
-    radius: float
-
-    def __post_init__(self) -> None:
-        require_one_of("kind", self.kind, KINDS)
-        require_positive("radius", self.radius)
-
-    @property
-    def axes(self) -> ca.DM:
-        """Which axes of the world count for distances, shape (3,)."""
-        return ca.DM([1.0, 1.0, 0.0 if self.kind == "column" else 1.0])
+from pfsc_drake.control.obstacles.reach import Reach
+from pfsc_drake.control.obstacles.shapes import Capsule, ObstacleShape
+from pfsc_drake.geometry.segments import between_nearest, from_nearest, to_segment, to_swept
 
 
 @dataclass(frozen=True)
@@ -55,15 +33,47 @@ class Foresight:
 
 
 @once_per_content()
-def clearance_function(
+def nearness_function(
+    shapes: Sequence[ObstacleShape], reach: Reach, spent: float, points: int, radius: float
+) -> ca.Function:
+    """Return ``(points, obstacles) -> (near, until)`` of an arm in one posture.
+
+    ``near`` is its distance from the obstacles where they are measured, between surfaces [m],
+    ``until`` the time until one of them may be nearer than ``spent`` whatever it does [s].
+
+    Args:
+        shapes: K obstacles.
+        reach: How they can move.
+        spent: Distance that is spent for the margin and for what is not known [m].
+        points: P, of the arm's outline.
+        radius: Of its capsules [m].
+    """
+    arm, obstacles = ca.SX.sym("points", 3 * points), ca.SX.sym("obstacles", 6 * len(shapes))
+    links = list(itertools.pairwise(ca.vertsplit(arm, 3)))
+    near, until = ca.inf, ca.inf
+    for shape, obstacle in zip(shapes, ca.vertsplit(obstacles, 6), strict=True):
+        axes, p, v = shape.axes, obstacle[:3], shape.axes * obstacle[3:]
+        for part, (a, b) in itertools.product(shape.parts, links):
+            away = away_from(axes * a, axes * b, axes * p, part)
+            length = ca.norm_2(away)
+            distance = length - (part.radius + radius)
+            receding = ca.dot(away, v) / ca.fmax(length, 1e-9)
+            near = ca.fmin(near, distance)
+            until = ca.fmin(until, reach.time(distance - spent, receding))
+    return ca.Function(
+        "nearness", [arm, obstacles], [near, until], ["points", "obstacles"], ["near", "until"]
+    )
+
+
+@once_per_content()
+def foresight_function(
     shapes: Sequence[ObstacleShape], foresight: Foresight, points: int, radius: float
 ) -> ca.Function:
-    """Return ``(points, obstacles, arrival) -> (near, ahead)`` of an arm in one posture.
+    """Return ``(points, obstacles, arrival) -> ahead`` of an arm in one posture.
 
-    ``near`` is its distance from the obstacles where they are measured, ``ahead`` the least one
-    from where they are expected from ``arrival`` on [s] until the horizon, both between surfaces
-    [m]. What an obstacle sweeps is a capsule, the distance is that of its axis from a link's; how
-    much it has spread by then is told by the place on that axis.
+    ``ahead`` is the least distance from where obstacles are expected from the arm's arrival on [s]
+    until the horizon, between surfaces [m]. How much an obstacle has spread is told by where on
+    its way it is nearest.
 
     Args:
         shapes: K obstacles.
@@ -71,34 +81,47 @@ def clearance_function(
         points: P, of the arm's outline.
         radius: Of its capsules [m].
     """
-    arm, arrival = ca.SX.sym("points", 3 * points), ca.SX.sym("arrival")
-    obstacles = ca.SX.sym("obstacles", 6 * len(shapes))
+    arm, obstacles = ca.SX.sym("points", 3 * points), ca.SX.sym("obstacles", 6 * len(shapes))
+    arrival = ca.SX.sym("arrival")
     begin = ca.fmin(arrival, foresight.horizon)
-    places = ca.vertsplit(arm, 3)
-    near, ahead = ca.inf, ca.inf
+    lasts = foresight.horizon - begin
+    links, ahead = list(itertools.pairwise(ca.vertsplit(arm, 3))), ca.inf
     for shape, obstacle in zip(shapes, ca.vertsplit(obstacles, 6), strict=True):
-        axes, size = shape.axes, shape.radius + radius
-        p, v = axes * obstacle[:3], axes * obstacle[3:]
-        c = p + v * (foresight.age + begin)
-        d = p + v * (foresight.age + foresight.horizon)
-        for a, b in itertools.pairwise(places):
-            near = ca.fmin(near, to_point(axes * a, axes * b, p) - size)
-            distance, share = to_segment(axes * a, axes * b, c, d)
-            time = begin + share * (foresight.horizon - begin)
-            ahead = ca.fmin(ahead, distance - size - foresight.spread * time)
-    return ca.Function(
-        "clearance",
-        [arm, obstacles, arrival],
-        [near, ahead],
-        ["points", "obstacles", "arrival"],
-        ["near", "ahead"],
-    )
+        axes, v = shape.axes, shape.axes * obstacle[3:]
+        p, way = axes * obstacle[:3] + v * (foresight.age + begin), v * lasts
+        for part, (a, b) in itertools.product(shape.parts, links):
+            c = p + axes * ca.DM(part.start)
+            if part.is_sphere:
+                distance, share = to_segment(axes * a, axes * b, c, c + way)
+            else:
+                distance, share = to_swept(a, b, c, p + ca.DM(part.end), way)
+            spread = foresight.spread * (begin + share * lasts)
+            ahead = ca.fmin(ahead, distance - (part.radius + radius) - spread)
+    names = ["points", "obstacles", "arrival"]
+    return ca.Function("foresight", [arm, obstacles, arrival], [ahead], names, ["ahead"])
+
+
+def away_from(a: Any, b: Any, p: Any, part: Capsule) -> Any:
+    """Return the shortest vector from a segment to a capsule's line, shape (3,).
+
+    Args:
+        a: One end of the segment, shape (3,).
+        b: The other one, shape (3,).
+        p: Where the obstacle is that the capsule is a part of, shape (3,).
+        part: The capsule.
+    """
+    if part.is_sphere:
+        return from_nearest(a, b, p + ca.DM(part.start))
+    away, _ = between_nearest(a, b, p + ca.DM(part.start), p + ca.DM(part.end))
+    return -away
 
 
 def least_distances(
     arm: np.ndarray, positions: np.ndarray, shapes: Sequence[ObstacleShape], radius: float
 ) -> np.ndarray:
     """Return the distance of a moving arm from each obstacle, between surfaces [m].
+
+    Two lines are nearest at an end of one of them, or where they are nearest without ends.
 
     Args:
         arm: Points of its outline, shape (samples, 3P) [m].
@@ -114,11 +137,30 @@ def least_distances(
     for k, shape in enumerate(shapes):
         axes = shape.axes.full().ravel()
         p, least = axes * positions[:, 3 * k : 3 * k + 3], np.full(len(arm), np.inf)
-        for a, b in itertools.pairwise(places):
-            along, away = axes * (b - a), p - axes * a
-            length = np.maximum(np.sum(along**2, axis=1), 1e-12)
-            share = np.clip(np.sum(away * along, axis=1) / length, 0.0, 1.0)
-            distance = np.linalg.norm(away - share[:, None] * along, axis=1)
-            least = np.minimum(least, distance - shape.radius - radius)
+        for part, (a, b) in itertools.product(shape.parts, itertools.pairwise(places)):
+            c, d = p + np.array(part.start), p + np.array(part.end)
+            distance = _between_lines(axes * a, axes * b, c, d)
+            least = np.minimum(least, distance - part.radius - radius)
         found.append(least)
     return np.array(found).T
+
+
+def _between_lines(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Return the distances of lines from a to b from those from c to d, each (samples, 3)."""
+    least = np.minimum(_from_line(a, b, c), _from_line(a, b, d))
+    least = np.minimum(least, np.minimum(_from_line(c, d, a), _from_line(c, d, b)))
+    normal = np.cross(b - a, d - c)
+    size = np.sum(normal**2, axis=1)
+    area = np.maximum(size, 1e-18)
+    first = np.sum(np.cross(c - a, d - c) * normal, axis=1) / area
+    second = np.sum(np.cross(c - a, b - a) * normal, axis=1) / area
+    crossing = (size > 1e-18) & (abs(first - 0.5) <= 0.5) & (abs(second - 0.5) <= 0.5)
+    height = np.abs(np.sum((c - a) * normal, axis=1)) / np.sqrt(area)
+    return np.where(crossing, np.minimum(height, least), least)
+
+
+def _from_line(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> np.ndarray:
+    along, away = b - a, p - a
+    length = np.maximum(np.sum(along**2, axis=1), 1e-12)
+    share = np.clip(np.sum(away * along, axis=1) / length, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(away - share[:, None] * along, axis=1))

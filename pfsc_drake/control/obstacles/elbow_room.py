@@ -11,7 +11,8 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.checks import require_positive
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.obstacles.clearance import ObstacleShape
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
+from pfsc_drake.geometry.segments import from_nearest
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import ArmOutline, outline_points
 
@@ -41,11 +42,12 @@ class ElbowParameters:
 class ElbowRoom(Block):
     """Torques that push the joints between shoulder and tool away from obstacles.
 
-    A point p of the arm's outline that is nearer than ``room`` is pushed as by a spring,
+    A point p of the arm's outline that is nearer than ``room`` to a part of an obstacle is pushed
+    as by a spring,
 
         f = min(k (room - d), f_max) n,    d = |p - p_O| - R - r,
 
-    n being the unit vector from the obstacle to it, in the plane for a column. The torques
+    n being the unit vector from the part to it, in the plane for a column. The torques
     ``sum J_p' f`` are for a posture that yields to them, see
     :class:`~pfsc_drake.control.compliance.posture_impedance.YieldingPosture`: it takes of them
     what does no work on the outputs, so that the tool does not leave its path. What is not a
@@ -102,11 +104,13 @@ def _torque_function(
     for point in ca.vertsplit(points, 3):
         force = ca.SX(np.zeros(3))
         for shape, obstacle in zip(shapes, ca.vertsplit(obstacles, 6), strict=True):
-            away = shape.axes * (point - obstacle[:3] - age * obstacle[3:])
-            length = ca.fmax(ca.norm_2(away), _ON_IT)
-            left = parameters.room - (length - shape.radius - outline.radius)
-            push = ca.fmin(ca.fmax(parameters.stiffness * left, 0.0), parameters.force_limit)
-            force += push * away / length
+            place = shape.axes * (point - obstacle[:3] - age * obstacle[3:])
+            for part in shape.parts:
+                away = from_nearest(ca.DM(part.start), ca.DM(part.end), place)
+                length = ca.fmax(ca.norm_2(away), _ON_IT)
+                left = parameters.room - (length - part.radius - outline.radius)
+                push = ca.fmin(ca.fmax(parameters.stiffness * left, 0.0), parameters.force_limit)
+                force += push * away / length
         forces.append(force)
     torque = ca.jtimes(points, q, ca.vertcat(*forces), True)
     return ca.Function(

@@ -9,18 +9,23 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import all_finite, all_of, where
-from pfsc_drake.control.obstacles.clearance import Foresight, ObstacleShape, clearance_function
+from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.control.obstacles.clearance import (
+    Foresight,
+    foresight_function,
+    nearness_function,
+)
+from pfsc_drake.control.obstacles.decision import SLOWEST, decision_function
 from pfsc_drake.control.obstacles.parameters import WatchParameters
+from pfsc_drake.control.obstacles.reach import Reach
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import ArmOutline, outline_points
 
-# steps into which the horizon is divided
-STEPS = 48
-# of the planned pace, below which nobody asks for less than a pause
-_SLOWEST = 0.05
+# steps into which the horizon is divided, and how many of them it looks back where it may go back
+STEPS, _BACK = 48, 24
 
 
 @dataclass(frozen=True)
@@ -51,31 +56,32 @@ class ArmAhead:
 class ObstacleWatch(Block):
     """Says how fast a motion may go on, so that its arm rests before an obstacle is near.
 
-    Samples j of the motion ahead are ``s_j`` of its own time, from where it is on; the arm is
-    expected there as it is planned, shifted by as much as it is beside the plan now. Of each there
-    is the distance ``c_j`` from the obstacles as measured, and the least distance ``e_j`` from
-    where they are expected from its arrival on, see :func:`clearance_function`. The time until an
-    obstacle of the largest speed V could be at the margin m is
+    Samples j of the motion are ``s_j`` of its own time, from where it is on; the arm is expected
+    there as it is planned, shifted by as much as it is beside the plan now. Of each there is the
+    time ``t_j`` until an obstacle may be at the margin m and what is not known of it, see
+    :class:`~pfsc_drake.control.obstacles.reach.Reach`, and the least distance ``e_j`` from where
+    obstacles are expected from its arrival on:
 
-        b_j = (c_j - m - uncertainty - between) / V - latency - T,
+        b_j = t_j - latency - T
 
-    ``between`` being half of the longest step of a point from sample to sample. With ``rest`` as
-    :class:`WaitingPace` says:
+    The distance that is spent beside the margin is the uncertainty, and half of the longest step
+    of a point from sample to sample. With ``rest`` as :class:`WaitingPace` says:
 
-    - **Waiting pace.** ``w <= W(b_j)`` for all samples that are not behind ``rest``: whatever
+    - **Waiting pace.** ``|w| <= W`` of the least b_j between the tool and ``rest``: whatever
       obstacles do, the arm rests before one of them is nearer than the margin.
     - **Waiting place.** Samples at which ``e_j < m + side`` are none to wait at. ``rest`` stays
       before them.
-    - **Passing.** The motion goes on as asked for if there is a sample ahead at which it can wait,
-      and the way until it has come to rest there is free however obstacles move:
-      ``b_j >= (s_j - rest) / w + time_to_stop`` for all samples until then. This keeps being true
-      by itself, so that what has set off gets through. To set off, twice the uncertainty must be
-      left besides.
+    - **Passing.** It need not wait where there is a place to wait at ahead, and the way until then
+      is free whatever obstacles do, ``b_j >= (s_j - rest) / w + time_to_stop``. Not to set off for
+      what noise takes back, twice the uncertainty must be left besides.
+    - **Retreat.** With ``retreat``, it goes back from where somebody is expected within the margin
+      to the next place to wait at behind, or, if there is none, to where the largest b_j is.
+      It turns where it rests.
 
     If something measured is no number, it stops.
 
     Ports:
-        clock (input): Of a :class:`WaitingReference`, shape (3,).
+        clock (input): Of a :class:`WaitingReference`, shape (r + 2,).
         joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
         obstacles (input): Position and velocity of K obstacles as measured, shape (6K,)
             [m, m/s].
@@ -83,10 +89,10 @@ class ObstacleWatch(Block):
             connected.
         override (output): Pace that the motion may have, shape (1,).
         record (output): Least distance as seen of the arm as it is [m], ``W`` of the least b, and
-            1 if it passes, shape (3,).
+            1 if it passes, -1 if it goes back, shape (3,).
 
     State:
-        velocity: Smoothed velocities, shape (3K,). passing: Whether it went on as asked for.
+        velocity: Smoothed velocities, shape (3K,). passing: Whether it passed or went back.
 
     Args:
         ahead: Where the arm will be.
@@ -115,16 +121,19 @@ class ObstacleWatch(Block):
         self._pace, self._ahead, self._parameters, self._n = pace, ahead, p, n
         self._outline = outline_points(ahead.chain, ahead.outline)
         self._table, self._last = ca.MX(ca.DM(ahead.points.T)), len(ahead.points) - 1
-        self._count = len(shapes)
+        self._behind = _BACK if p.retreat else 0
+        self._samples = self._behind + STEPS + 1
+        self._until = p.latency + period
+        points, radius = ahead.points.shape[1] // 3, ahead.outline.radius
+        reach = Reach(p.largest_speed, p.largest_acceleration, p.velocity_uncertainty)
+        spent = p.margin + p.uncertainty + ahead.between
+        self._near = nearness_function(shapes, reach, spent, points, radius)
         foresight = Foresight(p.latency, p.horizon, p.spread)
-        size = ahead.points.shape[1]
-        clearance = clearance_function(shapes, foresight, size // 3, ahead.outline.radius)
-        self._clearances = clearance.map(STEPS + 1)
-        self._now = clearance
-        self._decide = _decision(p, pace, ahead.step, ahead.between, period)
-        self._kept = math.exp(-period / p.smoothing)
+        self._expected = foresight_function(shapes, foresight, points, radius)
+        self._decide = decision_function(p, pace, ahead.step, self._behind, self._samples)
+        self._kept, self._count = math.exp(-period / p.smoothing), len(shapes)
         self.inputs = {
-            "clock": Port(3, "s, 1, s"),
+            "clock": Port(pace.order + 2, "s, 1, s, 1, .."),
             "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
             "obstacles": Port(6 * self._count, "m, m/s"),
             "asked": Port(1, optional=True),
@@ -138,32 +147,34 @@ class ObstacleWatch(Block):
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        s, _, rest = ca.vertsplit(u.clock)
+        s, rest = u.clock[0], u.clock[2]
         known = all_finite(u.obstacles, u.joint_state)
-        obstacles = where(known, self._smoothed(x, u), 0.0)
+        measured = where(known, u.obstacles, 0.0)
         arm = self._outline(where(known, u.joint_state[: self._n], 0.0))
-        place = ca.fmin(ca.fmax((s - self._ahead.begin) / self._ahead.step, 0.0), self._last)
-        first = ca.floor(place)
-        columns = [ca.fmin(first + j, self._last) for j in range(STEPS + 1)]
-        points = ca.horzcat(*[self._table[:, column] for column in columns])
-        planned = points[:, 0] + (place - first) * (points[:, 1] - points[:, 0])
         asked = 1.0 if u.asked is None else where(u.asked > 0.0, ca.fmin(u.asked, 1.0), 0.0)
-        times = self._ahead.begin + self._ahead.step * ca.horzcat(*columns)
-        way = ca.fmax(times - rest, 0.0) / ca.fmax(asked, _SLOWEST)
-        near, expected = self._clearances(
-            points + ca.repmat(arm - planned, 1, STEPS + 1),
-            ca.repmat(obstacles, 1, STEPS + 1),
-            way + self._pace.lag,
+        times, points = self._places(s, arm)
+        _, until = self._near.map(self._samples)(points, self._each(measured))
+        way = times - rest
+        arrives = ca.fmax(way, 0.0) / ca.fmax(asked, SLOWEST)
+        if self._behind:
+            arrives += ca.fmax(-way, 0.0) / self._parameters.retreat
+        foreseen = self._each(where(known, self._smoothed(x, u), 0.0))
+        expected = self._expected.map(self._samples)(points, foreseen, arrives + self._pace.lag)
+        now, until_now = self._near(arm, measured)
+        override, permitted, passing = self._decide(
+            until - self._until,
+            expected,
+            times,
+            u.clock,
+            asked,
+            until_now - self._until,
+            # without uncertainty, setting off needs no more than going on
+            x.passing if self._parameters.uncertainty > 0.0 or self._behind else 0.0,
         )
-        now, _ = self._now(arm, obstacles, 0.0)
-        # without uncertainty, setting off needs no more than going on
-        passed = x.passing if self._parameters.uncertainty > 0.0 else 0.0
-        override, permitted, passing = self._decide(near, expected, times, rest, asked, now, passed)
+        seen, passing = where(known, now, ca.DM.nan(1)), where(known, passing, 0.0)
         return {
             "override": where(known, override, 0.0),
-            "record": ca.vertcat(
-                where(known, now, ca.DM.nan(1)), permitted, all_of(known, passing)
-            ),
+            "record": ca.vertcat(seen, permitted, passing),
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
@@ -175,6 +186,23 @@ class ObstacleWatch(Block):
             "passing": y.record[2],
         }
 
+    def _places(self, s: Any, arm: Any) -> tuple[Any, Any]:
+        """Return own times of all samples, by columns, and where the outline will be there."""
+        ahead = self._ahead
+        place = ca.fmin(ca.fmax((s - ahead.begin) / ahead.step, 0.0), self._last)
+        first = ca.floor(place)
+        columns = [
+            ca.fmin(ca.fmax(first + j, 0.0), self._last) for j in range(-self._behind, STEPS + 1)
+        ]
+        points = ca.horzcat(*[self._table[:, column] for column in columns])
+        here, after = points[:, self._behind], points[:, self._behind + 1]
+        planned = here + (place - first) * (after - here)
+        times = ahead.begin + ahead.step * ca.horzcat(*columns)
+        return times, points + ca.repmat(arm - planned, 1, self._samples)
+
+    def _each(self, obstacles: Any) -> Any:
+        return ca.repmat(obstacles, 1, self._samples)
+
     def _smoothed(self, x: Values, u: Values) -> Any:
         """Return the obstacles with smoothed velocities, shape (6K,)."""
         parts = []
@@ -183,43 +211,3 @@ class ObstacleWatch(Block):
         ):
             parts += [obstacle[:3], obstacle[3:] + self._kept * (v - obstacle[3:])]
         return ca.vertcat(*parts)
-
-
-def _decision(
-    parameters: WatchParameters, pace: WaitingPace, step: float, between: float, period: float
-) -> ca.Function:
-    """Return what decides over the pace, see :class:`ObstacleWatch`.
-
-    It is ``(near, expected, times, rest, asked, now, passed) -> (override, permitted, passes)``;
-    the first three are rows of all samples.
-    """
-    p = parameters
-    near, expected, times = (
-        ca.SX.sym(name, 1, STEPS + 1) for name in ("near", "expected", "times")
-    )
-    rest, asked, now, passed = (ca.SX.sym(name) for name in ("rest", "asked", "now", "passed"))
-
-    def until(distance: Any) -> Any:
-        spent = p.margin + p.uncertainty + between
-        return (distance - spent) / p.largest_speed - p.latency - period
-
-    left, way, wait = until(near), times - rest, ca.inf
-    least, free, passes = until(now), 1.0, 0.0
-    reserve = where(passed, 0.0, 2.0 * p.uncertainty / p.largest_speed)
-    slowed = ca.fmax(asked, _SLOWEST)
-    for j in range(STEPS + 1):
-        least = where(way[j] <= step, ca.fmin(least, left[j]), least)
-        time = where(way[j] > 0.0, way[j] / slowed, way[j]) + pace.time_to_stop
-        free = all_of(free, left[j] - reserve >= time)
-        waits = expected[j] >= p.margin + p.side
-        passes = ca.fmax(passes, all_of(free, waits, way[j] >= 0.0))
-        blocked = all_of(ca.logic_not(waits), way[j] > -step)
-        wait = where(blocked, ca.fmin(wait, way[j] - step), wait)
-    permitted = pace.permitted(least)
-    held = ca.fmin(permitted, ca.fmax(wait, 0.0) * pace.bandwidth)
-    override = where(passes, asked, ca.fmin(asked, held))
-    return ca.Function(
-        "decision",
-        [near, expected, times, rest, asked, now, passed],
-        [override, permitted, passes],
-    )

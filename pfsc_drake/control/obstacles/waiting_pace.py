@@ -2,21 +2,19 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import gammaincc, gammainccinv
+from scipy.special import gammainccinv
 
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.checks import require_between, require_positive
 
-# steps, and the times by bandwidth, over which a worst case is summed up
-_STEPS, _LONGEST = 4001, 40.0
-_LEAST = 1e-9  # of the pace that trickles
+# times by bandwidth, after which nothing is left of a pace
+_LONGEST = 60.0
 
 
 @dataclass(frozen=True)
@@ -24,28 +22,27 @@ class WaitingPace:
     """How fast a reference may go that can be stopped within a time, whatever has been before.
 
     The pace ``z_1`` of a motion follows what is asked for, ``0 <= w <= 1``, through r lags,
-    ``(d/dt / omega + 1)^r z_1 = w``, see :class:`~pfsc_drake.control.law.timed_reference.
-    TimedReference`. If nothing more is asked for it falls from 1 at worst as
+    ``z_k' = omega (z_{k+1} - z_k)``, ``z_{r+1} = w``, see :class:`~pfsc_drake.control.law.
+    timed_reference.TimedReference`. If nothing more is asked for it falls from 1 at worst as
 
         Q(x) = e^{-x} sum_{k < r} x^k / k!,    x = omega t,
 
-    and the own time ``s`` of the motion comes to rest at ``rest = s + (z_1 + .. + z_r) / omega``,
-    ``z_k`` being the outputs of the lags. It follows ``rest' = w``: where the motion would stop
-    moves exactly at the pace that is asked for.
+    and the own time ``s`` of the motion comes to rest at ``rest = s + (z_1 + .. + z_r) / omega``.
+    It follows ``rest' = w``: where the motion would stop moves exactly at the pace that is asked
+    for.
 
-    Be b the time until something may be in the way at a place that the motion has not passed yet.
-    The pace that is permitted there is
+    Be b the time until something may be in the way at a place between ``s`` and ``rest``. Be
+    ``c_k`` the largest of ``z_k, .., z_r``, lags at least as full as these, that would only empty
+    if w was 0: their ``z_1`` after b is ``sum a_k c_k``, ``a_k = e^{-x} x^(k-1) / (k-1)!``,
+    ``x = omega b``. The pace that is permitted is the largest w to which these lags may be filled
+    up, so that ``sum a_k max(c_k, w) <= resting``:
 
-        W(b) = min(1, p / Q(omega b)),    0 if b <= 0.
+        W(b, z) = min_{i < r} (resting - sum_{k <= i} a_k c_k) / sum_{k > i} a_k,
 
-    If b falls no faster than time goes on, and w <= W(b) for all places between ``s`` and
-    ``rest``, then a place is passed at ``z_1 <= resting`` at most where its b is used up. The
-    worst of all histories: w = 1 until ``rest`` enters the place at ``x = X``, then W. By what the
-    lags still hold, and since ``z_1 <= omega (rest - s)``,
-
-        z_1 <= min(Q(X) + int_0^X h W dx,  int_0^X W dx),    h = -Q',
-
-    and p is the largest number by which no X makes that more than ``resting``.
+    within 0 and 1, and 0 if b <= 0. If b falls no faster than time goes on, and w <= W for all
+    places between ``s`` and ``rest``, then no place is passed faster than ``resting`` when its b
+    is used up. The same holds backwards, ``-1 <= w <= 0``, for the sizes of all of them, if it
+    turns at rest.
 
     Attributes:
         order: r, 1 to 4 for the laws of this project.
@@ -64,34 +61,10 @@ class WaitingPace:
         require_positive("bandwidth", self.bandwidth)
         require_between("resting", self.resting, 1e-4, 0.5, "of the planned pace")
 
-    @cached_property
-    def trickle(self) -> float:
-        """``p``, the pace that is permitted where all of the time is used up."""
-
-        def excess(log_p: float) -> float:
-            return self._largest_left(math.exp(log_p)) - self.resting
-
-        return math.exp(brentq(excess, math.log(_LEAST), math.log(self.resting), xtol=1e-6))
-
-    def _largest_left(self, trickle: float) -> float:
-        """Return the largest pace at a place where it should rest, in the worst case."""
-        x, step = np.linspace(0.0, _LONGEST, _STEPS, retstep=True)
-        left = gammaincc(self.order, x)
-        permitted = np.minimum(1.0, trickle / np.maximum(left, np.finfo(float).tiny))
-        # from above: the larger end of each step
-        asked = np.concatenate([[0.0], np.cumsum(permitted[1:] * step)])
-        held = np.concatenate([[0.0], np.cumsum(permitted[1:] * -np.diff(left))])
-        return float(np.minimum(left + held, asked).max())
-
     @property
     def time_to_stop(self) -> float:
         """Time from any pace until it rests, if nothing more is asked for [s]."""
         return float(gammainccinv(self.order, self.resting)) / self.bandwidth
-
-    @property
-    def time_unhindered(self) -> float:
-        """Time b from which on the pace is not held back at all [s]."""
-        return float(gammainccinv(self.order, self.trickle)) / self.bandwidth
 
     @property
     def lag(self) -> float:
@@ -108,28 +81,43 @@ class WaitingPace:
         terms = [x**k / math.factorial(k) for k in range(self.order)]
         return ca.exp(-x) * sum(terms[1:], terms[0])
 
-    def permitted(self, time: Any) -> Any:
+    def permitted(self, time: Any, lags: Sequence[Any]) -> Any:
         """Return ``W``, the pace that may be asked for.
 
         Args:
             time: b [s], number or expression.
+            lags: ``z_1`` to ``z_r``.
         """
-        within = ca.fmin(ca.fmax(time, 0.0), 2.0 * self.time_unhindered)
-        return where(time > 0.0, ca.fmin(self.trickle / self.left(within), 1.0), 0.0)
+        x = self.bandwidth * ca.fmin(ca.fmax(time, 0.0), _LONGEST / self.bandwidth)
+        shares = [ca.exp(-x) * x**k / math.factorial(k) for k in range(self.order)]
+        fill = list(itertools.accumulate([ca.fabs(lag) for lag in reversed(lags)], ca.fmax))[::-1]
+        spent, most = 0.0, 1.0
+        for i in range(self.order):
+            most = ca.fmin(most, (self.resting - spent) / sum(shares[i + 1 :], shares[i]))
+            spent = spent + shares[i] * fill[i]
+        return where(time > 0.0, where(spent <= self.resting, ca.fmax(most, 0.0), 0.0), 0.0)
 
-    def rest(self, s: Any, rates: list[Any]) -> Any:
+    def lags(self, rates: Sequence[Any]) -> list[Any]:
+        """Return ``z_1`` to ``z_r``.
+
+        Args:
+            rates: ``z_1`` and its derivatives 1 to r - 1.
+        """
+        # z_{k+1} = z_k + z_k' / omega
+        row, found = list(rates), [rates[0]]
+        for _ in range(self.order - 1):
+            row = [a + b / self.bandwidth for a, b in itertools.pairwise(row)]
+            found.append(row[0])
+        return found
+
+    def rest(self, s: Any, lags: Sequence[Any]) -> Any:
         """Return where the own time comes to rest if nothing more is asked for [s].
 
         Args:
             s: The own time [s].
-            rates: ``z_1`` and its derivatives 1 to r - 1.
+            lags: ``z_1`` to ``z_r``.
         """
-        # z_{k+1} = z_k + z_k' / omega
-        lags, total = list(rates), rates[0]
-        for _ in range(self.order - 1):
-            lags = [a + b / self.bandwidth for a, b in itertools.pairwise(lags)]
-            total = total + lags[0]
-        return s + total / self.bandwidth
+        return s + sum(lags[1:], lags[0]) / self.bandwidth
 
     def stop(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return way and rates of a stop from a pace of 1.

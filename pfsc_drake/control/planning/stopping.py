@@ -8,7 +8,7 @@ from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.control.planning.drive_demand import DriveDemand, with_pace
 
 # 1/s, between which a bandwidth is looked for, and to which share it is found
-_SLOWEST, _FASTEST, _FOUND = 2.0, 40.0, 0.03
+_SLOWEST, _FASTEST, _FOUND = 2.0, 60.0, 0.03
 # instants of a stop, times the bandwidth; and the most samples of a course from which it begins
 _INSTANTS, _BEGINS = np.linspace(0.0, 10.0, 21), 60
 
@@ -20,7 +20,7 @@ def stopping_bandwidth(
 
     Stops from the planned pace, and starts to it, are gone through from every begin on the course
     (:meth:`WaitingPace.stop`), and what they ask of the drives is compared with what is allowed.
-    It is between 2 and 40 1/s; the former also where even that is too much.
+    It is between 2 and 60 1/s; the former also where even that is too much.
 
     Args:
         demand: What motions ask of the drives.

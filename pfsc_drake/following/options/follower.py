@@ -7,6 +7,8 @@ import numpy as np
 from pfsc_drake.checks import require, require_between, require_not_negative, require_positive
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters, RobotLimitParameters
 from pfsc_drake.control.law.timed_reference import StreamLimits
+from pfsc_drake.control.obstacles.parameters import WatchParameters
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.yaml.typed import ONE_OR_MANY
@@ -95,6 +97,22 @@ class FixtureOptions:
         require_not_negative("looks", self.looks)
 
 
+@dc.dataclass
+class ObstacleOptions:
+    """Obstacles that progress along a path waits for.
+
+    Attributes:
+        shapes: What they look like.
+        watch: How progress waits for them.
+    """
+
+    shapes: list[ObstacleShape]
+    watch: WatchParameters = dc.field(default_factory=WatchParameters)
+
+    def __post_init__(self) -> None:
+        require(bool(self.shapes), "shapes", "none", "one or more")
+
+
 # 1/s, of poles that nobody chooses
 BANDWIDTH = 20.0
 
@@ -118,6 +136,8 @@ class FollowerOptions:
         override: Whether there is a port for the pace of the motion, see :class:`TimedReference`.
         stream: How fast the tool goes along a path to way points that come while it moves, by a
             port of their own, in place of a motion over time; None for the latter.
+        obstacles: What progress along a path waits for: there is a port for where it is, and with
+            ``override`` the pace that is asked for is from 0 to 1. None for nothing.
         measures: What is measured: ``plant_state``, the state ``[q, v]`` of the plant, or
             ``joint_state``, ``[q_J, v_J, q_M, v_M]``.
         frame: Of a path or surface that moves: the pose of its frame at the start, ``[p_WC, R_WC
@@ -133,5 +153,6 @@ class FollowerOptions:
     compliance: ComplianceParameters = dc.field(default_factory=ComplianceParameters)
     override: bool = False
     stream: StreamLimits | None = None
+    obstacles: ObstacleOptions | None = None
     measures: str = "plant_state"
     frame: np.ndarray | None = None

@@ -7,7 +7,7 @@ from pydrake.geometry import Capsule, Cylinder, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-from pfsc_drake.control.obstacles.clearance import ObstacleShape
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
 
 _ROOT = "/drake/obstacles"
 # m, of a person who stands on the floor z = 0

@@ -22,7 +22,8 @@ def test_it_starts_at_rest_and_then_is_a_timed_reference():
     for asked in np.repeat(rng.uniform(0.0, 1.0, (15, 1)), 100, axis=0):
         ours, theirs = paced.step(override=asked), timed.step(override=asked)
         np.testing.assert_array_equal(ours["reference"], theirs["reference"])
-    s, z, rest = ours["clock"]
+    s, z, rest, *others = ours["clock"]
+    assert s + (z + sum(others)) / 25.0 == pytest.approx(rest, abs=1e-12)
     for _ in range(2000):
         clock = paced.step(override=[0.0])["clock"]
     assert s + z / 25.0 <= rest + 1e-12

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.obstacles.clearance import ObstacleShape
 from pfsc_drake.control.obstacles.elbow_room import ElbowParameters, ElbowRoom
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.outline import arm_outline, outline_points
 from tests.control.conftest import BENT_7

@@ -1,14 +1,16 @@
 """Progress that waits: what passes, where it waits, and that no obstacle finds it moving."""
 
+import dataclasses as dc
+
 import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.waiting_reference import WaitingReference
-from pfsc_drake.control.obstacles.clearance import ObstacleShape
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
 from pfsc_drake.control.obstacles.parameters import WatchParameters
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -46,7 +48,7 @@ class _Crane:
             ObstacleWatch(ahead, [SHAPE], parameters, self.pace, PERIOD), ("asked",)
         )
         self.reference.start(override=0.0)
-        self.x, self.clock = 0.0, np.zeros(3)
+        self.x, self.clock = 0.0, np.zeros(6)
 
     def step(self, obstacle, asked=1.0):
         """Return where the tool is, the pace and the record of a tick."""
@@ -78,8 +80,9 @@ def test_it_waits_before_one_who_stands_on_the_path_and_goes_on_when_he_has_gone
     for _ in range(4000):
         x, pace, _ = crane.step(_standing(1.4))
     gap = 1.4 - x - SHAPE.radius - 0.1
-    assert PARAMETERS.margin < gap < 1.0
-    assert pace < 0.05
+    # at reduced speed, to where he could not be in time if he set off
+    assert 0.4 < gap < 0.5
+    assert crane.pace.resting < pace < 0.1
     for _ in range(4000):
         x, _, _ = crane.step(_standing(1.4, 50.0))
     assert x == pytest.approx(1.5, abs=1e-6)
@@ -116,30 +119,69 @@ def test_the_way_is_free_ahead_of_one_who_comes_slowly_later():
     assert crane.x == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_nobody_within_his_speed_finds_the_tool_moving(seed):
+BOUNDED = dc.replace(PARAMETERS, largest_acceleration=5.0, velocity_uncertainty=0.1)
+
+
+@pytest.mark.parametrize("parameters", [PARAMETERS, BOUNDED, dc.replace(BOUNDED, retreat=1.0)])
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_nobody_within_his_limits_finds_the_tool_moving(seed, parameters):
     """He does his worst: runs towards the tool, waits, runs again, as fast as is allowed."""
-    rng, crane = np.random.default_rng(seed), _Crane()
-    late = round(PARAMETERS.latency / PERIOD)
-    p = np.array([rng.uniform(0.3, 1.6), rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 2.0)])
-    shown = [p.copy()] * late
-    target, least = p, np.inf
-    for k in range(4500):
+    rng, crane = np.random.default_rng(seed), _Crane(parameters=parameters)
+    late, hasty = round(PARAMETERS.latency / PERIOD), parameters.largest_acceleration or 1e9
+    p = np.array([rng.uniform(0.3, 1.6), rng.choice([-1.0, 1.0]) * rng.uniform(1.5, 2.5)])
+    v, shown = np.zeros(2), [np.append(p, [0.0, 0.0])] * late
+    target, least, moved = p, np.inf, 0.0
+    for k in range(4000):
         if k % 400 == 0:
-            away = rng.random() < 0.4
+            away = rng.random() < 0.6
             target = np.array([rng.uniform(0, 1.5), 2.5 * rng.choice([-1.0, 1.0])])
             target = target if away else None
-        goal = np.array([crane.x, 0.0]) if target is None else target
-        way = goal - p
-        p = p + way * min(1.0, 1.6 * PERIOD / max(np.linalg.norm(way), 1e-9))
-        shown.append(p.copy())
-        noise = rng.uniform(-1, 1, 2) * 0.02 / np.sqrt(2.0)
-        seen = np.array([*(shown[-late] + noise), 0.0, *rng.normal(scale=0.3, size=2), 0.0])
-        x, pace, _ = crane.step(seen)
+        way = (np.array([crane.x, 0.0]) if target is None else target) - p
+        change = 1.6 * way / max(np.linalg.norm(way), 0.05) - v
+        v = v + change * min(1.0, hasty * PERIOD / max(np.linalg.norm(change), 1e-9))
+        p = p + v * PERIOD
+        shown.append(np.append(p, v))
+        noise = np.append(rng.uniform(-1, 1, 2) * 0.02, rng.uniform(-1, 1, 2) * 0.1) / np.sqrt(2)
+        x, y, v_x, v_y = shown[-late] + noise
+        before = crane.x
+        x, pace, _ = crane.step(np.array([x, y, 0.0, v_x, v_y, 0.0]))
+        moved += abs(x - before)
         gap = np.linalg.norm(p - [x, 0.0]) - SHAPE.radius - 0.1
-        if pace > crane.pace.resting:
+        if abs(pace) > crane.pace.resting:
             least = min(least, gap)
-    assert least >= PARAMETERS.margin
+    assert least >= parameters.margin
+    assert moved > 0.02
+
+
+def test_who_accelerates_no_faster_than_is_known_lets_it_go_on_sooner():
+    """He has crossed and walks away: only that he cannot turn round at once lets it go."""
+    ways = []
+    for parameters in (PARAMETERS, BOUNDED):
+        crane = _Crane(parameters=parameters)
+        for k in range(2200):
+            y = -1.2 + 1.2 * k * PERIOD
+            crane.step(np.array([0.4, y, 0.0, 0.0, 1.2, 0.0]))
+        ways.append(crane.x)
+    assert ways[1] > ways[0] + 0.1
+
+
+def test_it_goes_back_from_one_who_walks_up_to_it_and_on_when_he_has_gone():
+    """He comes along the path to where it waits, and stops there before he turns round."""
+    least = {}
+    for retreat in (0.0, 1.0):
+        crane = _Crane(parameters=dc.replace(BOUNDED, retreat=retreat))
+        gaps, passing = [], set()
+        for k in range(6000):
+            t = k * PERIOD
+            there = 2.3 - min(max(t - 1.0, 0.0), 2.0) * 0.8 + max(t - 3.5, 0.0) * 0.8
+            v = -0.8 * (1.0 < t < 3.0) + 0.8 * (t > 3.5)
+            x, _, record = crane.step(np.array([there, 0.0, 0.0, v, 0.0, 0.0]))
+            gaps.append(there - x - SHAPE.radius - 0.1)
+            passing.add(float(record[2]))
+        least[retreat] = min(gaps)
+        assert (-1.0 in passing) == (retreat > 0.0)
+    assert least[0.0] < PARAMETERS.margin <= least[1.0]
+    assert x > 0.8
 
 
 def test_there_must_be_something_to_watch():

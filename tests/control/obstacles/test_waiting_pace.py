@@ -4,7 +4,6 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
-from scipy.optimize import linprog
 
 from pfsc_drake.control.law.timed_reference import _filter_step
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
@@ -26,12 +25,19 @@ def _fallen(order, bandwidth, start, ticks):
     return np.array(rows)
 
 
+def _rates(lags, omega):
+    """Derivatives of ``z_1`` by the lags' own equations: z_k' = omega (z_{k+1} - z_k)."""
+    rows = [np.array(lags)]
+    while rows[-1].size > 1:
+        rows.append(omega * np.diff(rows[-1]))
+    return [row[0] for row in rows]
+
+
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_the_pace_falls_as_the_filter_of_the_reference_lets_it(order):
+def test_a_stop_is_what_the_filter_of_the_reference_makes_of_it(order):
     pace = WaitingPace(order, 25.0, 0.05)
     rows = _fallen(order, 25.0, np.array([0.3, 1.0, *np.zeros(order - 1)]), 1500)
     times = PERIOD * np.arange(len(rows))
-    np.testing.assert_allclose(_numbers(pace.left(times)), rows[:, 1], atol=1e-11)
     way, rates = pace.stop(25.0 * times)
     np.testing.assert_allclose(0.3 + way, rows[:, 0], atol=1e-11)
     np.testing.assert_allclose(rates[:, 0], rows[:, 1], atol=1e-11)
@@ -45,54 +51,77 @@ def test_the_pace_falls_as_the_filter_of_the_reference_lets_it(order):
 def test_rest_is_where_the_motion_stops_and_moves_as_is_asked_for(order):
     rng = np.random.default_rng(order)
     pace, step = WaitingPace(order, 25.0, 0.05), _filter_step(order, 25.0, PERIOD)
-    x = np.append(0.0, rng.normal(size=order) * 25.0 ** np.arange(order))
-    rest = float(ca.DM(pace.rest(x[0], list(x[1:]))))
+    lags = rng.normal(size=order)
+    x = np.append(0.0, _rates(lags, 25.0))
+    np.testing.assert_allclose(_numbers(ca.vertcat(*pace.lags(list(x[1:])))), lags, atol=1e-12)
+    rest = float(ca.DM(pace.rest(x[0], list(lags))))
     assert rest == pytest.approx(_fallen(order, 25.0, x, 4000)[-1, 0], abs=1e-9)
     for asked in (0.0, 0.4, 1.0):
         after = step @ np.append(x, asked)
-        moved = float(ca.DM(pace.rest(after[0], list(after[1:])))) - rest
+        moved = float(ca.DM(pace.rest(after[0], pace.lags(list(after[1:]))))) - rest
         assert moved == pytest.approx(asked * PERIOD, abs=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
-def test_no_history_is_faster_than_rest_where_time_is_used_up(order):
-    """A linear program picks the worst of all histories that the rule permits."""
-    resting, omega, ticks = 0.05, 25.0, 600
+def test_the_permitted_pace_is_the_largest_that_lags_may_be_filled_to(order):
+    """Lags at least as full as these, filled up to it, empty to rest just in time."""
+    rng, omega, resting = np.random.default_rng(order), 25.0, 0.05
+    pace, seen = WaitingPace(order, omega, resting), []
+    for _ in range(60):
+        lags, ticks = rng.uniform(0.0, rng.choice([0.05, 0.3]), size=order), rng.integers(1, 400)
+        fill = np.maximum.accumulate(lags[::-1])[::-1]
+        permitted = float(ca.DM(pace.permitted(PERIOD * ticks, list(lags))))
+        seen.append(permitted)
+
+        def left(level, fill=fill, ticks=ticks):
+            start = np.append(0.0, _rates(np.maximum(fill, level), omega))
+            return _fallen(order, omega, start, ticks)[-1, 1]
+
+        if permitted == 0.0:
+            assert left(0.0) >= resting * (1.0 - 1e-9)
+        elif permitted == 1.0:
+            assert left(1.0) <= resting * (1.0 + 1e-9)
+        else:
+            assert left(permitted) == pytest.approx(resting, rel=1e-9)
+    assert {0.0, 1.0} < set(seen)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_place_is_passed_faster_than_rest_when_its_time_is_used_up(order, sign):
+    """Places with times that fall as fast as they may, or are wrong to the safe side, at random."""
+    rng, omega, resting = np.random.default_rng(order), 25.0, 0.05
     pace, step = WaitingPace(order, omega, resting), _filter_step(order, omega, PERIOD)
-    respond, column = [], step[:, -1]
-    for _ in range(ticks):
-        respond.append(column)
-        column = step[:, :-1] @ column
-    # the newest tick is the last; before the first one w = 1
-    history = np.array(respond[::-1])
-    start = np.linalg.matrix_power(step[:, :-1], ticks) @ np.array([0.0, 1.0, *np.zeros(order - 1)])
-    permitted = [float(ca.DM(pace.permitted(PERIOD * k))) for k in range(ticks)][::-1]
-    worst = 0.0
-    for entered in range(0, ticks, 12):
-        bound = np.ones(ticks)
-        bound[-entered - 1 :] = permitted[-entered - 1 :]
-        # s is at the place where rest was when it entered
-        s, rest = history[:, 0], np.where(np.arange(ticks) < ticks - entered, PERIOD, 0.0)
-        place = order / omega - start[0]
-        found = linprog(
-            -history[:, 1],
-            A_eq=[(s - rest)],
-            b_eq=[place],
-            bounds=list(zip(np.zeros(ticks), bound, strict=True)),
-        )
-        if found.status == 0:
-            worst = max(worst, start[1] - found.fun)
+    b, z = ca.SX.sym("b"), ca.SX.sym("z", order)
+    permitted = ca.Function("permitted", [b, z], [pace.permitted(b, ca.vertsplit(z))])
+    x, worst = np.zeros(order + 1), 0.0
+    places = np.arange(0.0, 4.0, 0.01)
+    times = np.repeat(rng.uniform(0.0, 1.2, size=20), 20)
+    for _ in range(4000):
+        lags = _numbers(ca.vertcat(*pace.lags(list(x[1:]))))
+        rest = sign * x[0] + sign * lags.sum() / omega
+        between = (places >= sign * x[0] - 0.01) & (places <= rest + 0.01)
+        told = times[between] - PERIOD - rng.choice([0.0, 0.05], p=[0.9, 0.1])
+        w = float(permitted(told.min(initial=9.0), lags))
+        x = step @ np.append(x, sign * w * (rng.random() < 0.98))
+        times -= PERIOD
+        at = np.abs(places - sign * x[0]) <= 0.01
+        if np.any(times[at] <= 0.0):
+            worst = max(worst, abs(x[1]))
+        # who was in the way leaves
+        times[times < -0.1] = rng.uniform(0.02, 1.2)
     assert 0.2 * resting < worst <= resting * (1.0 + 1e-6)
+    assert abs(x[0]) > 0.1
 
 
 def test_the_permitted_pace_grows_from_nothing_to_all():
-    pace = WaitingPace(4, 25.0, 0.05)
-    assert _numbers(pace.permitted(ca.DM(-1e-9))) == 0.0
-    assert _numbers(pace.permitted(ca.DM(1e-9))) == pytest.approx(pace.trickle, rel=1e-6)
-    assert _numbers(pace.permitted(ca.DM(pace.time_unhindered))) == pytest.approx(1.0, rel=1e-6)
-    assert _numbers(pace.permitted(ca.DM(1e9))) == 1.0
-    assert _numbers(pace.permitted(ca.DM.nan())) == 0.0
-    values = [float(pace.permitted(ca.DM(b))) for b in np.linspace(0.01, 1.0, 50)]
+    pace, still = WaitingPace(4, 25.0, 0.05), [0.0] * 4
+    assert _numbers(pace.permitted(ca.DM(-1e-9), still)) == 0.0
+    assert _numbers(pace.permitted(ca.DM(1e-9), still)) == pytest.approx(0.05, rel=1e-6)
+    assert _numbers(pace.permitted(ca.DM(pace.time_to_stop), still)) == pytest.approx(1.0)
+    assert _numbers(pace.permitted(ca.DM(1e9), [1.0] * 4)) == 1.0
+    assert _numbers(pace.permitted(ca.DM.nan(), still)) == 0.0
+    values = [float(pace.permitted(ca.DM(b), still)) for b in np.linspace(0.01, 1.0, 50)]
     assert np.all(np.diff(values) >= 0.0)
 
 

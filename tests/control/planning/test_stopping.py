@@ -48,5 +48,5 @@ def test_a_mass_brakes_with_the_force_that_it_has(order, steepest):
 
 
 def test_it_stays_within_what_is_looked_for():
-    assert _bandwidth(1e6, 4) == 40.0
+    assert _bandwidth(1e6, 4) == 60.0
     assert _bandwidth(1e-3, 4) == 2.0

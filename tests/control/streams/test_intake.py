@@ -10,7 +10,14 @@ from pfsc_drake.control.streams.parameters import StreamParameters
 from pfsc_drake.errors import InputError
 from tests.control.streams.streaming import PERIOD, make_stream, sent_at
 
-BEND = StreamParameters(spacing=0.012, velocity=0.5)
+# what has the same start, order and parameters is made once
+START, UPPER = np.array([0.8, 0.0, 1.1]), [2.0, 2.0, 2.0]
+BEND = StreamParameters(spacing=0.012, velocity=0.5, upper=UPPER)
+# of a hand: smoother than its way points, or through them
+SMOOTHER, THROUGH = (
+    StreamParameters(spacing=0.006, velocity=0.4, through=through, patience=0.2)
+    for through in (False, True)
+)
 
 
 def bend(count=61):
@@ -70,8 +77,8 @@ def test_control_points_never_change(run):
             continue
         own = course[3 : 3 + d * columns].reshape(columns, d)
         for k in range(columns):
-            number = int(course[0]) + k
-            np.testing.assert_array_equal(seen.setdefault(number, own[k]), own[k])
+            first = seen.setdefault(int(course[0]) + k, own[k])
+            assert np.array_equal(first, own[k])
 
 
 def test_arc_length_and_frame_are_those_of_the_whole_spline(run):
@@ -112,9 +119,10 @@ def test_derivatives_are_those_of_the_whole_spline(run):
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_laws_of_other_orders_get_the_same_end(order):
-    w = bend(20)
-    stream = make_stream(BEND, w[0], order=order)
-    run = stream.run(sent_at(stream.layout, w[1:], even(19)), 3500)
+    w, parameters = bend(20), {1: THROUGH, 2: BEND, 3: SMOOTHER}[order]
+    poses = np.hstack([w, np.tile([1.0, 0.0, 0.0, 0.0], (20, 1))]) if order == 2 else w
+    stream = make_stream(parameters, poses[0], order=order)
+    run = stream.run(sent_at(stream.layout, poses[1:], even(19)), 3500)
     np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
     assert run.overrun.max() <= 1e-12
     assert run.stream[-1, 0] == StreamStatus.WAITING
@@ -138,7 +146,7 @@ def test_a_stream_that_runs_dry_is_followed_to_its_last_point_and_goes_on_later(
 def zigzag():
     """Return way points with corners of 120 deg and 180 deg, and the numbers of these."""
     legs = [np.array([1.0, 0.0, 0.0]), np.array([-0.5, 0.8, 0.0]), np.array([0.5, -0.8, 0.0])]
-    points, corners = [np.array([0.8, 0.0, 1.0])], []
+    points, corners = [START], []
     for leg in legs:
         for _ in range(12):
             points.append(points[-1] + 0.02 * leg)
@@ -216,14 +224,14 @@ def whole_path_driven(run):
 
 def test_way_points_that_were_missed_end_the_path():
     w = bend(61)
-    stream = make_stream(BEND, w[0], length=8)
+    stream = make_stream(BEND, w[0])
     told = sent_at(stream.layout, w[1:], even(60), end=False)
     held = {}
 
     def message(k, stream):
         now = told(k, stream)
-        # no message for a second
-        if not 800 <= k < 1800:
+        # none for longer than messages go back
+        if not 800 <= k < 2800:
             held["last"] = now.copy()
         return held["last"]
 
@@ -236,11 +244,10 @@ def test_way_points_that_were_missed_end_the_path():
 @pytest.mark.parametrize("bad", [[np.nan, 0.3, 1.0], [0.8, 9.0, 1.0]])
 def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
     w = bend(61)
-    parameters = StreamParameters(spacing=0.012, velocity=0.5, upper=[2.0, 2.0, 2.0])
     rows = w[1:].copy()
     rows[25] = bad
     rows[45] = w[26]
-    stream = make_stream(parameters, w[0])
+    stream = make_stream(BEND, w[0])
     told = sent_at(stream.layout, rows, even(60), new=(45,))
     run = stream.run(told, 7000)
     assert (run.stream[:, 0] == StreamStatus.REFUSED).any()
@@ -254,19 +261,21 @@ def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
 @pytest.mark.parametrize("seed", range(4))
 def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
     random = np.random.default_rng(seed)
-    parameters = StreamParameters(spacing=0.006, velocity=0.4, through=bool(seed % 2), patience=0.2)
-    heading, points = 0.0, [np.array([0.8, 0.0, 1.0])]
-    for _ in range(250):
+    parameters, order = (THROUGH, 1) if seed % 2 else (SMOOTHER, 3)
+    heading, points = 0.0, [START]
+    for _ in range(150):
         heading += random.normal(0.0, 0.3) + (random.random() < 0.03) * random.uniform(-3.2, 3.2)
         step = random.exponential(0.006) * np.array([np.cos(heading), np.sin(heading), 0.0])
         points.append(points[-1] + step)
-    times = np.cumsum(random.exponential(0.016, 250) + (random.random(250) < 0.01) * 1.5)
-    stream = make_stream(parameters, points[0])
-    run = stream.run(sent_at(stream.layout, np.array(points[1:]), times, heard=True), 25000)
+    times = np.cumsum(random.exponential(0.016, 150) + (random.random(150) < 0.015) * 1.5)
+    stream = make_stream(parameters, points[0], order=order)
+    run = stream.run(sent_at(stream.layout, np.array(points[1:]), times, heard=True), 16000)
     assert np.isfinite(run.points).all()
     assert run.overrun.max() <= 1e-12
     assert np.abs(np.diff(run.eta[:, 1])).max() <= parameters.acceleration * PERIOD * (1 + 1e-6)
-    slope, second = (run.points[:, run.layout.position].reshape(-1, 6, 3)[:, k] for k in (1, 2))
+    slope, second = (
+        run.points[:, run.layout.position].reshape(-1, order + 2, 3)[:, k] for k in (1, 2)
+    )
     speed = np.linalg.norm(slope, axis=1)
     curvature = np.linalg.norm(np.cross(slope, second), axis=1) / speed**3
     assert speed.min() > 0.1 * parameters.spacing
@@ -284,7 +293,7 @@ def test_orientations_come_with_way_points():
     q = np.stack([np.cos(angles / 2), np.sin(angles / 2), 0 * angles, 0 * angles], axis=1)
     q[7::5] *= -1.0  # the same orientations
     poses = np.hstack([w, q])
-    stream = make_stream(BEND, poses[0])
+    stream = make_stream(BEND, poses[0], order=2)
     run = stream.run(sent_at(stream.layout, poses[1:], even(39)), 5000)
     found = run.points[:, run.layout.quaternion][:, :4]
     found /= np.linalg.norm(found, axis=1)[:, None]

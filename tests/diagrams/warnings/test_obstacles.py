@@ -29,3 +29,15 @@ def test_what_breaks_the_promise_is_named():
     assert "0.08 s old" in late
     (noisy,) = obstacle_warnings(_crossing(latency=0.08, uncertainty=0.05))
     assert "uncertainty = 0.05 m" in noisy
+
+
+def test_what_is_hastier_than_is_known_is_named():
+    good = {"latency": 0.08, "uncertainty": 0.052, "largest_acceleration": 3.0}
+    (hasty,) = obstacle_warnings(_crossing(**good))
+    assert "moving[0] accelerates with up to inf m/s^2" in hasty
+    crossing = _crossing(**good, velocity_uncertainty=0.2)
+    crossing.moving[0].way = [
+        Stride(time, [x, 0.0, 0.0]) for time, x in [(0, 0), (1, 0), (2, 0.2), (3, 0.2)]
+    ]
+    (noisy,) = obstacle_warnings(crossing)
+    assert "velocity_uncertainty = 0.2 m/s" in noisy

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from pfsc_drake.control.obstacles.clearance import ObstacleShape
+from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.systems.drawing.obstacle_visualizer import ObstacleVisualizer
 
 
