@@ -1,14 +1,12 @@
 """The circle of an identification, shortened, on the robot with the fewest parameters."""
 
 import json
-from functools import partial
 
 import h5py
 import pytest
 
 from experiments.studies.identify import CircularRun, Drive, write_identification
-from identification import steps
-from identification.measurement.experiment import run_experiment
+from tests.one_process import short_experiments
 
 pytestmark = pytest.mark.slow
 
@@ -19,8 +17,7 @@ def fixture_out(tmp_path_factory):
     drives = {"pfc_delta": Drive("pfc_delta", "parameters.yaml", friction=False)}
     circle = CircularRun("festo_expt_45", drives, starts=1, runs=2, limits={"acceleration": 30.0})
     told = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(steps, "run_experiment", partial(run_experiment, periods=3))
+    with short_experiments():
         report = write_identification(out / "found", told.append, [circle])
     assert report.problem is None
     assert any("model written" in line for line in told)
