@@ -60,13 +60,14 @@ class BoundProgram:
 
     @functools.cached_property
     def initial(self) -> BoundFunction:
-        """What is remembered at the start."""
-        return self._bound(self.program.initial)
+        """What is remembered at the start; evaluated too rarely to be compiled."""
+        return self._bound(self.program.initial, False)
 
     @functools.cached_property
     def update(self) -> BoundFunction:
         """What is remembered at the next tick, where no stage evaluates it."""
         return self._bound(self.program.update)
 
-    def _bound(self, function: ca.Function) -> BoundFunction:
-        return BoundFunction(function, **{name: self._arrays[name] for name in function.name_in()})
+    def _bound(self, function: ca.Function, often: bool = True) -> BoundFunction:
+        arrays = {name: self._arrays[name] for name in function.name_in()}
+        return BoundFunction(function, often, **arrays)

@@ -22,6 +22,7 @@ class BoundFunction:
 
     Args:
         function: The function; arguments and results must be dense.
+        often: Whether it is evaluated so often that machine code pays.
         shared: Arrays to use for arguments or results of these names, so that functions
             need not copy from each other. Contiguous, of doubles.
 
@@ -35,7 +36,7 @@ class BoundFunction:
             not fit.
     """
 
-    def __init__(self, function: ca.Function, **shared: np.ndarray) -> None:
+    def __init__(self, function: ca.Function, often: bool = True, /, **shared: np.ndarray) -> None:
         self.arguments = {
             name: _array(name, function.sparsity_in(i), shared)
             for i, name in enumerate(function.name_in())
@@ -46,7 +47,7 @@ class BoundFunction:
         }
         self.evaluate: Callable[[], None]
         self._function = function
-        code = native_code(function)
+        code = native_code(function) if often else None
         if code is None:
             self.evaluate = self._interpreted(function)
         else:

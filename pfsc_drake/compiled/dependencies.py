@@ -185,8 +185,7 @@ def _jacobian(function: ca.Function) -> sp.csr_array:
 
 def _calls(function: ca.Function) -> bool:
     """Return whether a function of scalar expressions calls others."""
-    operations = (function.instruction_id(k) for k in range(function.n_instructions()))
-    return ca.OP_CALL in operations
+    return bool(function.find_functions())
 
 
 def _everything(n_rows: int, n_columns: int) -> sp.csr_array:

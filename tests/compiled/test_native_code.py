@@ -53,7 +53,7 @@ def test_callable_keeps_code_and_arrays_alive(afresh):
     result = np.zeros(1)
     evaluate = native_code(ca.Function("f", [x[:2]], [x[0] + x[1]])).bind([np.ones(2)], [result])
     module._compiled.clear()
-    gc.collect()
+    gc.collect(1)  # of all that a process has it takes seconds
     trash = [np.full(2, np.nan) for _ in range(100)]
     evaluate()
     assert result[0] == 2.0
@@ -154,7 +154,7 @@ def test_what_is_bound_outlives_what_is_kept(monkeypatch):
         native_code(f).bind([np.ones(1)], [y]) for f, y in zip(functions, results, strict=True)
     ]
     assert native_code(functions[5]) is native_code(functions[5])
-    gc.collect()
+    gc.collect(1)  # of all that a process has it takes seconds
     for call in calls:
         call()
     np.testing.assert_array_equal(np.ravel(results), np.arange(6) + 0.5)

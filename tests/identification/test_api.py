@@ -7,6 +7,7 @@ import pytest
 import identification
 from identification import Identification, consistent_model, estimate, simulate
 from pfsc_drake import InputError
+from tests.one_process import short_experiments
 
 ROBOT = "festo_expt_45"
 
@@ -14,7 +15,8 @@ ROBOT = "festo_expt_45"
 @pytest.fixture(scope="module", name="found")
 def fixture_found(tmp_path_factory):
     out = tmp_path_factory.mktemp("identification")
-    records = simulate(ROBOT, out=out / "runs", runs=1, quiet=True)
+    with short_experiments():
+        records = simulate(ROBOT, out=out / "runs", runs=1, quiet=True)
     assert [file.name for file in records] == ["run_1.h5"]
     return estimate(ROBOT, records[0], out=out / "found", simulated=True, quiet=True)
 

@@ -12,6 +12,7 @@ from identification.consistency.printed import chi_squared_of_printed
 from identification.model.parameters import true_parameters
 from identification.model.subject import load_subject
 from pfsc_drake.robot.models.files import models_directory
+from tests.one_process import short_experiments
 
 ROBOT = "festo_expt_45"
 
@@ -20,7 +21,8 @@ ROBOT = "festo_expt_45"
 def fixture_work(tmp_path_factory):
     """Two runs of the shipped excitation, and what was estimated of them."""
     out = tmp_path_factory.mktemp("identification")
-    assert main(["simulate", ROBOT, "--runs", "2", "--out", str(out / "runs")]) == 0
+    with short_experiments():
+        assert main(["simulate", ROBOT, "--runs", "2", "--out", str(out / "runs")]) == 0
     records = [str(out / "runs" / f"run_{seed}.h5") for seed in (1, 2)]
     assert main(["estimate", ROBOT, *records, "--simulated", "--out", str(out / "found")]) == 0
     return out

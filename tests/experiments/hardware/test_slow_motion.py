@@ -22,6 +22,7 @@ from pfsc_drake.robot.robot_model import gravity_function, mass_function
 from tests.experiments.hardware.test_drive import panda
 
 FOLDER = find_scenario("pfc_panda_7r").parent
+PERIOD = 4e-3  # s, of what leads the simulated robot
 
 
 class Stepped(ControllerEnd):
@@ -31,7 +32,7 @@ class Stepped(ControllerEnd):
         lcm, spoken = DrakeLcm("memq://"), dialect("panda")
         super().__init__(lcm, spoken)
         robot_settings.simulation.integrator = "runge_kutta3"
-        robot_settings.simulation.max_step = 1e-3
+        robot_settings.simulation.max_step = PERIOD / 2.0
         self.robot = SimulatedRobot(
             build_robot_station(robot_settings, FOLDER),
             robot_settings,
@@ -57,23 +58,21 @@ class Stepped(ControllerEnd):
         self.robot.tell()
 
 
-def checked(
-    seen=lambda status: status, heard=lambda values: values, settings=None, believed=None, load=0.0
-):
+def checked(seen=lambda status: status, heard=lambda values: values, settings=None, load=0.0):
     """Return what the check says of a robot whose messages are changed on their way.
 
     What the robot carries, its driver does not compensate.
     """
     settings = settings or panda()
-    settings.controller.sampling_time = 2e-3
+    settings.controller.sampling_time = PERIOD
     true = read_arm(settings.robot, FOLDER).chain
     end = Stepped(settings, seen, heard)
     if load:
         end.robot._weight = gravity_function(carrying(true, -load))
     first = end.receive(0.0)
-    believed = believed or carrying(true, -load)
+    believed = carrying(true, -load)
     moved = move_slowly(
-        end, believed, first, 3.0, ControlMode.TORQUE, 2e-3, lambda: False, lambda t, phase: None
+        end, believed, first, 3.0, ControlMode.TORQUE, PERIOD, lambda: False, lambda t, phase: None
     )
     q, torque = moved.q, moved.torque
     if not len(q):
@@ -97,47 +96,78 @@ def quicker(monkeypatch):
 
 
 class Obedient:
-    """A robot that does exactly what it is to do, with friction and inertia, and tells it."""
+    """A robot that does exactly what it is to do, with friction and inertia, and tells it.
 
-    def __init__(self, chain, zero=0.0):
-        self._chain, self._tick, self.sent = chain, 0, []
+    Args:
+        chain: The robot.
+        seen: Changes what it tells.
+    """
+
+    def __init__(self, chain, seen=lambda status: status):
+        self.chain, self._tick, self._seen = chain, 0, seen
         start = np.deg2rad([20.0, -30.0, 25.0, -110.0, 15.0, 80.0, 40.0])
         self._tour = JointTour(chain, start, np.deg2rad(3.0), ControlMode.TORQUE, 0.01)
-        self._zero = np.deg2rad(zero) * (np.arange(7) == 1)
-        self._weight, self._mass = gravity_function(chain), mass_function(chain)
+        self.weight, self._mass = gravity_function(chain), mass_function(chain)
 
     def receive(self, timeout):
         q, v, a = self._tour.desired(0.01 * self._tick)
-        torque = np.asarray(self._weight(q)).ravel() + np.asarray(self._mass(q)) @ a
+        torque = np.asarray(self.weight(q)).ravel() + np.asarray(self._mass(q)) @ a
         torque += 3.0 * np.sign(v) * (np.abs(v) > 1e-9) + 2.0 * v
         self._tick += 1
-        return RobotStatus(10_000 * (self._tick - 1), q + self._zero, v, torque)
+        return self._seen(RobotStatus(10_000 * (self._tick - 1), q, v, torque))
 
     def send(self, command):
-        self.sent.append(command)
+        """Need no command."""
+
+    def checked(self, believed):
+        """Return what it told in slow motion, and what the check says of it."""
+        first = self.receive(0.0)
+        moved = move_slowly(
+            self, believed, first, 3.0, ControlMode.TORQUE, 0.01, lambda: False, lambda t, phase: 0
+        )
+        assert moved.complaint is None
+        return moved, check_statics(believed, moved.q, moved.torque)
 
 
-@pytest.mark.parametrize("zero", [0.0, -3.0])
-def test_friction_and_inertia_take_no_part(zero):
-    chain = read_arm(panda().robot, FOLDER).chain
-    robot = Obedient(chain, zero)
-    first = robot.receive(0.0)
-    moved = move_slowly(
-        robot, chain, first, 3.0, ControlMode.TORQUE, 0.01, lambda: False, lambda t, phase: None
-    )
-    assert moved.complaint is None
+@pytest.fixture(scope="module", name="chain")
+def fixture_chain():
+    return read_arm(panda().robot, FOLDER).chain
+
+
+def test_friction_and_inertia_take_no_part(chain):
+    robot = Obedient(chain)
+    moved, found = robot.checked(chain)
     assert np.all(np.isfinite(moved.torque).sum(axis=0) >= 5)
-    found = check_statics(chain, moved.q, moved.torque)
-    if zero:
-        assert found.verdict.startswith("most likely the zero of joint 2 is off by -3.0")
-    else:
-        assert found.is_good
-        off = moved.torque - np.array([np.asarray(robot._weight(q)).ravel() for q in moved.q])
-        assert np.nanmax(np.abs(off)) < 0.1
+    assert found.is_good
+    off = moved.torque - np.array([np.asarray(robot.weight(q)).ravel() for q in moved.q])
+    assert np.nanmax(np.abs(off)) < 0.1
 
 
 def flip(values, joint):
     return np.where(np.arange(7) == joint, -values, values)
+
+
+@pytest.mark.parametrize("degrees", [2.0, -3.0])
+def test_a_zero_that_is_off(chain, degrees):
+    off = np.deg2rad(degrees) * (np.arange(7) == 1)
+    _, found = Obedient(chain, lambda s: replace(s, q=s.q + off)).checked(chain)
+    # alone, while at rest as well other zeros may be
+    assert found.verdict.startswith(f"most likely the zero of joint 2 is off by {degrees}")
+    assert "as well may be" not in found.verdict
+
+
+def test_a_torque_with_the_wrong_sign(chain):
+    robot = Obedient(chain, lambda s: replace(s, torque=flip(s.torque, 3)))
+    verdict = robot.checked(chain)[1].verdict
+    assert verdict.startswith("most likely the torque of joint 4 has the wrong sign")
+
+
+def test_gravity_from_another_side(chain):
+    upside_down = replace(chain, gravity=np.array([0.0, 0.0, 9.81]))
+    _, found = Obedient(chain).checked(upside_down)
+    assert found.verdict.startswith("most likely gravity is [")
+    numbers = found.causes[0].words.split("[")[1].split("]")[0]
+    np.testing.assert_allclose(np.array(numbers.split(","), float), [0.0, 0.0, -9.81], atol=0.1)
 
 
 @pytest.mark.slow
@@ -155,35 +185,11 @@ def test_a_robot_as_it_is_believed_with_friction():
 
 
 @pytest.mark.slow
-def test_a_torque_with_the_wrong_sign():
-    found, _ = checked(seen=lambda s: replace(s, torque=flip(s.torque, 3)))
-    assert found.verdict.startswith("most likely the torque of joint 4 has the wrong sign")
-
-
-@pytest.mark.slow
-def test_a_zero_that_is_off():
-    off = np.deg2rad(2.0) * (np.arange(7) == 1)
-    found, _ = checked(seen=lambda s: replace(s, q=s.q + off))
-    # alone, while at rest as well other zeros may be
-    assert found.verdict.startswith("most likely the zero of joint 2 is off by 2.0")
-    assert "as well may be" not in found.verdict
-
-
-@pytest.mark.slow
 def test_a_payload_that_nobody_told():
     found, off = checked(load=0.5)
     assert found.verdict.startswith("most likely the tool weighs 0.5")
     assert "kg more than is told" in found.verdict
     assert off < np.deg2rad(1.0)
-
-
-@pytest.mark.slow
-def test_gravity_from_another_side():
-    true = read_arm(panda().robot, FOLDER).chain
-    found, _ = checked(believed=replace(true, gravity=np.array([0.0, 0.0, 9.81])))
-    assert found.verdict.startswith("most likely gravity is [")
-    numbers = found.causes[0].words.split("[")[1].split("]")[0]
-    np.testing.assert_allclose(np.array(numbers.split(","), float), [0.0, 0.0, -9.81], atol=0.1)
 
 
 def test_a_joint_that_turns_the_other_way_than_it_is_told():

@@ -128,9 +128,3 @@ def test_a_dry_run_sends_nothing(tmp_path):
     assert "nothing was sent" in drive
     assert ", 0 of them too old" in robot
     assert " 0 commands" in robot
-
-
-def test_another_robot_is_refused(tmp_path):
-    status, _, drive = both(tmp_path, "pfc_compliant_6r", "pfc_panda_7r")
-    assert status == 2
-    assert "the robot has 6 joints; the scenario's has 7" in drive

@@ -4,8 +4,6 @@ import pytest
 
 from experiments.sweep import many
 from experiments.sweep.worker import run_task
-from identification import steps
-from reporting.processes import side_by_side
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -21,5 +19,4 @@ def in_this_process():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(many, "run_many", run_many)
-        patch.setattr(steps, "side_by_side", lambda workers, most: side_by_side(1, most))
         yield

@@ -10,7 +10,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_the_page_is_written(tmp_path, monkeypatch):
-    path = {"short": ("pfc_elastic_3r", ("reference.points=[0.0, 0.3]",))}
+    path = {"short": ("pfc_elastic_3r", ("reference.points=[0.0, 0.1]",))}
     for name, value in {"PATHS": path, "_SEEDS": (), "_ASKED": ((1.0, 10.0),), "_FINER": 2}.items():
         monkeypatch.setattr(fastest, name, value)
     said: list[str] = []

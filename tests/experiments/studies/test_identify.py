@@ -6,6 +6,7 @@ import h5py
 import pytest
 
 from experiments.studies.identify import CircularRun, Drive, write_identification
+from tests.one_process import short_experiments
 
 pytestmark = pytest.mark.slow
 
@@ -16,7 +17,8 @@ def fixture_out(tmp_path_factory):
     drives = {"pfc_delta": Drive("pfc_delta", "parameters.yaml", friction=False)}
     circle = CircularRun("festo_expt_45", drives, starts=1, runs=2, limits={"acceleration": 30.0})
     told = []
-    report = write_identification(out / "found", told.append, [circle])
+    with short_experiments():
+        report = write_identification(out / "found", told.append, [circle])
     assert report.problem is None
     assert any("model written" in line for line in told)
     assert sum(line.endswith(" mm") for line in told) == 3
