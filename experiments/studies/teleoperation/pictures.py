@@ -29,6 +29,7 @@ def draw_felt(
     late = 1e3 * np.array(delays)
     for (name, rows), colour in zip(felt.items(), COLOURS, strict=False):
         style: dict[str, Any] = {"color": colour, "marker": "o", "markersize": 4}
+        style["linestyle"] = _line(name)
         steady = [np.nan if np.isnan(row.stiffness) else row.impedance for row in rows]
         free.plot(late, steady, label=name, **style)
         wall.plot(late, [row.stiffness for row in rows], label=name, **style)
@@ -58,6 +59,11 @@ def draw_felt(
     return Drawing("transparency", "What a hand feels, over the delay", caption, canvas)
 
 
+def _line(name: str) -> str:
+    """Return how a coupling is drawn; one that is made passive may lie upon the one that is not."""
+    return ":" if name.endswith(", passive") else "-"
+
+
 def draw_contact(contact: Mapping[str, Motion], delay: float) -> Drawing:
     """A hand that presses a point against a wall far away.
 
@@ -68,9 +74,10 @@ def draw_contact(contact: Mapping[str, Motion], delay: float) -> Drawing:
     canvas, (leader, point, force) = make_panels(3)
     for (name, motion), colour in zip(contact.items(), COLOURS, strict=False):
         time = np.arange(len(motion.hand)) * PERIOD
-        leader.plot(time, 1e3 * motion.handle[:, 0], color=colour, label=name)
-        point.plot(time, 1e3 * motion.point[:, 0], color=colour)
-        force.plot(time, -motion.motor[:, 0], color=colour)
+        style: dict[str, Any] = {"color": colour, "linestyle": _line(name)}
+        leader.plot(time, 1e3 * motion.handle[:, 0], label=name, **style)
+        point.plot(time, 1e3 * motion.point[:, 0], **style)
+        force.plot(time, -motion.motor[:, 0], **style)
     for panel in (leader, point):
         panel.axhline(1e3 * WALL, color=INK, linestyle="--", linewidth=0.9)
     leader.set(title="Leader", ylabel="way in mm")

@@ -82,7 +82,7 @@ def random_port(seed, ticks=300, arriving=2e-3, **options):
     return rows
 
 
-COUNTS = [2, pytest.param(200, marks=pytest.mark.slow)]
+COUNTS = [2, pytest.param(50, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -133,6 +133,25 @@ def test_other_couplings_draw_turns_together():
     np.testing.assert_allclose(row["force"], [0, 0, 0, drawn, 1.0, 0], atol=1e-9)
     row = step(port, P_0, R_0, message(2, *told))
     np.testing.assert_allclose(row["force"], [0, 0, 0, 30.0 * 0.1, 1.0, 0], atol=1e-9)
+
+
+def test_a_moment_does_the_work_of_the_force_on_the_vector():
+    """Far from the start, springs on phi: at any w, its rate by differences of the rotation."""
+    port, turn = make(coupling="four_channel", passive=False, moment=1e3), [0.9, -0.4, 0.6]
+    step(port, P_0, R_0, message())
+    R = Rotation.from_rotvec(turn)
+    told = message(1, (0, 0, 0, 1.0, 0.3, -0.2))
+    for _ in range(3):
+        row = step(port, P_0, R * R_0, told)
+    spring = 30.0 * (np.array([1.0, 0.3, -0.2]) - turn)
+    for w in np.eye(3):
+        ends = [(Rotation.from_rotvec(h * w) * R).as_rotvec() for h in (-1e-5, 1e-5)]
+        work = spring @ (ends[1] - ends[0]) / 2e-5
+        assert row["force"][3:] @ w == pytest.approx(work, abs=1e-6)
+
+
+def test_a_reserve_is_for_forces_and_moments():
+    assert PortLimits(30.0, 2.0, 1, T, 3.0, 4.0).reserve == pytest.approx(2.0 * T * (60.0 + 12.0))
 
 
 def test_where_energy_lacks_turns_are_damped_in_the_ratio_of_impedances():

@@ -1,12 +1,13 @@
 """Where a tool is that is led from afar, and what it feels there."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
-from pfsc_drake.control.teleoperation.reaction import FixtureReaction, LedPoint
+from pfsc_drake.control.teleoperation.reaction import FixtureReaction, LedOrientation, LedPoint
 from pfsc_drake.robot.robot_model import pose_function
 from tests.diagrams.conftest import Arm
 
@@ -63,3 +64,29 @@ def test_a_tool_on_a_path_is_where_its_lag_ends():
     )
     np.testing.assert_allclose(row["position"], y + 0.02 * rate, atol=1e-8)
     np.testing.assert_array_equal(row["felt"], [1.0, 2.0, 3.0])
+
+
+def test_a_tool_is_turned_as_where_its_lag_ends():
+    """``exp(lag [w]) R``, w by differences of the pose."""
+    robot = Arm("comau_racer_1_4").chain
+    q, v = np.deg2rad([10.0, 100, -35, 5, 70, -6]), np.array([0.2, -0.1, 0.3, 0.5, 0.4, 0.1])
+    pose, step = pose_function(robot), 1e-5
+
+    def rotation(at):
+        return Rotation.from_matrix(pose(at).full().ravel()[3:12].reshape(3, 3))
+
+    w = (rotation(q + step * v) * rotation(q - step * v).inv()).as_rotvec() / (2 * step)
+    row = Stepper(LedOrientation(robot, 0.2)).step(joint_state=np.concatenate([q, v, q, v]))
+    expected = (Rotation.from_rotvec(0.2 * w) * rotation(q)).as_matrix()
+    np.testing.assert_allclose(row["orientation"], expected.ravel(), atol=1e-7)
+
+
+def test_with_six_axes_moments_are_felt():
+    robot, still = Arm("comau_racer_1_4").chain, np.zeros(24)
+    wrench = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    row = Stepper(LedPoint(robot, 0.02, 6)).step(joint_state=still, wrench=wrench)
+    np.testing.assert_array_equal(row["felt"], wrench)
+    row = Stepper(FixtureReaction(2, 6), ("wrench",)).step(
+        record=record([0.1, 0.2, 0.3], [(0, (0.0, 0.0, 1.0), 7.0)]), wrench=wrench
+    )
+    np.testing.assert_allclose(row["felt"], [1.0, 2.0, 10.0, 4.0, 5.0, 6.0], atol=1e-12)

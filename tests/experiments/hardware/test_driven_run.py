@@ -70,3 +70,18 @@ def test_nobody_answers(tmp_path, monkeypatch):
             progress=nothing,
         )
     assert not (tmp_path / "out").exists()
+
+
+def test_a_controller_in_c_is_not_led_from_afar(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.hardware.driven_run.check_native", lambda *_: None)
+    with pytest.raises(InputError, match="--native: a controller in C hears no leader"):
+        drive_scenario(
+            read_scenario("teleop_path", ["teleoperation.lcm=memq://"]),
+            ControllerEnd(DrakeLcm("memq://"), dialect("panda")),
+            out=tmp_path / "out",
+            duration=None,
+            figures=False,
+            recording=False,
+            progress=nothing,
+            native=True,
+        )
