@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.scenario.checks import require_whole_ticks
 from diagrams.scenario.turntable import TurntableParameters
 from diagrams.tasks.held_frame import HeldFrame
+from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.carried import DifferencedFrame
@@ -70,7 +71,7 @@ def add_turntable(
     if parameters.believed_delay is not None:
         delay = parameters.believed_delay
 
-    def add(name: str, block: object) -> BlockSystem:
+    def add(name: str, block: Block) -> BlockSystem:
         return builder.AddNamedSystem(f"{TURNTABLE}{name}", BlockSystem(block, period))
 
     followed = add("followed", TimedReference(_later(command, parameters.lag), 1, n, period))

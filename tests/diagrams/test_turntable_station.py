@@ -5,7 +5,9 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
+from diagrams.robot_station import build_robot_station
 from diagrams.scenario import Scenario
+from diagrams.scenario.schema import driven
 from diagrams.scenario.turntable import TurntableAxisParameters, TurntableParameters
 from diagrams.turntable_station import turntable_command
 from experiments.results.holder import holder_metrics
@@ -135,3 +137,12 @@ def test_wrong_input_is_refused_by_its_key(said):
 def test_margins_know_no_turntable(late):
     with pytest.raises(InputError, match="turntable = given; allowed: null where margins"):
         build_station(exact(), SCENARIO_DIRECTORY, like=late[0], with_slope=True)
+
+
+@pytest.mark.parametrize("carrier", ["holder", "turntable"])
+def test_a_robot_elsewhere_has_no_workpiece_that_moves(carrier):
+    settings = shipped_scenario("pfc_two_arms" if carrier == "holder" else "pfc_turntable")
+    with pytest.raises(InputError, match=f"^{carrier} = given; allowed: null where the robot"):
+        driven(settings)
+    with pytest.raises(InputError, match=f"^{carrier} = given; allowed: null where the contr"):
+        build_robot_station(settings, SCENARIO_DIRECTORY)

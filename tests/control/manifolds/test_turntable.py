@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RevoluteJoint, SpatialInertia
+from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, SpatialInertia
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE
@@ -41,7 +41,7 @@ def table():
         body = plant.AddRigidBody(f"body_{k}", SpatialInertia.SolidSphereWithMass(1.0, 0.1))
         # axes of the base, origin at the axis' point
         X_PF = X_BJ @ RigidTransform(point) if k == 0 else RigidTransform(point - POINTS[k - 1])
-        frame = plant.AddFrame(_fixed(f"frame_{k}", before, X_PF))
+        frame = plant.AddFrame(FixedOffsetFrame(f"frame_{k}", before, X_PF))
         joint = RevoluteJoint(f"joint_{k}", frame, body.body_frame(), direction)
         plant.AddJoint(joint)
         before = body.body_frame()
@@ -56,17 +56,10 @@ def table():
     return pose
 
 
-def _fixed(name, parent, X_PF):
-    from pydrake.multibody.tree import FixedOffsetFrame
-
-    return FixedOffsetFrame(name, parent, X_PF)
-
-
 @pytest.fixture(scope="module")
 def rows():
     """Return derivatives 0..r of the angles at zero, one row each."""
-    rows = np.random.default_rng(4).uniform(-1.0, 1.0, (ORDER + 1, 2))
-    return rows
+    return np.random.default_rng(4).uniform(-1.0, 1.0, (ORDER + 1, 2))
 
 
 def moved(rows, t):

@@ -13,8 +13,8 @@ from pfsc_drake.geometry import quaternion_to_matrix
 STEP = 1e-3
 
 
-def find(robot, law, path, times, start):
-    """Return a course along a path, and the arc lengths."""
+def find(robot, law, path, times, start, frames=None):
+    """Return a course along a path, and the arc lengths; at rest on one that is carried."""
     order = RELATIVE_DEGREE["elastic"]
     manifold = PathManifold(order, oriented=path.orientation is not None)
     evaluator = path.evaluator(order)
@@ -24,12 +24,15 @@ def find(robot, law, path, times, start):
         lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
         law.inverse,
         law.posture,
+        carried=frames is not None,
     )
     eta = rest_to_rest([0.3, 0.45], velocity=1.0, acceleration=8.0)
     reference = np.zeros((len(times), order + 1, len(manifold.coordinates)))
     reference[:, :, 0] = eta.derivatives(times, order)[:, :, 0]
-    theta = path.arc_length.parameter(0.3)
-    return finder.find(CourseStart(start, np.array([theta])), reference, times), reference[:, 0, 0]
+    if frames is not None:
+        reference[:] = reference[0]
+    begin = CourseStart(start, np.array([path.arc_length.parameter(0.3)]))
+    return finder.find(begin, reference, times, frames=frames), reference[:, 0, 0]
 
 
 def check(robot, path, course, eta, tolerance=1e-4):
@@ -57,6 +60,26 @@ def test_six_axes(load_robot, make_law, oriented_path):
     near = rigid.reach(y_t) + 0.01
     course, eta = find(robot, law, oriented_path, np.arange(0.0, 0.15, STEP), near)
     check(robot, oriented_path, course, eta)
+
+
+def test_a_tool_at_rest_on_what_begins_to_move_moves_with_it(load_robot, make_law, oriented_path):
+    """The frame rests for 20 ms, and goes 40 mm along y then, not turning."""
+    robot = load_robot("comau_racer_1_4_elastic")
+    law = make_law(robot.chain, "elastic")
+    place = oriented_path.position.derivatives(oriented_path.arc_length.parameter(0.3), 0)[0]
+    near = load_robot("comau_racer_1_4").reach(place) + 0.01
+    times = np.arange(0.0, 0.1, 4e-3)
+    way = np.polynomial.Polynomial([0.0] * 5 + [0.04 / 0.08**5])
+    frames = np.zeros((len(times), 5, 12))
+    frames[:, 0, 3:] = np.eye(3).ravel()
+    for k in range(5):
+        frames[:, k, 1] = np.where(times > 0.02, way.deriv(k)(times - 0.02), 0.0)
+    frames = frames.reshape(len(times), -1)
+    course, _ = find(robot, law, oriented_path, times, near, frames)
+    for q, p in zip(course, frames[:, :3], strict=True):
+        y_t, _ = robot.tool_pose(np.concatenate([q[0], 0 * q[0], q[0], 0 * q[0]]))
+        assert np.allclose(y_t, place + p, rtol=0, atol=1e-9)
+    assert not course[:5, 1:].any() and np.abs(course[-1, 1]).max() > 0.5
 
 
 def test_joints_beyond_the_outputs_move_next_to_their_posture(load_robot, make_law, position_path):

@@ -1,0 +1,28 @@
+"""The study of what must be known of a workpiece's motion, shrunk."""
+
+import json
+
+import pytest
+
+from experiments.scenario_file import read_scenario
+from experiments.studies.two_arms import SOURCES, WORLDS, at_speed, write_two_arms
+
+
+def test_both_arms_are_the_shipped_ones_at_its_speed():
+    shipped, same = read_scenario("pfc_two_arms", []), read_scenario("pfc_two_arms", at_speed(0.3))
+    for one in (lambda data: data, lambda data: data["holder"]):
+        told, own = one(same.data)["reference"], one(shipped.data)["reference"]
+        for key in ("velocity", "acceleration"):
+            assert told[key] == pytest.approx(own[key], rel=1e-12)
+
+
+@pytest.mark.slow
+def test_jets_beat_the_pose_alone(tmp_path):
+    world, lines = "nothing wrong", []
+    first, *_, last = SOURCES
+    told = {name: SOURCES[name] for name in (first, last)}
+    report = write_two_arms(tmp_path, lines.append, {world: WORLDS[world]}, told, [0.3])
+    assert report.problem is None and len(lines) == 2
+    metrics = json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8"))
+    off = {name: metrics[f"{world}, {name}, 0.3 m/s"]["value"] for name in told}
+    assert off[first] < 1e-6 and off[last] > 5e-4
