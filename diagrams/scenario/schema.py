@@ -206,7 +206,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         InputError: If it needs what only a simulation knows.
     """
     left, plain = deepcopy(scenario), Scenario()
-    for key in ("plate", "operator", "teleoperation", "holder", "obstacles"):
+    for key in ("plate", "operator", "teleoperation", "holder"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
     controller = scenario.controller
@@ -228,6 +228,11 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
             setattr(left.simulation, key, getattr(plain.simulation, key))
             ignored.append(f"simulation.{key}")
     said = [f"left to the robot: {', '.join(ignored)}"] if ignored else []
+    if scenario.obstacles is not None:
+        said.append(
+            "obstacles.moving, obstacles.sensor: where obstacles are comes by messages; without "
+            "them nothing moves"
+        )
     faults = left.faults
     rigid = controller.law in _OF_ONE_SIDE
     holding = _HOLD_BANDWIDTH if rigid else _HOLD_OF_SPRINGS

@@ -108,6 +108,16 @@ def test_what_is_no_number_stops_it():
     assert np.isnan(record[0])
 
 
+def test_who_is_not_seen_at_first_keeps_it_waiting_until_he_is():
+    crane = _Crane()
+    for _ in range(300):
+        crane.step(np.full(6, np.nan))
+    assert crane.clock[0] == 0.0
+    for _ in range(300):
+        _, pace, _ = crane.step(_standing(0.0, 50.0))
+    assert pace > 0.9
+
+
 def test_the_way_is_free_ahead_of_one_who_comes_slowly_later():
     """He would be on the path in two seconds: the tool is past before, and does not wait."""
     crane, waited = _Crane(length=1.0), False
