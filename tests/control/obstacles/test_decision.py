@@ -94,3 +94,11 @@ def test_to_set_off_through_somebody_more_time_is_needed_than_to_go_on():
     assert _decide(left=left, **given, passed=1.0)[2] == 1.0
     assert _decide(left=left + 0.02, **given)[2] == 1.0
     assert _decide(left=left - 0.06, **given, passed=1.0)[2] == 0.0
+
+
+def test_where_somebody_is_expected_between_two_samples_it_does_not_go_on():
+    left = np.full(COUNT, 0.8 * PACE.time_to_stop)
+    permitted = _decide(left=left, s=1.02)[0]
+    assert 0.05 < permitted < 1.0
+    assert _decide(left=left, expected=_expected([BEHIND]), s=1.02, retreat=0.0)[0] == 0.0
+    assert _decide(left=left, expected=_expected([BEHIND + 3]), s=1.02)[0] == permitted

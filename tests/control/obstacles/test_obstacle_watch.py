@@ -2,6 +2,7 @@
 
 import dataclasses as dc
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -43,6 +44,7 @@ class _Crane:
         q = np.vstack([x, np.zeros(len(x))])
         points = outline_points(chain, outline).map(len(x))(q).full().T
         ahead = ArmAhead(chain, outline, 0.0, step, points)
+        self.between = ahead.between
         self.reference = Stepper(WaitingReference(motion, self.pace, 1, PERIOD))
         self.watch = Stepper(
             ObstacleWatch(ahead, [SHAPE], parameters, self.pace, PERIOD), ("asked",)
@@ -86,6 +88,22 @@ def test_it_waits_before_one_who_stands_on_the_path_and_goes_on_when_he_has_gone
     for _ in range(4000):
         x, _, _ = crane.step(_standing(1.4, 50.0))
     assert x == pytest.approx(1.5, abs=1e-6)
+
+
+def test_the_pace_is_that_of_the_time_until_he_can_be_at_the_margin():
+    """Beside the start, whose next samples are farther away."""
+    crane, p = _Crane(), PARAMETERS
+    between = crane.between
+    assert between > 1e-3
+    for y in (0.7, 0.8):
+        _, _, record = crane.step(np.array([0.0, y, 0.0, 0.0, 0.0, 0.0]))
+        gap = y - SHAPE.radius - 0.1 - p.margin - p.uncertainty - between
+        time = gap / p.largest_speed - p.latency - PERIOD
+        permitted = float(crane.pace.permitted(ca.DM(time), [0.0] * 4))
+        assert 0.05 < permitted < 1.0
+        assert record[1] == pytest.approx(permitted, rel=1e-9)
+        assert record[0] == pytest.approx(y - SHAPE.radius - 0.1)
+        crane = _Crane()
 
 
 def test_a_pause_that_is_asked_for_is_one():
