@@ -45,7 +45,7 @@ from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.mounting_parts import add_payload
-from diagrams.surroundings.obstacles import add_obstacles
+from diagrams.surroundings.obstacles import add_obstacles, add_told_obstacles
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
@@ -176,7 +176,10 @@ def build_station(
     )
     joint_state = links.joint_state
     override = part.override.get_output_port() if isinstance(part, RemoteArm) else None
-    obstacles = {} if crossing is None else add_obstacles(builder, crossing, period)
+    obstacles = {}
+    if crossing is not None:
+        told = add_told_obstacles if remote else add_obstacles
+        obstacles = told(builder, crossing, period)
     place = add_place(
         builder, following, joint_state, override, obstacles.get("obstacles_measured")
     )

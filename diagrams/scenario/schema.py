@@ -211,7 +211,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         InputError: If it needs what only a simulation knows.
     """
     left, plain = deepcopy(scenario), Scenario()
-    for key in ("plate", "operator", "holder", "turntable", "obstacles"):
+    for key in ("plate", "operator", "holder", "turntable"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
     if scenario.teleoperation is not None:
@@ -241,6 +241,11 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         said.append("left to the leader: hand")
     if ignored:
         said.append(f"left to the robot: {', '.join(ignored)}")
+    if scenario.obstacles is not None:
+        said.append(
+            "obstacles.moving, obstacles.sensor: where obstacles are comes by messages; without "
+            "them nothing moves"
+        )
     faults = left.faults
     rigid = controller.law in _OF_ONE_SIDE
     holding = _HOLD_BANDWIDTH if rigid else _HOLD_OF_SPRINGS

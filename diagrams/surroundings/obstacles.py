@@ -1,6 +1,8 @@
 """Obstacles that move by themselves, and what is measured of them."""
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.scenario.checks import require_whole_ticks
 from diagrams.scenario.obstacles import CrossingParameters
@@ -9,6 +11,26 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 
 _MOST_TICKS = 1000
+# source of what is told of them where the robot stands elsewhere
+TOLD = "obstacles_told"
+
+
+def add_told_obstacles(
+    builder: DiagramBuilder, crossing: CrossingParameters, period: float
+) -> dict[str, OutputPort]:
+    """Add what others tell of obstacles, of which nothing else is known.
+
+    Args:
+        builder: Builder of the diagram.
+        crossing: What they look like.
+        period: Sampling time [s], of no matter here.
+
+    Returns:
+        As :func:`add_obstacles`, both the same.
+    """
+    nothing = np.full(6 * len(crossing.moving), np.nan)
+    told = builder.AddNamedSystem(TOLD, ConstantVectorSource(nothing)).get_output_port()
+    return {"obstacles": told, "obstacles_measured": told}
 
 
 def add_obstacles(

@@ -160,6 +160,7 @@ def add_place(
     else:
         if following.waiting is not None and obstacles is not None:
             told = {"joint_state": joint_state, "obstacles_measured": obstacles}
+            told |= {} if override is None else {"override": override}
             waits = add_waiting_reference(builder, following.waiting, task, m, period, told)
             desired = waits.pop("reference")
         elif not isinstance(task, SpaceTask):

@@ -103,7 +103,8 @@ def add_waiting_reference(
         task: What the tool is to do.
         outputs: Number of outputs.
         period: Sampling time [s].
-        ports: ``joint_state`` and ``obstacles_measured``.
+        ports: ``joint_state`` and ``obstacles_measured``, and ``override`` if somebody may ask for
+            another pace.
 
     Returns:
         ``reference``, and for the log ``clock`` and ``watch``; of an elbow that gives way
@@ -122,6 +123,8 @@ def add_waiting_reference(
         ports["joint_state"],
     )
     builder.Connect(ports["obstacles_measured"], watch.GetInputPort("obstacles"))
+    if "override" in ports:
+        builder.Connect(ports["override"], watch.GetInputPort("asked"))
     made = {}
     if waiting.crossing.elbow is not None:
         ahead, age = waiting.ahead, waiting.crossing.watch.latency

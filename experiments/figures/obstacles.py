@@ -30,11 +30,12 @@ def draw_obstacles(log: RunLog) -> Drawing:
     permitted = log["permitted_pace"].values[:, 0]
     pace.plot(log.time, going, color=COLOURS[0], label="pace")
     pace.plot(log.time, permitted, "--", color=REFERENCE, label="permitted, whatever they do")
-    pace.set(ylabel="pace / planned", title="Pace of the reference", ylim=(-0.02, 1.05))
+    pace.set(ylabel="pace / planned", title="Pace of the reference")
+    pace.set_ylim(min(-0.02, 1.05 * float(going.min(initial=0.0))), 1.05)
     lost.plot(log.time, log["time_lost"].values[:, 0], color=COLOURS[1])
     lost.set(ylabel="time in s", title="Time lost", ylim=(0.0, None))
-    running = np.flatnonzero(going > 0.0)
-    waits = going < _RESTING
+    running = np.flatnonzero(going)
+    waits = np.abs(going) < _RESTING
     if running.size:
         waits[: running[0]] = waits[running[-1] :] = False
     shade([distance, pace, lost], log.time, waits, "waits", _WAITS)

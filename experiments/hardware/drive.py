@@ -25,6 +25,7 @@ from experiments.hardware.drive_options import (
     command_mode,
 )
 from experiments.hardware.drive_record import DrivenTick, DriveRecord
+from experiments.hardware.told_obstacles import ToldObstacles
 from experiments.simulation import SimulationResult
 from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.drivers.link import ControllerEnd
@@ -80,7 +81,7 @@ class Drive:
         self.rate = torque_rates(options.torque_rate, effort)
         self._q = station.start_posture
         self.mode = command_mode(station)
-        self._simulator = Simulator(station.diagram)
+        self._simulator, self._obstacles = Simulator(station.diagram), ToldObstacles(station)
         self._first: RobotStatus | None = None
         self._last_state, self._last_torque = np.zeros(4 * self._n), np.zeros(self._n)
         self._sent: np.ndarray | None = None
@@ -178,6 +179,7 @@ class Drive:
         if request.override is not None:
             self.override = min(request.override, self.fastest_pace)
             self._part.set_override(self.root, self.override)
+        self._obstacles.hear(request, self.time)
         if request.stop:
             self.stop("asked to stop")
 
@@ -274,6 +276,7 @@ class Drive:
 
     def _tell(self, state: np.ndarray, torque: np.ndarray) -> None:
         self._part.tell(self.root, state, torque)
+        self._obstacles.tell(self.root, self.time)
         if self._part.wrench is not None and self._end.wrench is not None:
             context = self._part.wrench.GetMyMutableContextFromRoot(self.root)
             self._part.wrench.get_mutable_source_value(context).SetFromVector(self._end.wrench)

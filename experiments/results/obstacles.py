@@ -70,15 +70,17 @@ def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metric
     if crossing is None or "obstacle_distance" not in log or not log.time.size:
         return metrics
     least = log["obstacle_distance"].values.min(axis=1)
-    metrics.add("least_distance", float(least.min()))
-    moving = moves(log, crossing.watch.resting_speed)
+    # where the robot stands elsewhere nobody may have told of them
+    known = np.isfinite(least)
+    metrics.add("least_distance", float(least[known].min()) if known.any() else np.nan)
+    moving = moves(log, crossing.watch.resting_speed) & known
     metrics.add(
         "least_distance_while_moving", float(least[moving].min()) if moving.any() else np.nan
     )
     metrics.add("waited_time", float(log["time_lost"].values[-1, 0]))
     position = log["obstacle_position"].values.reshape(len(log.time), -1, 3)
     speed = np.linalg.norm(np.gradient(position, log.time, axis=0), axis=2)
-    metrics.add("largest_obstacle_speed", peak(speed))
+    metrics.add("largest_obstacle_speed", peak(speed[np.isfinite(speed)]))
     return metrics
 
 

@@ -22,6 +22,8 @@ from experiments.results.run_log import FloatArray, RunLog
 _LIFT = 3e-3
 # share of the samples whose distance fits the colours, and of the largest distance that it takes
 _LASTING, _LEAST_COLOR = 0.9, 0.1
+# where obstacles are drawn of which nobody has told [m]
+_OUT_OF_SIGHT = 1e3
 
 
 def collect_motion(
@@ -91,7 +93,7 @@ def _obstacles(station: Station, log: RunLog, frames: NDArray[np.int_]) -> Recor
         return None
     crossing = station.waiting.crossing
     shapes = [obstacle.shape for obstacle in crossing.moving]
-    positions = log["obstacle_position"].values[frames]
+    positions = np.nan_to_num(log["obstacle_position"].values[frames], nan=_OUT_OF_SIGHT)
     return RecordedObstacles(positions, shapes, crossing.watch.margin)
 
 

@@ -143,7 +143,8 @@ class ObstacleWatch(Block):
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero."""
-        return {"velocity": ca.vertcat(*[o[3:] for o in ca.vertsplit(u.obstacles, 6)])}
+        velocity = ca.vertcat(*[o[3:] for o in ca.vertsplit(u.obstacles, 6)])
+        return {"velocity": where(all_finite(u.obstacles), velocity, 0.0)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""

@@ -2,6 +2,7 @@
 
 import dataclasses as dc
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -43,6 +44,7 @@ class _Crane:
         q = np.vstack([x, np.zeros(len(x))])
         points = outline_points(chain, outline).map(len(x))(q).full().T
         ahead = ArmAhead(chain, outline, 0.0, step, points)
+        self.between = ahead.between
         self.reference = Stepper(WaitingReference(motion, self.pace, 1, PERIOD))
         self.watch = Stepper(
             ObstacleWatch(ahead, [SHAPE], parameters, self.pace, PERIOD), ("asked",)
@@ -88,6 +90,22 @@ def test_it_waits_before_one_who_stands_on_the_path_and_goes_on_when_he_has_gone
     assert x == pytest.approx(1.5, abs=1e-6)
 
 
+def test_the_pace_is_that_of_the_time_until_he_can_be_at_the_margin():
+    """Beside the start, whose next samples are farther away."""
+    crane, p = _Crane(), PARAMETERS
+    between = crane.between
+    assert between > 1e-3
+    for y in (0.7, 0.8):
+        _, _, record = crane.step(np.array([0.0, y, 0.0, 0.0, 0.0, 0.0]))
+        gap = y - SHAPE.radius - 0.1 - p.margin - p.uncertainty - between
+        time = gap / p.largest_speed - p.latency - PERIOD
+        permitted = float(crane.pace.permitted(ca.DM(time), [0.0] * 4))
+        assert 0.05 < permitted < 1.0
+        assert record[1] == pytest.approx(permitted, rel=1e-9)
+        assert record[0] == pytest.approx(y - SHAPE.radius - 0.1)
+        crane = _Crane()
+
+
 def test_a_pause_that_is_asked_for_is_one():
     crane = _Crane()
     paces = [crane.step(_standing(0.0, 50.0), 0.0)[1] for _ in range(500)]
@@ -106,6 +124,16 @@ def test_what_is_no_number_stops_it():
         _, pace, record = crane.step(np.full(6, np.nan))
     assert pace < 1e-3
     assert np.isnan(record[0])
+
+
+def test_who_is_not_seen_at_first_keeps_it_waiting_until_he_is():
+    crane = _Crane()
+    for _ in range(300):
+        crane.step(np.full(6, np.nan))
+    assert crane.clock[0] == 0.0
+    for _ in range(300):
+        _, pace, _ = crane.step(_standing(0.0, 50.0))
+    assert pace > 0.9
 
 
 def test_the_way_is_free_ahead_of_one_who_comes_slowly_later():
