@@ -13,11 +13,13 @@ from pydrake.multibody.tree import (
 from diagrams.scenario import (
     RobotParameters,
 )
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
-from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.models.files import packages_for, read_with_inclusions, resolve_model
 from pfsc_drake.robot.models.joint_edits import frame_named
+from pfsc_drake.robot.models.model_xml import read_model_xml
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.yaml.reading import read_yaml
 
@@ -45,9 +47,12 @@ def read_robot(
     Raises:
         InputError: If the model cannot be read.
     """
-    plant = MultibodyPlant(time_step)
     file, options = locate_model(parameters, folder), parameters.options(folder)
     try:
+        if before_finalizing is None:
+            read, said = _read_once(time_step, file, _text_of(file, options), options)
+            return read.Clone(), [*said]
+        plant = MultibodyPlant(time_step)
         return plant, read_model(plant, file, options, before_finalizing)
     except InputError as error:
         # what starts with an option is about the key of that name, what with the file about that
@@ -57,6 +62,21 @@ def read_robot(
         if str(error).startswith(str(file.parent)):
             raise InputError(f"robot.model: {error}") from None
         raise
+
+
+@once_per_content(20)
+def _read_once(
+    time_step: float, file: FilePath, _text: list[bytes], options: ModelOptions
+) -> tuple[MultibodyPlant, tuple[str, ...]]:
+    """Return a plant to be copied, which takes a fiftieth of what it takes to read it."""
+    plant = MultibodyPlant(time_step)
+    return plant, tuple(read_model(plant, file, options))
+
+
+def _text_of(file: FilePath, options: ModelOptions) -> list[bytes]:
+    """Return what a model's file and all that it includes hold."""
+    packages = packages_for(file, read_model_xml(file).content, options.packages)
+    return [model.content for model in read_with_inclusions(file, packages)]
 
 
 def locate_model(parameters: RobotParameters, folder: FilePath) -> FilePath:

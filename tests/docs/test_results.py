@@ -74,6 +74,7 @@ def test_what_was_run_is_kept_for_its_revision(tmp_path, monkeypatch):
 
 def test_two_scenarios(tmp_path, monkeypatch):
     monkeypatch.setattr(docs.results, "KEPT", tmp_path)
+    monkeypatch.setattr(docs.results, "count_cores", lambda: 1)
     two: list[Case] = cases(["pfc_elastic_3r", "pfc_comau_6r"])[:2]
     outcomes = run_all(two, duration=0.1)
     assert list(tmp_path.iterdir()) == []  # cut short, which nobody is to take for the whole

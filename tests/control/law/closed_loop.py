@@ -11,6 +11,8 @@ from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.geometry import quaternion_to_matrix
 
 STEP, STEPS = 5e-3, 100
+# of references that move all the time
+FEW_STEPS = 60
 # first derivative from nine equidistant values, error h^8 f^(9) / 630
 NINE_POINTS = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 
@@ -118,9 +120,9 @@ def rest_of_state(robot, rigid, q, size, seed=1):
     return np.concatenate([q, v, q + (D_E @ a + n_E) / K_s, v + D_E @ jerk / K_s])
 
 
-def simulate(loop, x):
+def simulate(loop, x, steps=STEPS):
     """Return times and states on a grid, each of them a step's end, not interpolated."""
-    times, states = STEP * np.arange(STEPS + 1), [x]
+    times, states = STEP * np.arange(steps + 1), [x]
     for begin, end in pairwise(times):
         leg = solve_ivp(
             loop.rates, (begin, end), states[-1], method="DOP853", rtol=1e-11, atol=1e-12
@@ -129,17 +131,18 @@ def simulate(loop, x):
     return times, np.array(states)
 
 
-def predicted(initial, poles):
+def predicted(initial, poles, steps=STEPS):
     """Return an error over the steps of :func:`simulate`, by its linear dynamics.
 
     Args:
         initial: The error and its derivatives at the start, shape (r,).
         poles: Of the dynamics, r of them.
+        steps: How many steps.
     """
     # the state of the companion form is e^(r-1), ..., e
     transition, e = expm(companion(np.poly(poles)) * STEP), initial[::-1]
     errors = []
-    for _ in range(STEPS + 1):
+    for _ in range(steps + 1):
         errors.append(e[-1])
         e = transition @ e
     return np.array(errors)
@@ -169,6 +172,6 @@ def assert_linear_dynamics(Y, v, outputs, reference):
     expected = reference[:, 0].copy()
     for i in range(m):
         poles = [-20.0 - 3.0 * i - 2.0 * k for k in range(r)]
-        expected[:, i] += predicted(initial[:, i], poles)
+        expected[:, i] += predicted(initial[:, i], poles, len(Y) - 1)
     # the integration leaves 1e-13
     assert np.abs(outputs - expected).max() < 1e-10

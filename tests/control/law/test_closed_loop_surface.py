@@ -14,6 +14,7 @@ from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid
 from tests.control.law.closed_loop import (
+    FEW_STEPS,
     ClosedLoop,
     assert_linear_dynamics,
     rest_of_state,
@@ -114,7 +115,7 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     q = robot.reach(sigma + axes @ [0.002, -0.003, 0.009 * loop.scale], R_e)
     loop.middle = q + 0.05
     x = np.append(rest_of_state(robot, rigid, q, loop.size), loop.scale * np.array([0.01, -0.012]))
-    times, states = simulate(loop, x)
+    times, states = simulate(loop, x, FEW_STEPS)
 
     results = [loop.evaluate(t, x) for t, x in zip(times, states, strict=True)]
     assert not any(result[made.layout.status][0] for result in results)

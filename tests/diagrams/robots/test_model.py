@@ -1,6 +1,7 @@
 """The robot in a diagram."""
 
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -48,6 +49,32 @@ def test_a_file_is_relative_to_the_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "mine")
     with pytest.raises(InputError, match=r"arm\.sdf': no such file"):
         add("mine/arm.sdf", tmp_path / "mine")
+
+
+def test_a_model_that_is_read_again_is_a_copy_of_its_own(tmp_path):
+    """And it is read anew where its file, or one that it includes, has changed."""
+    text = resolve_model(SHIPPED).read_text(encoding="utf-8")
+    (tmp_path / "arm.sdf").write_text(text, encoding="utf-8")
+    (tmp_path / "package.xml").write_text("<package><name>own</name></package>", encoding="utf-8")
+    (tmp_path / "all.sdf").write_text(
+        "<sdf version='1.9'><model name='all'><include merge='true'>"
+        "<uri>package://own/arm.sdf</uri></include>"
+        "</model></sdf>",
+        encoding="utf-8",
+    )
+    first, second = add("all.sdf", tmp_path), add("all.sdf", tmp_path)
+    assert first is not second
+    for plant in (first, second):
+        assert chain_from_plant(plant, tool_frame(plant, RobotParameters("all.sdf")))[0].K_s.any()
+    first.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -1.0])
+    again = add("all.sdf", tmp_path)
+    for plant in (second, again):
+        np.testing.assert_array_equal(plant.gravity_field().gravity_vector(), [0.0, 0.0, -9.81])
+    weight = again.CalcTotalMass(again.CreateDefaultContext())
+    heavier = re.sub(r"<mass>([^<]+)</mass>", lambda m: f"<mass>{2 * float(m[1])}</mass>", text)
+    (tmp_path / "arm.sdf").write_text(heavier, encoding="utf-8")
+    changed = add("all.sdf", tmp_path)
+    assert changed.CalcTotalMass(changed.CreateDefaultContext()) == pytest.approx(2.0 * weight)
 
 
 def test_file_names_that_do_not_depend_on_the_folder(tmp_path):
