@@ -114,6 +114,19 @@ class MotionDemand:
         led = course[:, : reference.shape[1]]
         return self._continued(self._finder.bare(self._start, led, reference), times[1])
 
+    def held_back(
+        self, motion: PiecewisePolynomialCurve, step: float, course: np.ndarray
+    ) -> np.ndarray:
+        """Return joint speeds by those from which on the law holds a posture back, (samples, N).
+
+        Args:
+            motion: Tangential coordinates over time.
+            step: As it was asked for.
+            course: Its course.
+        """
+        reference = self._sampled(motion, step)[1]
+        return self._finder.held_back(self._start, course[:, : reference.shape[1]], reference)
+
     def allowed(self, course: np.ndarray, reserve: float | None = None) -> np.ndarray:
         """Return what may be asked of the drives, (samples, 2N).
 

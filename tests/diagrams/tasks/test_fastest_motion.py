@@ -43,9 +43,10 @@ def build(settings, name=ARM):
     return build_station(settings, find_scenario(name).parent)
 
 
-def test_limits_are_met_on_the_path(fastest):
+@pytest.mark.parametrize(("name", "way"), [(ARM, 0.15), ("pfc_elastic_7r", -0.6)])
+def test_limits_are_met_on_the_path(name, way, fastest):
     """Torques of the simulated plant within 1 % of what was allowed, and of what was expected."""
-    station = build(fastest())
+    station = build(fastest(name, way), name)
     simulator = Simulator(station.diagram)
     station.set_start(simulator.get_mutable_context())
     simulator.AdvanceTo(station.reference_duration)
@@ -53,10 +54,10 @@ def test_limits_are_met_on_the_path(fastest):
     law, layout, plan = raw["law"], station.law.layout, station.task.drive_plan
     across = indices(station.task.place.coordinates, Kind.TRANSVERSAL)
     assert np.linalg.norm(law[:, layout.manifold_state][:, across], axis=1).max() < 5e-5
-    torque, limits = law[:, layout.drive], plan.limits[:3]
+    torque, limits = law[:, layout.drive], plan.limits[: station.robot.dimension]
     assert np.abs(torque / limits).max() < 1.01 * (1.0 - RESERVE)
     middle = times + station.controller.period / 2.0
-    expected = np.array([np.interp(middle, plan.times, tau) for tau in plan.demand[:, :3].T]).T
+    expected = np.array([np.interp(middle, plan.times, tau) for tau in plan.demand.T[: len(limits)]]).T
     assert np.abs(expected - torque).max() < 0.02 * np.abs(torque).max()
     assert not plan.said and plan.limiting.largest.max() < 1.006
     parts = plan.limiting.of_the_way(plan.speed)
