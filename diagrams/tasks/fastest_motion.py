@@ -33,8 +33,9 @@ _FIRST_SAMPLES, _OF_RADIUS = (400, 20_000), 1.0 / 6.0
 _PACES, _SPREAD = np.geomspace(1e-3, 1e3, 241), 40.0
 # s, over which the first pace is smoothed, and in which it may double
 _SMOOTHING, _DOUBLED = 0.04, 0.05
-# what is planned of what is allowed, of rates, and by how much that may be missed
-_KEPT_OF_RATES = 0.985
+# what is planned of what is allowed; of rates, and of the speeds that hold a posture back; and by
+# how much that may be missed
+_KEPT_OF_OTHERS = 0.985
 _KEPT, _MISSED = 0.999, 5e-3
 _CORRECTIONS, _STEPS, _SLOWER = 3, 20, 1.002
 # parts of a way that are planned more tightly; and of what is allowed, a speed that is none
@@ -231,11 +232,11 @@ class FastestPlanner(MotionDemand):
         state = move.progress.derivatives(theta, 1)[:, :, 0]
         part = _along(state[:, 0] / state[-1, 0], tight)
         speed = np.max(np.abs(course[:, 1]) / allowed[:, n:], axis=1)
-        speed = np.maximum(speed, held_back.max(axis=1) / _KEPT)
+        speed = np.maximum(speed, held_back.max(axis=1) / _KEPT_OF_OTHERS)
         speed = np.maximum(speed, state[:, 1] / (_KEPT * self._velocity))
         limits = PaceLimits(
             allowed[:, :n] * part[:, :1],
-            _KEPT_OF_RATES * self._rates * part[:, 1:],
+            _KEPT_OF_OTHERS * self._rates * part[:, 1:],
             1.0 / np.maximum(speed, _STILL),
         )
         found = find_fastest_pace(polynomial, theta, limits, intervals, degree, watched)

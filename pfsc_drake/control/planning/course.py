@@ -68,11 +68,11 @@ class CourseFinder:
         self._n, self._order = robot.dimension, manifold.layout.order
         self._memory, self._projection = manifold.layout.memory, projection
         self._pose = BoundFunction(pose_function(robot))
-        known = robot, manifold, inverse, posture
-        self._correction = BoundFunction(_correction_function(*known))
+        self._correction = BoundFunction(_correction_function(robot, manifold, inverse, posture))
         self._restraint = None
         if posture is not None and posture.speeds is not None:
-            self._restraint = BoundFunction(_restraint_function(*known))
+            restraint = _restraint_function(robot, manifold, inverse, posture)
+            self._restraint = BoundFunction(restraint)
 
     @once_per_content(30)
     def find(
@@ -122,7 +122,9 @@ class CourseFinder:
         return found
 
     @once_per_content(30)
-    def held_back(self, start: CourseStart, course: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    def held_back(
+        self, start: CourseStart, course: np.ndarray, reference: np.ndarray
+    ) -> np.ndarray:
         """Return joint speeds by those from which on the law holds a posture back, (samples, N).
 
         Speeds are those that the outputs take and those that the posture asks for beside them,

@@ -75,7 +75,8 @@ def test_joints_beyond_the_outputs_move_next_to_their_posture(load_robot, make_l
 @pytest.mark.parametrize("weight", [np.array([1.0, 2.0, 1.0, 0.5, 1.0, 3.0]), None])
 def test_from_where_on_a_posture_is_held_back(weight, load_robot, make_law, position_path):
     """The law's drives are those of a law that holds nothing back, up to the share of 1."""
-    robot, order, speeds = load_robot("comau_racer_1_4"), 2, np.array([1.0, 2.0, 3.0, 2.0, 1.5, 1.0])
+    robot, order = load_robot("comau_racer_1_4"), 2
+    speeds = np.array([1.0, 2.0, 3.0, 2.0, 1.5, 1.0])
     free = make_law(robot.chain, "rigid", False, weight=weight)
 
     def held_from(speeds):

@@ -57,7 +57,8 @@ def test_limits_are_met_on_the_path(name, way, fastest):
     torque, limits = law[:, layout.drive], plan.limits[: station.robot.dimension]
     assert np.abs(torque / limits).max() < 1.01 * (1.0 - RESERVE)
     middle = times + station.controller.period / 2.0
-    expected = np.array([np.interp(middle, plan.times, tau) for tau in plan.demand.T[: len(limits)]]).T
+    planned = plan.demand.T[: len(limits)]
+    expected = np.array([np.interp(middle, plan.times, tau) for tau in planned]).T
     assert np.abs(expected - torque).max() < 0.02 * np.abs(torque).max()
     assert not plan.said and plan.limiting.largest.max() < 1.006
     parts = plan.limiting.of_the_way(plan.speed)
