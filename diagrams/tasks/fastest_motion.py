@@ -309,6 +309,12 @@ class FastestPlanner(MotionDemand):
                 f"the fastest motion found takes {100.0 * largest:.1f} % of what may be asked "
                 "of the drives"
             )
+        moves = self._posture.reference_deg or self._posture.is_pulled
+        if self._is_led and moves:
+            said.append(
+                "controller.posture leads the joints elsewhere while the tool moves; the fastest "
+                "motion is planned for a posture that stays, and may ask more of the drives"
+            )
         return DrivePlan(
             checked.times,
             checked.demand,

@@ -50,6 +50,7 @@ class MotionDemand:
     ) -> None:
         self._reference, self._period = reference, controller.sampling_time
         self._task, self._law, self._start = task, law, start
+        self._posture = controller.posture
         self.robot, reserve = law.robot, reference.reserve
         f_c, f_v = friction or (np.zeros(self.robot.dimension),) * 2
         damping = spread(controller.boundary_layer_damping, self.robot.dimension)

@@ -114,6 +114,14 @@ def test_surfaces_redundant_arms_and_other_laws(name, way, fastest):
     assert np.allclose(places, begin + np.outer(along, direction), rtol=0, atol=1e-10)
 
 
+def test_a_posture_that_moves_is_told_of(fastest):
+    """It stays where it is in the plan."""
+    settings = fastest("pfc_panda_7r", -0.05)
+    settings.controller.posture.task = "limits"
+    (said,) = build(settings, "pfc_panda_7r").task.drive_plan.said
+    assert "planned for a posture that stays" in said
+
+
 def test_as_fast_as_toppra_on_rigid_joints(fastest):
     """Drake's own optimum, whose torque may jump, is shorter, by few per cent."""
     settings = fastest("pfc_elastic_6r", -0.4, torque_rate=np.inf)
