@@ -167,8 +167,9 @@ def _all_times(
 ) -> dict[str, Times]:
     """Return how long motions along paths take, planned on all cores."""
     motions = [motion for name, path in paths.items() for motion in _motions(name, *path)]
-    # long ones first, so that all processes end together
-    motions.sort(key=lambda motion: -motion.finer)
+    # what is timed comes first, before anything of it is known; then long ones, so that all
+    # processes end together
+    motions.sort(key=lambda motion: (motion.kind != "fastest", -motion.finer))
     found: dict[str, dict[str, float]] = defaultdict(dict)
     with side_by_side(None, len(motions)) as run:
         for motion, seconds, preparation in run(plan_motion, None, motions):
