@@ -33,8 +33,9 @@ _FIRST_SAMPLES, _OF_RADIUS = (400, 20_000), 1.0 / 6.0
 _PACES, _SPREAD = np.geomspace(1e-3, 1e3, 241), 40.0
 # s, over which the first pace is smoothed, and in which it may double
 _SMOOTHING, _DOUBLED = 0.04, 0.05
-# what is planned of what is allowed, of rates, and by how much that may be missed
-_KEPT_OF_RATES = 0.985
+# what is planned of what is allowed; of rates, and of the speeds that hold a posture back; and by
+# how much that may be missed
+_KEPT_OF_OTHERS = 0.985
 _KEPT, _MISSED = 0.999, 5e-3
 _CORRECTIONS, _STEPS, _SLOWER = 3, 20, 1.002
 # parts of a way that are planned more tightly; and of what is allowed, a speed that is none
@@ -186,11 +187,12 @@ class FastestPlanner(MotionDemand):
         motion, begins = one_after_another(moves, self._reference.dwell)
         longest = self._step(min(spacing / _SAMPLES, self._period))
         step, course = self.course_of(motion, longest, still=not self._is_led)
-        both = course[:, None]
+        held_back, parts = self.held_back(motion, longest, course), [course]
         if self._is_led:
             # a change of pace moves what a posture leads no further than the outputs need it
-            both = np.stack([course, self.bare_course_of(motion, longest, course)], axis=1)
-        between = make_interp_spline(step * np.arange(len(course)), both, k=3)
+            parts.append(self.bare_course_of(motion, longest, course))
+        known = np.concatenate([*parts, held_back[:, None]], axis=1)
+        between = make_interp_spline(step * np.arange(len(course)), known, k=3)
         return [
             self._fastest(move, between, begin, spacing, part, watched)
             for move, begin, part in zip(moves, begins, tight, strict=True)
@@ -199,7 +201,7 @@ class FastestPlanner(MotionDemand):
     def _fastest(
         self,
         move: Move,
-        course_at: BSpline,
+        known: BSpline,
         begin: float,
         spacing: float,
         tight: np.ndarray,
@@ -209,7 +211,8 @@ class FastestPlanner(MotionDemand):
 
         Args:
             move: As it is.
-            course_at: The joints' course over time, and last the one without what a posture leads.
+            known: Over time, by rows, the joints' course, then the one without what a posture
+                leads, if one does, and what it takes of the speeds from which on that is held back.
             begin: When the move begins [s].
             spacing: Between the knots of its pace [s].
             tight: What is planned of the torques allowed and of their rates, at even parts of the
@@ -219,8 +222,8 @@ class FastestPlanner(MotionDemand):
         n, degree = self.robot.dimension, self.demand.derivatives + 1
         intervals = int(np.clip(move.duration / spacing, _FEWEST, _MOST))
         theta = np.linspace(0.0, move.duration, _SAMPLES * intervals + 1)
-        courses = course_at(begin + theta)
-        course, bare = courses[:, 0], courses[:, -1]
+        rows, terms = known(begin + theta), self.demand.derivatives + 1
+        course, bare, held_back = rows[:, :terms], rows[:, -1 - terms : -1], rows[:, -1]
         polynomial = DemandPolynomial.of(self.demand, bare, _SMOOTHING)
         if self._is_led:
             led = self.demand.of(course) - self.demand.of(bare)
@@ -229,10 +232,11 @@ class FastestPlanner(MotionDemand):
         state = move.progress.derivatives(theta, 1)[:, :, 0]
         part = _along(state[:, 0] / state[-1, 0], tight)
         speed = np.max(np.abs(course[:, 1]) / allowed[:, n:], axis=1)
+        speed = np.maximum(speed, held_back.max(axis=1) / _KEPT_OF_OTHERS)
         speed = np.maximum(speed, state[:, 1] / (_KEPT * self._velocity))
         limits = PaceLimits(
             allowed[:, :n] * part[:, :1],
-            _KEPT_OF_RATES * self._rates * part[:, 1:],
+            _KEPT_OF_OTHERS * self._rates * part[:, 1:],
             1.0 / np.maximum(speed, _STILL),
         )
         found = find_fastest_pace(polynomial, theta, limits, intervals, degree, watched)
@@ -241,14 +245,20 @@ class FastestPlanner(MotionDemand):
     def _check(self, moves: list[Move]) -> _Checked:
         """Return what the moves ask for, between the samples that they were planned on."""
         motion, begins = one_after_another(moves, self._reference.dwell)
-        step, course = self.course_of(motion, self._step(_FINE / _CHECKED), still=not self._is_led)
+        longest = self._step(_FINE / _CHECKED)
+        step, course = self.course_of(motion, longest, still=not self._is_led)
         times = step * np.arange(len(course))
         demand = self.demand.of(course)
         speed = np.abs(motion.derivatives(times, 1)[:, 1]).max(axis=1)
         ticks = max(1, round(self._period / step))
         tick = ticks, ticks * step
         limiting = Limiting.of(
-            demand, self.allowed(course), tick, self._rates, speed / self._velocity
+            demand,
+            self.allowed(course),
+            tick,
+            self._rates,
+            speed / self._velocity,
+            self.held_back(motion, longest, course),
         )
         return _Checked(motion, begins, times, demand, limiting)
 
@@ -298,6 +308,12 @@ class FastestPlanner(MotionDemand):
             said.append(
                 f"the fastest motion found takes {100.0 * largest:.1f} % of what may be asked "
                 "of the drives"
+            )
+        moves = self._posture.reference_deg or self._posture.is_pulled
+        if self._is_led and moves:
+            said.append(
+                "controller.posture leads the joints elsewhere while the tool moves; the fastest "
+                "motion is planned for a posture that stays, and may ask more of the drives"
             )
         return DrivePlan(
             checked.times,

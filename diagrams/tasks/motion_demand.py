@@ -54,6 +54,7 @@ class MotionDemand:
         self._carrier = carrier
         self._reference, self._period = reference, controller.sampling_time
         self._task, self._law, self._start = task, law, start
+        self._posture = controller.posture
         self.robot, reserve = law.robot, reference.reserve
         f_c, f_v = friction or (np.zeros(self.robot.dimension),) * 2
         damping = spread(controller.boundary_layer_damping, self.robot.dimension)
@@ -129,6 +130,19 @@ class MotionDemand:
         times, reference = self._sampled(motion, step)
         led = course[:, : reference.shape[1]]
         return self._continued(self._finder.bare(self._start, led, reference), times[1])
+
+    def held_back(
+        self, motion: PiecewisePolynomialCurve, step: float, course: np.ndarray
+    ) -> np.ndarray:
+        """Return joint speeds by those from which on the law holds a posture back, (samples, N).
+
+        Args:
+            motion: Tangential coordinates over time.
+            step: As it was asked for.
+            course: Its course.
+        """
+        reference = self._sampled(motion, step)[1]
+        return self._finder.held_back(self._start, course[:, : reference.shape[1]], reference)
 
     def allowed(self, course: np.ndarray, reserve: float | None = None) -> np.ndarray:
         """Return what may be asked of the drives, (samples, 2N).

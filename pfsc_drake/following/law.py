@@ -300,7 +300,11 @@ def make_law(
     """
     law = parameters.law
     damping = spread(parameters.boundary_layer_damping, robot.dimension)
-    options = ActuationOptions(parameters.sampling_time, np.array(damping) if damping else None)
+    options = ActuationOptions(
+        parameters.sampling_time,
+        np.array(damping) if damping else None,
+        parameters.torque_lead,
+    )
     linearization = linearize(robot, law, manifold, options)
     if law not in parameters.gains:
         given = ", ".join(parameters.gains) or "none"

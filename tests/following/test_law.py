@@ -46,6 +46,15 @@ def test_gains_reach_their_coordinates(load_arm, law):
     assert law.linearization.relative_degree == r
 
 
+def test_torques_that_lead(load_arm):
+    eta = by_poles(-20.0, -20.0)
+    for leads, lead in ((False, 0.0), (True, 0.5)):
+        parameters = controller("rigid", eta, eta, torque_lead=leads)
+        assert make(parameters, load_arm("comau_racer_1_4_3r").chain).linearization.lead == lead
+    with pytest.raises(InputError, match="torque_lead = True; allowed: false but with the law"):
+        ControllerParameters("elastic", torque_lead=True)
+
+
 def test_integral_part(load_arm):
     eta = GainParameters(coefficients=[900.0, 60.0], integral=500.0)
     parameters = controller("rigid", eta, by_poles(-3.0, -3.0))

@@ -64,22 +64,26 @@ def velocity_servo(robot: RobotModel, state: DriveState) -> DrivenMotion:
     return DrivenMotion([state.q_J], ca.SX.eye(n), ca.SX(n, 1), ca.SX(n, 1))
 
 
-def rigid(robot: RobotModel, state: DriveState) -> DrivenMotion:
+def rigid(robot: RobotModel, state: DriveState, *, changes: bool = False) -> DrivenMotion:
     """Rigid joints (2.42), r = 2: the inverse dynamics of (3.29).
 
     Where joints are elastic the law acts on motor coordinates, because with link
     coordinates the loop is unstable (Sec. 3.8.3). It serves any mixture of rigid and
     elastic joints: of a rigid joint, motor and link coordinate are one.
+
+    Args:
+        robot: The robot.
+        state: Its state.
+        changes: Whether weight, Coriolis terms and damping belong to what changes while the torque
+            is held: all but external torques is then drift, to be extrapolated.
     """
     q, v = (state.q_J, state.v_J) if robot.is_rigid else (state.q_M, state.v_M)
     D_E = robot.mass_matrix(q)
     n_E = _link_torque(robot, [q, v, ca.SX(robot.dimension, 1)], 0)
-    return DrivenMotion(
-        [q, v],
-        D_E + ca.diag(robot.D_M),
-        ca.SX(*n_E.shape),
-        n_E - state.tau_ext[0] + _viscous(robot) * v,
-    )
+    gain, viscous = D_E + ca.diag(robot.D_M), _viscous(robot) * v
+    if changes:
+        return DrivenMotion([q, v], gain, n_E + viscous, -state.tau_ext[0])
+    return DrivenMotion([q, v], gain, ca.SX(*n_E.shape), n_E - state.tau_ext[0] + viscous)
 
 
 def singular_perturbation(

@@ -156,7 +156,8 @@ class FollowingLaw:
         aim, drives = aim_and_drives(u, linearization, self.stabilization)
         spare = None
         if self.posture is not None:
-            spare = spare_of(self.posture, self.robot, aim, u.posture)
+            motion = ca.horzsplit(aim.motion)
+            spare = spare_of(self.posture, self.robot, motion, u.posture)
         elif inverse.damped_below:
             spare = coming_to_rest(self.stabilization, ca.horzsplit(aim.motion))
         solution = inverse.solve(aim.A, aim.rhs, spare)

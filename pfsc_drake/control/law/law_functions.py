@@ -148,22 +148,22 @@ def aim_and_drives(
     return aim, DriveRelation(gain, drift, offset + u.friction, lead, u.last_held)
 
 
-def spare_of(posture: Posture, robot: RobotModel, aim: Aim, reference: ca.SX) -> Spare:
+def spare_of(
+    posture: Posture, robot: RobotModel, motion: Sequence[ca.SX], reference: ca.SX
+) -> Spare:
     """Return what joints are to do that the outputs leave free.
 
     Args:
         posture: What a law wants of them.
         robot: The robot.
-        aim: What it wants of the outputs.
+        motion: Derivatives 0..r-1 of the joint coordinates, each (N,).
         reference: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,).
     """
     n, restraint = robot.dimension, None
-    terms = posture_expressions(
-        posture, robot, ca.horzsplit(aim.motion), ca.vertsplit(reference, n)
-    )
+    terms = posture_expressions(posture, robot, motion, ca.vertsplit(reference, n))
     if posture.speeds is not None:
-        velocity = aim.motion[:, 1] if aim.motion.shape[1] > 1 else None
-        to_ends = posture.to_ends(aim.motion[:, 0])
+        velocity = motion[1] if len(motion) > 1 else None
+        to_ends = posture.to_ends(motion[0])
         restraint = Restraint(terms.rest, velocity, posture.settling, posture.speeds, to_ends)
     scale = posture.scale
     scale = scale_of(terms.weight) if terms.weight.numel() else scale

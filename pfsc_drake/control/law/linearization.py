@@ -23,6 +23,7 @@ RELATIVE_DEGREE = {
 }
 # sampling intervals by which the held part of the drive input is extrapolated
 _LEAD = {"visco_elastic": 1.0, "elastic": 0.5}
+_MIDDLE = 0.5
 
 
 @dataclass
@@ -34,10 +35,13 @@ class ActuationOptions:
             ``elastic``); 0 for a continuous controller.
         boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], shape (N,)
             (``singular_perturbation``).
+        leads_torque: Whether torques lead to the middle of their hold (``rigid``), as those of the
+            sampled elastic laws always do.
     """
 
     sampling_time: float = 1e-3
     boundary_layer_damping: np.ndarray | None = None
+    leads_torque: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,8 @@ class Linearization:
         manifold: The manifold, which lays out its point.
         num_joints: ``N``.
         lead: By how many sampling intervals ``gain q^(r) + drift`` is to be extrapolated:
-            to the middle of the interval (``elastic``) or to its end (``visco_elastic``).
+            to the middle of the interval (``elastic``; ``rigid`` if that is chosen) or to its end
+            (``visco_elastic``).
         velocity: Which part of the state is ``q'`` of the motion that is linear: ``v_J``, or
             ``v_M`` where the law acts on motors.
     """
@@ -105,6 +110,8 @@ def linearize(
     options = options or ActuationOptions()
     if law not in RELATIVE_DEGREE:
         raise InputError(f"law '{law}': unknown; allowed are {', '.join(RELATIVE_DEGREE)}")
+    if options.leads_torque and law != "rigid":
+        raise InputError(f"law '{law}': torques lead with the law 'rigid' only")
     r, n, m = RELATIVE_DEGREE[law], robot.dimension, len(manifold.coordinates)
     if manifold.layout.order != r:
         raise InputError(
@@ -116,7 +123,8 @@ def linearize(
         raise InputError(
             f"law '{law}': {n} joints for {m} outputs ({names}); there must be as many or more"
         )
-    ahead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
+    lead = _MIDDLE if options.leads_torque else _LEAD.get(law, 0.0)
+    ahead = lead if options.sampling_time > 0.0 else 0.0
     on_motors = law == "rigid" and not robot.is_rigid
     velocity = slice(3 * n, 4 * n) if on_motors else slice(n, 2 * n)
     function = _linearizing_function(robot, law, manifold, options)
@@ -234,8 +242,6 @@ def _driven_motion(
                 f"{robot.dimension} positive values [s]"
             )
         return actuation.singular_perturbation(robot, state, damping)
-    models = {
-        "velocity_servo": actuation.velocity_servo,
-        "rigid": actuation.rigid,
-    }
-    return models[law](robot, state)
+    if law == "rigid":
+        return actuation.rigid(robot, state, changes=options.leads_torque)
+    return actuation.velocity_servo(robot, state)

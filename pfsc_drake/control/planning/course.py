@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -10,8 +11,9 @@ import numpy as np
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.actuation import joint_jets
-from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare, scale_of
-from pfsc_drake.control.law.posture import Posture, posture_expressions
+from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare
+from pfsc_drake.control.law.law_functions import spare_of
+from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, MovingFrameManifold
 from pfsc_drake.errors import InputError
@@ -45,7 +47,8 @@ class CourseFinder:
     lower orders only, ``q^(k)`` is corrected by the inverse of A until ``yhat^(k)`` is the
     reference's, for k = 0 .. r. What joints beyond the number of outputs do is what the law
     would let them do: their r-th derivative is next to what the posture desires, and what is
-    integrated of it is corrected as little as the outputs allow.
+    integrated of it is corrected as little as the outputs allow. That the law holds a posture back
+    where joints become fast is left out; :meth:`held_back` tells where it would.
 
     Args:
         robot: The robot as it is believed, N joints.
@@ -71,6 +74,10 @@ class CourseFinder:
         self._pose = BoundFunction(pose_function(robot))
         seen: Manifold = MovingFrameManifold(manifold) if carried else manifold
         self._correction = BoundFunction(_correction_function(robot, seen, inverse, posture))
+        self._restraint = None
+        if posture is not None and posture.speeds is not None:
+            restraint = _restraint_function(robot, seen, inverse, posture)
+            self._restraint = BoundFunction(restraint)
 
     @once_per_content(30)
     def find(
@@ -129,6 +136,46 @@ class CourseFinder:
             memory = self._correct(q, None, wanted, memory)
         return found
 
+    @once_per_content(30)
+    def held_back(
+        self, start: CourseStart, course: np.ndarray, reference: np.ndarray
+    ) -> np.ndarray:
+        """Return joint speeds by those from which on the law holds a posture back, (samples, N).
+
+        Speeds are those that the outputs take and those that the posture asks for beside them,
+        added; the law reaches what a course says as long as none is above 1. They are zero where
+        nothing is held back.
+
+        Args:
+            start: Where it began.
+            course: A course, from :meth:`find`.
+            reference: That of the virtual output.
+        """
+        found, memory = np.zeros((len(course), self._n)), start.memory
+        if self._restraint is None:
+            return found
+        arguments, results = self._restraint.arguments, self._restraint.results
+        arguments["posture"][: self._n] = start.q_J
+        for i, (q, wanted) in enumerate(zip(course, reference, strict=True)):
+            arguments["derivatives"][:], arguments["wanted"][:] = q.ravel(), wanted.ravel()
+            arguments["manifold_point"][:] = point = self._place(q[0], memory)
+            memory = point[self._memory].copy()
+            self._restraint.evaluate()
+            found[i] = results["shares"]
+        return found
+
+    def _place(
+        self, q: np.ndarray, memory: np.ndarray, frame: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return the manifold point of joint coordinates."""
+        self._pose.arguments["q"][:] = q
+        self._pose.evaluate()
+        y = self._pose.results["pose"][:3]
+        if frame is None:
+            return self._projection(y, memory)
+        R_WC = frame[3:POSE_SIZE].reshape(3, 3)
+        return np.concatenate([self._projection(R_WC.T @ (y - frame[:3]), memory), frame])
+
     def _correct(
         self,
         q: np.ndarray,
@@ -153,16 +200,7 @@ class CourseFinder:
             return step
 
         for _ in range(_STEPS):
-            self._pose.arguments["q"][:] = q[0]
-            self._pose.evaluate()
-            y = self._pose.results["pose"][:3]
-            if frame is None:
-                point = self._projection(y, memory)
-                arguments["manifold_point"][:] = point
-            else:
-                R_WC = frame[3:POSE_SIZE].reshape(3, 3)
-                point = self._projection(R_WC.T @ (y - frame[:3]), memory)
-                arguments["manifold_point"][:] = np.concatenate([point, frame])
+            arguments["manifold_point"][:] = point = self._place(q[0], memory, frame)
             if not np.max(np.abs(correct(0))) > _FOUND:
                 break
         else:
@@ -193,6 +231,59 @@ def _advance(order: int, step: float) -> np.ndarray:
     )
 
 
+class _Relation(NamedTuple):
+    """What a motion of the joints misses of a virtual output that is wanted, as expressions.
+
+    Attributes:
+        derivatives: 0..r of the joints by rows, shape ((r + 1) N,).
+        point: The manifold point.
+        wanted: Derivatives 0..r of the output by rows, shape ((r + 1) m,).
+        posture: Those of the posture reference, shape ((r + 1) N,).
+        A: Decoupling matrix, shape (m, N).
+        missing: What each derivative of the output misses, each (m,).
+    """
+
+    derivatives: ca.SX
+    point: ca.SX
+    wanted: ca.SX
+    posture: ca.SX
+    A: ca.SX
+    missing: list[ca.SX]
+
+    @classmethod
+    def of(cls, robot: RobotModel, manifold: Manifold) -> "_Relation":
+        """Return that of a robot on a manifold."""
+        n, order = robot.dimension, manifold.layout.order
+        m = len(manifold.coordinates)
+        derivatives = ca.SX.sym("derivatives", (order + 1) * n)
+        point, rate = ca.SX.sym("manifold_point", manifold.layout.size), ca.SX.sym("rate", n)
+        wanted = ca.SX.sym("wanted", (order + 1) * m)
+        posture = ca.SX.sym("posture", (order + 1) * n)
+        q = ca.vertsplit(derivatives, n)
+
+        def output(motion: list[ca.SX]) -> list:
+            y, R_e = robot.tool_pose(joint_jets(motion))
+            return manifold.virtual_output(y, R_e, point, [])
+
+        found = output(q)
+        slopes = ca.vertcat(*[y.coefficients[1] for y in output([q[0], rate])])
+        missing = [
+            y_p - ca.vertcat(*[y.derivative(k) for y in found])
+            for k, y_p in enumerate(ca.vertsplit(wanted, m))
+        ]
+        return cls(derivatives, point, wanted, posture, ca.jacobian(slopes, rate), missing)
+
+    def function(self, name: str, results: dict[str, ca.SX]) -> ca.Function:
+        """Return results as a function of all symbols."""
+        return ca.Function(
+            name,
+            [self.derivatives, self.point, self.wanted, self.posture],
+            [ca.densify(e) for e in ca.cse(list(results.values()))],
+            ["derivatives", "manifold_point", "wanted", "posture"],
+            list(results),
+        )
+
+
 @once_per_content()
 def _correction_function(
     robot: RobotModel,
@@ -202,54 +293,44 @@ def _correction_function(
 ) -> ca.Function:
     """Return by what derivatives of joints are to change, if the virtual output is to be wanted.
 
-    Its arguments are ``derivatives`` 0..r of the joints and of the output that is ``wanted``, by
-    rows, shapes ((r + 1) N,) and ((r + 1) m,), the ``manifold_point`` and the ``posture``
-    reference, shape ((r + 1) N,).
-
     The columns of ``steps``, shape (N, r + 1), are corrections of each order of which those below
     are right; joints beyond the outputs move as little as they can. ``led``, shape (N,), is the
     one of order r by which they follow the posture. ``rcond`` and ``usable`` are those of
     :class:`DecouplingSolution`.
     """
-    n, order = robot.dimension, manifold.layout.order
-    m = len(manifold.coordinates)
-    derivatives = ca.SX.sym("derivatives", (order + 1) * n)
-    point, rate = ca.SX.sym("manifold_point", manifold.layout.size), ca.SX.sym("rate", n)
-    wanted = ca.SX.sym("wanted", (order + 1) * m)
-    reference = ca.SX.sym("posture", (order + 1) * n)
-    q = ca.vertsplit(derivatives, n)
-
-    def output(motion: list[ca.SX]) -> list:
-        y, R_e = robot.tool_pose(joint_jets(motion))
-        return manifold.virtual_output(y, R_e, point, [])
-
-    found = output(q)
-    slopes = ca.vertcat(*[y.coefficients[1] for y in output([q[0], rate])])
-    A = ca.jacobian(slopes, rate)
-    missing = [
-        y_p - ca.vertcat(*[y.derivative(k) for y in found])
-        for k, y_p in enumerate(ca.vertsplit(wanted, m))
-    ]
-    still = led = None
+    relation, n = _Relation.of(robot, manifold), robot.dimension
+    A, still, led = relation.A, None, None
     if posture is not None:
-        terms = posture_expressions(posture, robot, q[:-1], ca.vertsplit(reference, n))
         still = Spare(ca.SX(n, 1), posture.scale)
-        scale = scale_of(terms.weight) if terms.weight.numel() else posture.scale
-        led = Spare(terms.desired, scale)
-        if terms.slope.numel():
-            led = led._replace(slope=terms.slope, rate=terms.rate)
-    steps = [inverse.solve(A, rhs, still) for rhs in missing]
-    last = inverse.solve(A, missing[-1], led)
+        q = ca.vertsplit(relation.derivatives, n)
+        led = spare_of(posture, robot, q[:-1], relation.posture)._replace(restraint=None)
+    steps = [inverse.solve(A, rhs, still) for rhs in relation.missing]
+    last = inverse.solve(A, relation.missing[-1], led)
     results = {
         "steps": ca.horzcat(*[solution.x for solution in steps]),
         "led": last.x,
         "rcond": last.rcond,
         "usable": last.usable,
     }
-    return ca.Function(
-        "course",
-        [derivatives, point, wanted, reference],
-        [ca.densify(e) for e in ca.cse(list(results.values()))],
-        ["derivatives", "manifold_point", "wanted", "posture"],
-        list(results),
-    )
+    return relation.function("course", results)
+
+
+@once_per_content()
+def _restraint_function(
+    robot: RobotModel, manifold: Manifold, inverse: DecouplingInverse, posture: Posture
+) -> ca.Function:
+    """Return ``shares`` of the speeds from which on a posture is held back, shape (N,)."""
+    relation, n = _Relation.of(robot, manifold), robot.dimension
+    q = ca.vertsplit(relation.derivatives, n)
+    led = spare_of(posture, robot, q[:-1], relation.posture)
+    restraint, A = led.restraint, relation.A
+    assert restraint is not None and posture.speeds is not None
+    # with the highest derivative of the joints left out
+    rhs = relation.missing[-1] + A @ q[-1]
+    x = inverse.solve(A, rhs, led._replace(restraint=None)).x
+    rest = inverse.solve(A, rhs, Spare(restraint.rest, led.scale)).x
+    taken = rest
+    if restraint.velocity is not None:
+        taken = inverse.solve(A, A @ restraint.velocity, Spare(ca.SX(n, 1), led.scale)).x
+    speeds = ca.fabs(taken) + ca.fabs(x - rest) / restraint.settling
+    return relation.function("restraint", {"shares": speeds / ca.DM(posture.speeds)})

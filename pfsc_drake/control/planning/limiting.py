@@ -31,6 +31,7 @@ class Limiting:
         tick: tuple[int, float],
         torque_rate: np.ndarray,
         velocity: np.ndarray,
+        held_back: np.ndarray | float = 0.0,
     ) -> "Limiting":
         """Return what limits a motion.
 
@@ -40,12 +41,16 @@ class Limiting:
             tick: Samples from one command to the next, and its time [s].
             torque_rate: Largest rates of torques, shape (N,).
             velocity: What it takes of the largest velocity of the tool, shape (samples,).
+            held_back: What it takes of the joint speeds from which on a posture is held back, shape
+                (samples, N).
         """
         n = demand.shape[1] // 2
         samples, period = tick
         later = np.minimum(np.arange(len(demand)) + samples, len(demand) - 1)
         rates = np.abs(demand[later, :n] - demand[:, :n]) / period
-        shares = [np.abs(demand) / allowed, rates / torque_rate, velocity[:, None]]
+        taken = np.abs(demand) / allowed
+        taken[:, n:] = np.maximum(taken[:, n:], held_back)
+        shares = [taken, rates / torque_rate, velocity[:, None]]
         kinds = [f"{kind}_{i + 1}" for kind in KINDS[:-1] for i in range(n)]
         return cls([*kinds, KINDS[-1]], np.concatenate(shares, axis=1))
 

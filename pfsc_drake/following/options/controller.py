@@ -250,6 +250,8 @@ class ControllerParameters:
         delay: Until a torque acts that the law commands [s], a multiple of its sampling time, at
             most 10 of it: it then acts on the state that its model foretells for that moment, with
             velocities of the age of positions. Null for a law that takes what is measured.
+        torque_lead: With the law ``rigid``: whether torques are extrapolated from the last two
+            ticks to the middle of that for which they are held, as those of the elastic laws are.
     """
 
     law: str = "elastic"
@@ -272,12 +274,15 @@ class ControllerParameters:
     state_bandwidth: float = 800.0
     state_uncertainty: StateUncertainty = dc.field(default_factory=StateUncertainty)
     delay: float | None = None
+    torque_lead: bool = False
 
     def __post_init__(self) -> None:
         require_one_of("state", self.state, STATES)
         require_positive("state_bandwidth", self.state_bandwidth)
         require_not_negative("delay", self.delay or 0.0)
         require_one_of("law", self.law, RELATIVE_DEGREE)
+        allowed = "false but with the law 'rigid'; the elastic laws lead their torques anyway"
+        require(self.law == "rigid" or not self.torque_lead, "torque_lead", True, allowed)
         require_one_of("manifold", self.manifold, MANIFOLDS)
         for law in self.gains:
             require_one_of("gains", law, RELATIVE_DEGREE)

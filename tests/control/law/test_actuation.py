@@ -342,3 +342,40 @@ def test_rigid_joints_are_refused_by_elastic_laws(load_robot, law, arguments):
     chain = load_robot("comau_racer_1_4_3r").chain
     with pytest.raises(InputError, match=rf"law '{law.__name__}'.*rigid are joint_1, joint_2"):
         compile_law(chain, law, 3, *arguments)
+
+
+def test_a_torque_that_leads_makes_the_rigid_law_second_order(load_robot):
+    """Velocity after the second of two intervals, on the way to a motion that is known."""
+    robot, n = load_robot("comau_racer_1_4_3r"), 3
+    rng = np.random.default_rng(4)
+    q_0, amplitude, rate = np.array([0.2, 1.4, -0.4]), rng.uniform(0.1, 0.3, n), 5.0
+    tau_ext = np.array([3.0, -8.0, 5.0])
+
+    def wanted(t):
+        angle = rate * t + np.array([0.3, 1.0, 2.0])
+        rates = rate * np.cos(angle), -(rate**2) * np.sin(angle)
+        return q_0 + amplitude * np.sin(angle), *(amplitude * value for value in rates)
+
+    errors = {True: [], False: []}
+    for T_s in (2e-3, 1e-3, 5e-4):
+        for changes, error in errors.items():
+
+            def law(chain, state, changes=changes):
+                return actuation.rigid(chain, state, changes=changes)
+
+            evaluate = compile_law(robot.chain, law, 1)
+            last = None
+            for k in range(2):
+                # exactly on the motion at both ticks
+                q, v, a = wanted(k * T_s)
+                state = np.concatenate([q, v, q, v])
+                _, gain, drift, offset = evaluate(state, tau_ext)
+                held = gain @ a + drift
+                lead = 0.5 * (held - last) if changes and last is not None else 0.0
+                drive, last = held + lead + offset, held
+            after = simulate(robot, state, drive, lambda t: tau_ext, T_s).y[n : 2 * n, -1]
+            error.append(np.abs(after - wanted(2 * T_s)[1]).max() / T_s)
+    ratios = {key: np.divide(error[:-1], error[1:]) for key, error in errors.items()}
+    assert np.all(ratios[True] > 3.5)
+    assert np.all(np.abs(ratios[False] - 2.0) < 0.4)
+    assert errors[True][-1] < 0.05 * errors[False][-1]

@@ -118,6 +118,15 @@ def test_only_sampled_laws_for_elastic_joints_are_extrapolated(load_robot):
             assert linearization.lead == (lead if sampling_time > 0.0 else 0.0)
 
 
+def test_torques_of_rigid_joints_lead_if_that_is_chosen(load_robot):
+    chain, manifold = load_robot("comau_racer_1_4_3r").chain, PathManifold(2, oriented=False)
+    for sampling_time, lead in ((0.0, 0.0), (1e-3, 0.5)):
+        options = ActuationOptions(sampling_time, leads_torque=True)
+        assert linearize(chain, "rigid", manifold, options).lead == lead
+    with pytest.raises(InputError, match="law 'velocity_servo': torques lead with the law 'rigid'"):
+        linearize(chain, "velocity_servo", PathManifold(1, oriented=False), options)
+
+
 @pytest.mark.parametrize(
     ("law", "oriented", "message"),
     [

@@ -1,5 +1,7 @@
 """How joints move when the tool follows exactly, against Drake's kinematics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -91,6 +93,50 @@ def test_joints_beyond_the_outputs_move_next_to_their_posture(load_robot, make_l
     course, eta = find(robot, law, position_path, np.arange(0.0, 0.2, STEP), start)
     # what the outputs leave free is held from sample to sample, as by a sampled law
     check(robot, position_path, course, eta, 0.03)
+
+
+@pytest.mark.parametrize("weight", [np.array([1.0, 2.0, 1.0, 0.5, 1.0, 3.0]), None])
+def test_from_where_on_a_posture_is_held_back(weight, load_robot, make_law, position_path):
+    """The law's drives are those of a law that holds nothing back, up to the share of 1."""
+    robot, order = load_robot("comau_racer_1_4"), 2
+    speeds = np.array([1.0, 2.0, 3.0, 2.0, 1.5, 1.0])
+    free = make_law(robot.chain, "rigid", False, weight=weight)
+
+    def held_from(speeds):
+        return make_law(robot.chain, "rigid", False, posture=replace(free.posture, speeds=speeds))
+
+    law, evaluator = held_from(speeds), position_path.evaluator(order)
+    theta = position_path.arc_length.parameter(0.3)
+    q_0 = robot.reach(position_path.position.derivatives(theta, 0)[0])
+    finder = CourseFinder(
+        robot.chain,
+        PathManifold(order, oriented=False),
+        lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+        law.inverse,
+        law.posture,
+    )
+    times = np.arange(0.0, 0.25, 5e-3)
+    reference = np.zeros((len(times), order + 1, 3))
+    eta = rest_to_rest([0.3, 0.5], velocity=1.0, acceleration=8.0)
+    reference[:, :, 0] = eta.derivatives(times, order)[:, :, 0]
+    start = CourseStart(q_0, np.array([theta]))
+    course = finder.find(start, reference, times)
+    shares = finder.held_back(start, course, reference)
+    assert shares[0].max() < 1e-6
+    for i in (10, 25, 40):
+        y_t, _ = robot.tool_pose(np.concatenate([course[i, 0]] * 2))
+        point = evaluator(y_t.tolist(), position_path.nearest(y_t))
+        state = np.tile(course[i, :2].ravel(), 2)
+        given = reference[i].ravel(), np.zeros(3)
+        posture = np.concatenate([q_0, np.zeros(12)])
+        drives = []
+        for share in (np.inf, 1.001, 0.99):
+            tried = held_from(share * shares[i].max() * speeds)
+            result = tried.evaluate(state, point, *given, posture=posture)
+            drives.append(result[tried.layout.drive])
+        scale = np.abs(drives[0]).max()
+        assert np.allclose(drives[1], drives[0], rtol=0, atol=1e-9 * scale)
+        assert np.abs(drives[2] - drives[0]).max() > 1e-6 * scale
 
 
 def test_places_out_of_reach_are_refused(load_robot, make_law, position_path):

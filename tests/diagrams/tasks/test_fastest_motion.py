@@ -43,20 +43,27 @@ def build(settings, name=ARM):
     return build_station(settings, find_scenario(name).parent)
 
 
-def test_limits_are_met_on_the_path(fastest):
+@pytest.mark.parametrize(
+    ("name", "way", "leads"),
+    [(ARM, 0.15, False), ("pfc_elastic_7r", -0.5, False), ("pfc_scara_4r", -0.2, True)],
+)
+def test_limits_are_met_on_the_path(name, way, leads, fastest):
     """Torques of the simulated plant within 1 % of what was allowed, and of what was expected."""
-    station = build(fastest())
+    settings = fastest(name, way)
+    settings.controller.torque_lead = leads
+    station = build(settings, name)
     simulator = Simulator(station.diagram)
     station.set_start(simulator.get_mutable_context())
     simulator.AdvanceTo(station.reference_duration)
     times, raw = station.log.read(simulator.get_context())
     law, layout, plan = raw["law"], station.law.layout, station.task.drive_plan
     across = indices(station.task.place.coordinates, Kind.TRANSVERSAL)
-    assert np.linalg.norm(law[:, layout.manifold_state][:, across], axis=1).max() < 5e-5
-    torque, limits = law[:, layout.drive], plan.limits[:3]
+    assert np.linalg.norm(law[:, layout.manifold_state][:, across], axis=1).max() < 1e-5
+    torque, limits = law[:, layout.drive], plan.limits[: station.robot.dimension]
     assert np.abs(torque / limits).max() < 1.01 * (1.0 - RESERVE)
     middle = times + station.controller.period / 2.0
-    expected = np.array([np.interp(middle, plan.times, tau) for tau in plan.demand[:, :3].T]).T
+    planned = plan.demand.T[: len(limits)]
+    expected = np.array([np.interp(middle, plan.times, tau) for tau in planned]).T
     assert np.abs(expected - torque).max() < 0.02 * np.abs(torque).max()
     assert not plan.said and plan.limiting.largest.max() < 1.006
     parts = plan.limiting.of_the_way(plan.speed)
@@ -105,6 +112,14 @@ def test_surfaces_redundant_arms_and_other_laws(name, way, fastest):
     begin, direction = np.array(ends[0]), np.subtract(ends[1], ends[0])
     along = (places - begin) @ direction / (direction @ direction)
     assert np.allclose(places, begin + np.outer(along, direction), rtol=0, atol=1e-10)
+
+
+def test_a_posture_that_moves_is_told_of(fastest):
+    """It stays where it is in the plan."""
+    settings = fastest("pfc_panda_7r", -0.05)
+    settings.controller.posture.task = "limits"
+    (said,) = build(settings, "pfc_panda_7r").task.drive_plan.said
+    assert "planned for a posture that stays" in said
 
 
 def test_as_fast_as_toppra_on_rigid_joints(fastest):

@@ -23,5 +23,5 @@ def test_the_page_is_written(tmp_path, monkeypatch):
     assert metrics["short, as believed: torque by plan"] == pytest.approx(1.0, abs=0.01)
     heavier = metrics["short, masses believed 5 % too low: deviation"]
     assert 5e-5 < heavier < 5e-3
-    assert len(said) == 3
+    assert len(said) == 6
     assert (tmp_path / "out" / "report.html").stat().st_size > 10_000
