@@ -87,17 +87,17 @@ class TurntableParameters:
             require_positive(key, getattr(self, key))
         for key in ("dwell", "increments"):
             require_not_negative(key, getattr(self, key))
-        for key in ("lag", "delay", "believed_delay"):
-            value = getattr(self, key)
-            if value is not None:
-                require_between(key, value, 0.0, _LATEST, "s")
+        for key in ("lag", "delay"):
+            require_between(key, getattr(self, key), 0.0, _LATEST, "s")
 
     def check(self) -> None:
-        """Refuse a table that has no axes, or nowhere to go.
+        """Refuse a table that has no axes, nowhere to go, or is believed to be too late.
 
         Raises:
             InputError: If so.
         """
+        if self.believed_delay is not None:
+            require_between("turntable.believed_delay", self.believed_delay, 0.0, _LATEST, "s")
         key, count = "turntable.stops_deg", len(self.axes)
         require(1 <= count <= 6, "turntable.axes", f"{count} given", "1 to 6")
         require(len(self.stops_deg) > 1, key, self.stops_deg, "two stops or more")

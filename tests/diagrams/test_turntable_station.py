@@ -117,6 +117,7 @@ WRONG = {
     ),
     "turntable.stops_deg[0]": lambda s: s.turntable.stops_deg.__setitem__(0, [1.0]),
     "turntable.delay = 0.0035": lambda s: setattr(s.turntable, "delay", 0.0035),
+    "turntable.believed_delay = 1.0": lambda s: setattr(s.turntable, "believed_delay", 1.0),
     "turntable = given": two_carriers,
     "driver = given; allowed: left out where a turntable": lambda s: setattr(
         s.driver, "delay", 1e-3
