@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydrake.geometry import Capsule, Cylinder, Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
@@ -48,6 +48,9 @@ class ObstacleVisualizer(LeafSystem):
                 self._meshcat.SetObject(f"{path}/body", Sphere(r), _SOLID)
                 self._meshcat.SetObject(f"{path}/margin", Sphere(r + self._margin), _MARGIN)
                 continue
+            if shape.kind == "capsules":
+                self._draw_parts(path, shape)
+                continue
             body = min(_BODY, r)
             length = _HEIGHT - 2.0 * _HEAD - 2.0 * body
             parts = {
@@ -61,6 +64,22 @@ class ObstacleVisualizer(LeafSystem):
                 self._meshcat.SetTransform(f"{path}/{name}", RigidTransform([0.0, 0.0, height]))
         self._draw(context)
         return EventStatus.Succeeded()
+
+    def _draw_parts(self, path: str, shape: ObstacleShape) -> None:
+        for i, part in enumerate(shape.parts):
+            start, way = np.array(part.start), np.subtract(part.end, part.start)
+            length, r = float(np.linalg.norm(way)), part.radius
+            pose = RigidTransform(start)
+            if length:
+                R_WP = RotationMatrix.MakeFromOneVector(way, 2)
+                pose = RigidTransform(R_WP, start + way / 2.0)
+            for name, radius, colour in (
+                ("body", r, _SOLID),
+                ("margin", r + self._margin, _MARGIN),
+            ):
+                form = Capsule(radius, length) if length else Sphere(radius)
+                self._meshcat.SetObject(f"{path}/{name}_{i}", form, colour)
+                self._meshcat.SetTransform(f"{path}/{name}_{i}", pose)
 
     def _draw(self, context: Context) -> None:
         places = np.array(self._positions.Eval(context)).reshape(-1, 3)
