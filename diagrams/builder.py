@@ -95,13 +95,7 @@ def build_station(
         InputError: If the scenario cannot be built.
     """
     builder = DiagramBuilder()
-    for carrier_key in ("holder", "turntable"):
-        if getattr(scenario, carrier_key) is None:
-            continue
-        alone = remote or parametric or with_slope
-        allowed = "null where margins are told, or a robot is driven elsewhere"
-        require(not alone, carrier_key, "given", allowed)
-        check_carrier(scenario)
+    check_carrier(scenario, simulated=not (remote or parametric or with_slope))
     task = make_task(scenario, folder, progress) if like is None else like.task
     workpiece, mounting = make_workpiece(scenario, task), choose_mounting(scenario, task)
     spring = make_spring(scenario, workpiece) if with_slope else None

@@ -38,19 +38,24 @@ _BESIDE_HOLDER = (
 )
 
 
-def check_carrier(scenario: Scenario) -> None:
-    """Refuse what does not go with a workpiece that moves.
+def check_carrier(scenario: Scenario, *, simulated: bool = True) -> None:
+    """Refuse what does not go with a workpiece that moves, if it is one.
 
     Args:
-        scenario: One with a holder or a turntable.
+        scenario: The scenario.
+        simulated: Whether its station is for a simulation, not for margins nor a robot elsewhere.
 
     Raises:
         InputError: If there is something of the kind.
     """
+    if scenario.holder is None and scenario.turntable is None:
+        return
     plain, manifold = Scenario(), scenario.controller.manifold
     both = scenario.holder is not None and scenario.turntable is not None
     require(not both, "turntable", "given", "null where a holder has the workpiece")
     carrier = "holder" if scenario.turntable is None else "turntable"
+    allowed = "null where margins are told, or a robot is driven elsewhere"
+    require(simulated, carrier, "given", allowed)
     for key in _BESIDE_HOLDER:
         given = getattr(scenario, key) != getattr(plain, key)
         require(not given, key, "given", f"left out where a {carrier} has the workpiece")
