@@ -187,7 +187,7 @@ def test_a_force_is_held_like_the_torque(settings):
         port = plant.get_applied_spatial_force_input_port()
         (force,) = port.Eval(plant.GetMyContextFromRoot(root))
         got = force.F_Bq_W.translational()
-        np.testing.assert_allclose(got, np.ravel(push.at(tick * 1e-3))[:3], rtol=1e-12)
+        np.testing.assert_allclose(got, push.at(tick * 1e-3).full().ravel()[:3], rtol=1e-12)
 
 
 def test_log_holds_every_signal(station):

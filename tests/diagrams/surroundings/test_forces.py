@@ -110,7 +110,7 @@ def test_pushes_reach_a_plant_with_coupled_rotors(six_axes):
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
     root.SetTime(0.05)
-    station.blocks.set_state(root, "push_hold.held", np.ravel(PULSE.at(0.05)))
+    station.blocks.set_state(root, "push_hold.held", PULSE.at(0.05).full().ravel())
     station.blocks.set_state(root, "wrench_hold.held", np.array([20.0, 0, 0, 0, 0, 0]))
     pushes, tool, plant = (
         station.diagram.GetSubsystemByName(name)
