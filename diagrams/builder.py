@@ -54,6 +54,7 @@ from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.waiting import plan_waiting
 from diagrams.turntable_station import add_turntable
 from diagrams.warnings.law_warnings import MODES
+from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
@@ -307,6 +308,9 @@ def draw_station(settings: Scenario, folder: FilePath, station: Station) -> Robo
     if not isinstance(station.part, Arm):
         return None
     drawing = draw_robot(station.part.model, station.part.tool, settings.robot, folder)
+    if station.waiting is not None:
+        uncovered = uncovered_links(station.part, drawing.parts, station.waiting.ahead)
+        return replace(drawing, warnings=drawing.warnings + uncovered)
     if settings.holder is None or station.holder is None:
         return drawing
     part = station.holder.part

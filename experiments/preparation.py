@@ -78,7 +78,8 @@ def prepare(
         settle(settings, scenario.name, station, duration, recording=recording)
         progress(0.0, "choosing the integration")
         station, integration = _integrated(settings, folder, station)
-        drawing = draw_station(settings, folder, station) if recording else None
+        seen = recording or settings.obstacles is not None
+        drawing = draw_station(settings, folder, station) if seen else None
         warnings = station.warnings + (drawing.warnings if drawing else [])
     resolve_files(settings, folder)
     text = dump_typed(settings)

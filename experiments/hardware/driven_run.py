@@ -84,7 +84,8 @@ def prepare_driven(
         progress(0.0, "building the controller")
         station = build_station(settings, folder, remote=True)
         settle(settings, scenario.name, station, duration, recording=recording)
-        drawing = draw_station(settings, folder, station) if recording else None
+        seen = recording or settings.obstacles is not None
+        drawing = draw_station(settings, folder, station) if seen else None
     warnings = station.warnings + (drawing.warnings if drawing else [])
     resolve_files(settings, folder)
     text = dump_typed(settings)
