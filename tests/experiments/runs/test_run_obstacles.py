@@ -22,7 +22,7 @@ def _run(folder, *overrides, duration=2.0):
 
 
 def test_the_tool_waits_and_its_promise_is_kept(tmp_path):
-    outcome = _run(tmp_path)
+    outcome = _run(tmp_path, duration=3.0)
     metrics = outcome.metrics
     assert outcome.fault is None
     assert outcome.broken == []
@@ -40,6 +40,7 @@ def test_who_is_faster_than_was_said_breaks_the_promise_and_the_run_says_so(tmp_
         "obstacles.watch.margin=0.6",
         "obstacles.watch.side=0.0",
         "obstacles.watch.uncertainty=0.0",
+        "obstacles.watch.arm_radius=0.1",
         duration=1.6,
     )
     assert any("largest_speed = 0.01 m/s" in warning for warning in outcome.warnings)
