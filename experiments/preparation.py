@@ -78,12 +78,28 @@ def prepare(
         settle(settings, scenario.name, station, duration, recording=recording)
         progress(0.0, "choosing the integration")
         station, integration = _integrated(settings, folder, station)
-        seen = recording or settings.obstacles is not None
-        drawing = draw_station(settings, folder, station) if seen else None
-        warnings = station.warnings + (drawing.warnings if drawing else [])
+        drawing, warnings = look_at(settings, folder, station, recording=recording)
     resolve_files(settings, folder)
     text = dump_typed(settings)
     return PreparedRun(settings, text, station, integration, drawing, warnings)
+
+
+def look_at(
+    settings: Scenario, folder: Path, station: Station, *, recording: bool
+) -> tuple[RobotDrawing | None, list[str]]:
+    """Return what a station's robot looks like, and all that is to be said beforehand.
+
+    It is looked at to be recorded, and where obstacles keep away from what it looks like.
+
+    Args:
+        settings: The scenario.
+        folder: Where its relative file names start.
+        station: Its station.
+        recording: Whether the motion will be recorded.
+    """
+    needed = recording or settings.obstacles is not None
+    drawing = draw_station(settings, folder, station) if needed else None
+    return drawing, station.warnings + (drawing.warnings if drawing else [])
 
 
 def settle(

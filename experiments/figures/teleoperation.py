@@ -1,6 +1,7 @@
 """Figures of a tool that is led from afar: where it follows, what is felt, where energy is."""
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from experiments.results.run_log import RunLog
 from experiments.results.teleoperation import stored_in_channel, turns_between, works
@@ -13,17 +14,12 @@ def draw_teleoperation(log: RunLog) -> Drawing:
     """Where the leader has the tool and where that is, and what both sides feel."""
     canvas, (way, apart, force) = make_panels(3)
     led, tool = log["led_point"].values, log["y_t"].values
-    for k, axis in enumerate(_AXES):
-        way.plot(log.time, tool[:, k] - tool[0, k], color=COLOURS[k], label=axis)
-        way.plot(log.time, led[:, k] - led[0, k], "--", color=COLOURS[k], linewidth=0.9)
+    _plot_axes(way, log.time, tool - tool[0], led - led[0])
     way.set(title="Way of the tool, and of the leader (dashed)", ylabel="way in m")
     distance = np.linalg.norm((led - led[0]) - (tool - tool[0]), axis=1)
     apart.plot(log.time, 1e3 * distance, color=COLOURS[0])
     apart.set(title="Between where the leader is and the tool", ylabel="distance in mm")
-    felt = np.linalg.norm(log["leader_force"].values, axis=1)
-    given = np.linalg.norm(log["port_force"].values[:, 3:], axis=1)
-    force.plot(log.time, felt, color=COLOURS[1], label="that the hand feels")
-    force.plot(log.time, given, color=INK, linewidth=0.9, label="that leads the tool")
+    _plot_sizes(force, log, "force", "that leads the tool")
     force.set(title="Forces", ylabel="force in N")
     place_legend(way)
     place_legend(force)
@@ -39,22 +35,32 @@ def draw_led_turns(log: RunLog) -> Drawing:
     canvas, (turn, apart, moment) = make_panels(3)
     led, tool = (log[name].values.reshape(-1, 3, 3) for name in ("led_orientation", "R_e"))
     turned = [turns_between(np.broadcast_to(R[:1], R.shape), R) for R in (tool, led)]
-    for k, axis in enumerate(_AXES):
-        turn.plot(log.time, turned[0][:, k], color=COLOURS[k], label=axis)
-        turn.plot(log.time, turned[1][:, k], "--", color=COLOURS[k], linewidth=0.9)
+    _plot_axes(turn, log.time, *turned)
     turn.set(title="Turn of the tool, and of the leader (dashed)", ylabel="turn in rad")
     angle = np.linalg.norm(turns_between(tool, led), axis=1)
     apart.plot(log.time, 1e3 * angle, color=COLOURS[0])
     apart.set(title="Between how the leader is turned and the tool", ylabel="angle in mrad")
-    felt = np.linalg.norm(log["leader_moment"].values, axis=1)
-    given = np.linalg.norm(log["port_moment"].values[:, 3:], axis=1)
-    moment.plot(log.time, felt, color=COLOURS[1], label="that the hand feels")
-    moment.plot(log.time, given, color=INK, linewidth=0.9, label="that turns the tool")
+    _plot_sizes(moment, log, "moment", "that turns the tool")
     moment.set(title="Moments", ylabel="moment in Nm")
     place_legend(turn)
     place_legend(moment)
     caption = "Turns since the start, axis times angle, along the world's axes."
     return Drawing("led_turns", "Turned from afar", caption, canvas)
+
+
+def _plot_axes(panel: Axes, time: np.ndarray, tool: np.ndarray, led: np.ndarray) -> None:
+    """Plot what the tool does along each axis, and dashed what the leader asks for."""
+    for k, axis in enumerate(_AXES):
+        panel.plot(time, tool[:, k], color=COLOURS[k], label=axis)
+        panel.plot(time, led[:, k], "--", color=COLOURS[k], linewidth=0.9)
+
+
+def _plot_sizes(panel: Axes, log: RunLog, kind: str, given: str) -> None:
+    """Plot how large forces or moments are at both sides."""
+    felt = np.linalg.norm(log[f"leader_{kind}"].values, axis=1)
+    at_tool = np.linalg.norm(log[f"port_{kind}"].values[:, 3:], axis=1)
+    panel.plot(log.time, felt, color=COLOURS[1], label="that the hand feels")
+    panel.plot(log.time, at_tool, color=INK, linewidth=0.9, label=given)
 
 
 def draw_port_energy(log: RunLog) -> Drawing:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.lcm import DrakeLcm
 
-from diagrams.builder import build_station, draw_station
+from diagrams.builder import build_station
 from diagrams.integration import Integration
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
@@ -23,7 +23,7 @@ from experiments.hardware.native_project import PRIORITY, check_native, write_na
 from experiments.hardware.native_run import Operator, repeat_drive, run_native
 from experiments.hardware.slow_motion import move_slowly
 from experiments.hardware.statics import StaticCheck, check_statics
-from experiments.preparation import PreparedRun, naming, settle
+from experiments.preparation import PreparedRun, look_at, naming, settle
 from experiments.scenario_file import ScenarioFile
 from experiments.simulation import SimulationResult
 from pfsc_drake.checks import require_between
@@ -84,9 +84,7 @@ def prepare_driven(
         progress(0.0, "building the controller")
         station = build_station(settings, folder, remote=True)
         settle(settings, scenario.name, station, duration, recording=recording)
-        seen = recording or settings.obstacles is not None
-        drawing = draw_station(settings, folder, station) if seen else None
-    warnings = station.warnings + (drawing.warnings if drawing else [])
+        drawing, warnings = look_at(settings, folder, station, recording=recording)
     resolve_files(settings, folder)
     text = dump_typed(settings)
     by_robot = Integration("none", station.controller.period, "the robot moves by itself")

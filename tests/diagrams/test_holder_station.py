@@ -4,18 +4,16 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.holder_station import HOLDER
 from diagrams.robots.held_workpiece import WORKPIECE
 from diagrams.scenario import Scenario, SensorFailureParameters
 from diagrams.scenario.robot import PoseParameters
-from experiments.results.run_signals import collect_log
 from experiments.scenario_file import SCENARIO_DIRECTORY
-from experiments.simulation import configure
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
+from tests.diagrams.station_run import run_station
 from tests.scenarios import shipped_scenario
 
 # s, when the seam is gone along; and from when on
@@ -35,13 +33,7 @@ def exact(**holder):
 
 def run(settings, end=END, like=None):
     """Return a station, its context at the end, and its log."""
-    station = build_station(settings, SCENARIO_DIRECTORY, like=like)
-    simulator = Simulator(station.diagram)
-    configure(simulator, "runge_kutta5", 1e-3)
-    root = simulator.get_mutable_context()
-    station.set_start(root)
-    simulator.AdvanceTo(end)
-    return station, root, collect_log(station, root)
+    return run_station(settings, end, like)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.robot_station import build_robot_station
@@ -11,10 +10,9 @@ from diagrams.scenario.schema import driven
 from diagrams.scenario.turntable import TurntableAxisParameters, TurntableParameters
 from diagrams.turntable_station import turntable_command
 from experiments.results.holder import holder_metrics
-from experiments.results.run_signals import collect_log
 from experiments.scenario_file import SCENARIO_DIRECTORY
-from experiments.simulation import configure
 from pfsc_drake.errors import InputError
+from tests.diagrams.station_run import run_station
 from tests.scenarios import shipped_scenario
 
 END, BEGIN = 0.8, 0.5  # s
@@ -31,14 +29,8 @@ def exact(**table):
 
 
 def run(settings, like=None):
-    """Return a station and the log of its run."""
-    station = build_station(settings, SCENARIO_DIRECTORY, like=like)
-    simulator = Simulator(station.diagram)
-    configure(simulator, "runge_kutta5", 1e-3)
-    root = simulator.get_mutable_context()
-    station.set_start(root)
-    simulator.AdvanceTo(END)
-    return station, root, collect_log(station, root)
+    """Return a station, its context at the end, and its log."""
+    return run_station(settings, END, like)
 
 
 @pytest.fixture(scope="module")
