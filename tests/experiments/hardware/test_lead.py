@@ -18,11 +18,12 @@ from tests.experiments.hardware.test_two_processes import ROOT, is_allowed
 
 _ALONE = """
 ip link set lo up; ip route add 224.0.0.0/4 dev lo
-{python} -m experiments run teleop_region --out {out}/follower --duration 4 --no-recording \\
-    --set teleoperation.lcm=udpm:// > {out}/follower.txt 2>&1 &
-{python} -m experiments lead teleop_region --lcm udpm:// --duration 60 > {out}/lead.txt 2>&1 &
+{python} -u -m experiments lead teleop_region --lcm udpm:// --duration 120 > {out}/lead.txt 2>&1 &
 LEADS=$!
-wait %1; STATUS=$?; kill $LEADS; wait $LEADS; exit $STATUS
+until grep -q "waiting for a follower" {out}/lead.txt || ! kill -0 $LEADS; do sleep 0.1; done
+{python} -m experiments run teleop_region --out {out}/follower --duration 4 --no-recording \\
+    --set teleoperation.lcm=udpm:// > {out}/follower.txt 2>&1
+STATUS=$?; kill $LEADS; wait $LEADS; exit $STATUS
 """
 
 
