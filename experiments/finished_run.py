@@ -45,6 +45,7 @@ from experiments.results.promises import (
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
+from experiments.results.stop import MotionAfterFault
 from experiments.results.streaming import stream_metrics
 from experiments.results.teleoperation import teleoperation_metrics
 from experiments.simulation import SimulationResult, measure_tick
@@ -73,6 +74,7 @@ class RunOutcome:
         problem: Which results could not be written, why, and where they are instead; or None.
         margins: What the loop bears at the start, in one line; None if nobody asked.
         broken: What was promised and not kept, one phrase each.
+        stop: How the robot moved after a fault, in words; empty without one.
     """
 
     fault: str | None
@@ -83,6 +85,7 @@ class RunOutcome:
     problem: str | None = None
     margins: str | None = None
     broken: list[str] = field(default_factory=list)
+    stop: str = ""
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,7 @@ class _Measured:
         fault: Why the run was stopped, or None.
         broken: What was promised and not kept, one phrase each.
         end: When it ended [s].
+        stop: How the robot moved after a fault, in words; empty without one.
     """
 
     log: RunLog
@@ -129,6 +133,7 @@ class _Measured:
     fault: str | None
     broken: list[str]
     end: float
+    stop: str
 
 
 def write_outcome(
@@ -177,6 +182,7 @@ def write_outcome(
         report.problem,
         None if run.analysis is None else one_line(run.analysis),
         measured.broken,
+        measured.stop,
     )
 
 
@@ -238,6 +244,11 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
     metrics.update(limits.metrics(log))
+    stop = ""
+    if "fault_time" in log.attributes and log.time.size:
+        motion_after = MotionAfterFault(log, limits)
+        metrics.update(motion_after.metrics())
+        stop = motion_after.sentence()
     metrics.update(found_links_metrics(log))
     metrics.update(link_metrics(log))
     metrics.update(plan_metrics(station.task.drive_plan))
@@ -261,7 +272,7 @@ def _measure(
         *unpromised_distance(metrics, settings.controller.law),
     ]
     broken = broken_promises(metrics, whole=lasted and result.fault is None)
-    return _Measured(log, motion, metrics, warnings, result.fault, broken, end)
+    return _Measured(log, motion, metrics, warnings, result.fault, broken, end, stop)
 
 
 def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:

@@ -42,7 +42,8 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
     if outcome.interrupted:
         status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
     if outcome.fault is not None:
-        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {time:.3f} s"]
+        stop = outcome.stop or f"ended at t = {time:.3f} s"
+        status, ends = FAULT, [f"fault: {outcome.fault}; {stop}"]
     if outcome.broken:
         status, ends = status or FAULT, [*ends, _missed(outcome.broken)]
     if outcome.problem is not None:

@@ -26,6 +26,7 @@ from reporting.registry import possible_metrics
 _ALWAYS = (
     *("deepest_violation", "max_unanswered_force", "past_known_way"),
     *("least_port_tank", "energy_margin", "least_distance_while_moving"),
+    *("motion_after_fault", "slide_motion_after_fault"),
 )
 # m, by which a tool may be past the end of what it knows of its path: it follows its reference
 _PAST = 1e-3
