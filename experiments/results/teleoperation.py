@@ -52,7 +52,8 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     Returns:
         ``following_delay`` [s] and ``following_error`` [m]: by which delay the tool follows best,
         and how far it is from there, rms; ``led_distance_end`` [m]: between the two when all is
-        over; ``largest_felt_force`` [N]; ``least_port_tank`` [J]; ``energy_margin`` [J]: how far
+        over; ``owed_distance_end`` [m]: what of it a side could not tell for want of energy;
+        ``largest_felt_force`` [N]; ``least_port_tank`` [J]; ``energy_margin`` [J]: how far
         the work of the hand and of what the tool touches, as it truly was, stayed above what was
         stored at the start; with six axes ``led_turn_end`` [rad] and ``largest_felt_moment`` [Nm],
         and moments do work, too; ``audit_ports`` [J]: beside the law of the tanks;
@@ -64,6 +65,7 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     if way is None or "port_force" not in log or log.time.size < 2:
         return metrics
     metrics.add("least_port_tank", float(log["port_tank"].values.min()))
+    metrics.add("owed_distance_end", float(log["port_owed"].values[-1].max()))
     metrics.add("audit_ports", tank_residual(log, way.tank.capacity if way.passive else np.inf))
     if "led_point" not in log:
         return metrics

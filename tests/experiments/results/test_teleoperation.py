@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from experiments.figures.all import draw_figures
+from experiments.results.promises import broken_promises, set_promises
 from experiments.results.run_log import RunLog
 from experiments.results.teleoperation import (
     add_teleoperation,
@@ -23,10 +24,11 @@ LATE = 120  # ticks
 FORCE, START = np.array([3.0, 0.0, 0.0]), np.array([0.5, 0.0, 1.0])
 
 
-def records(position, force, tank, sent, received):
+def records(position, force, tank, sent, received, owed):
     parts = {
         "force": force, "position": position, "tank": tank, "sent": sent,
         "received": received, "share": np.ones(len(TIME)),
+        "owed": np.full(len(TIME), owed),
     }  # fmt: skip
     return np.column_stack([parts[name] for name in RECORD])
 
@@ -43,8 +45,8 @@ def fixture_log():
     arrived = np.concatenate([np.zeros(LATE), taken[:-LATE]])
     tank = np.full(len(TIME), 0.5)
     raw = {
-        "leader_record": records(way, -force, tank, taken, np.zeros(len(TIME))),
-        "follower_record": records(late, 0 * force, tank + arrived, 0 * taken, arrived),
+        "leader_record": records(way, -force, tank, taken, np.zeros(len(TIME)), 0.0),
+        "follower_record": records(late, 0 * force, tank + arrived, 0 * taken, arrived, 4e-3),
         "leader_state": np.hstack([way, way]),
         "leader_hand": np.hstack([force, force]),
         "leader_motor": -force,
@@ -54,6 +56,14 @@ def fixture_log():
     add_teleoperation(log, raw)
     log.add("y_t", late + START)
     return log
+
+
+def test_what_a_side_owes_is_a_requirement(log, settings):
+    metrics = teleoperation_metrics(log, settings)
+    assert metrics["owed_distance_end"].value == 4e-3
+    set_promises(metrics, settings)
+    missed = broken_promises(metrics, whole=True)
+    assert any(phrase.startswith("owed_distance_end = 4\u202fmm") for phrase in missed)
 
 
 @pytest.fixture(name="settings")
