@@ -21,7 +21,8 @@ from reporting.progress import ProgressListener
 COMMANDS = "commands.csv"
 _LONGEST = 1200.0  # s
 _RESULT = re.compile(
-    r"ticks (\d+) differing (\d+) median_us ([\d.]+) p99_us ([\d.]+) worst_us ([\d.]+)"
+    r"ticks (\d+) differing (\d+) largest (\S+) "
+    r"median_us ([\d.]+) p99_us ([\d.]+) worst_us ([\d.]+)"
 )
 _TOOLS = ("gcc", "make")
 # a force sensor's, whatever led it to the controller
@@ -40,12 +41,14 @@ class Replay:
     Attributes:
         ticks: Ticks of the run.
         differing: How many of them have an output that is not the same to the last bit.
+        largest: Largest difference of an output from the record, infinite where one is NaN.
         median, p99, worst: Times of a step, in a row [us].
         text: What was printed.
     """
 
     ticks: int
     differing: int
+    largest: float
     median: float
     p99: float
     worst: float
@@ -107,8 +110,8 @@ def check_export(
     if found is None:
         raise InputError(f"{folder}/replay ended with status {replayed.returncode}")
     ticks, differing = int(found[1]), int(found[2])
-    median, p99, worst = (float(found[i]) for i in (3, 4, 5))
-    return Replay(ticks, differing, median, p99, worst, replayed.stdout)
+    largest, median, p99, worst = (float(found[i]) for i in (3, 4, 5, 6))
+    return Replay(ticks, differing, largest, median, p99, worst, replayed.stdout)
 
 
 def compile_replay(folder: Path, progress: ProgressListener, optimization: str = "") -> None:
