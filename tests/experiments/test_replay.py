@@ -41,7 +41,7 @@ def test_the_log_of_a_run(exported, tmp_path):
     commands = replay_log(folder, tmp_path / "log.h5", quiet)
     np.testing.assert_array_equal(commands.told, recorded[:, 4 * N : 5 * N])
     np.testing.assert_allclose(commands.difference, [0.0, 0.5, 2.0], atol=1e-12)
-    assert (commands.fault, commands.port, commands.unit) == (0, "drive_torque", "Nm or N")
+    assert (commands.fault, commands.port, commands.unit) == (0, "drive_torque", "Nm")
     table = np.genfromtxt(commands.file, delimiter=",", names=True)
     np.testing.assert_allclose(table["t"], log.time, atol=1e-12)
     np.testing.assert_allclose(table["drive_torque_3"], commands.told[:, 2], rtol=1e-11)
@@ -95,7 +95,7 @@ def test_what_the_command_says(exported, tmp_path, capfd):
     status = main(["replay", str(folder), links])
     said = capfd.readouterr()
     assert status == 3
-    assert "drive_torque [Nm or N], 40 ticks" in said.out
+    assert "drive_torque [Nm], 40 ticks" in said.out
     assert "motors are taken to be where q, v is" in said.out
     assert "largest change" in said.out
     assert said.err.startswith("fault: ")

@@ -1,5 +1,7 @@
 """Signals, metrics and audit of a tool that is led from afar, from a made-up log."""
 
+import dataclasses as dc
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,6 +13,7 @@ from experiments.results.run_log import RunLog
 from experiments.results.teleoperation import (
     add_teleoperation,
     energy_above_bound,
+    handle_warnings,
     stored_in_channel,
     tank_residual,
     teleoperation_metrics,
@@ -56,6 +59,19 @@ def fixture_log():
     add_teleoperation(log, raw)
     log.add("y_t", late + START)
     return log
+
+
+def test_a_handle_that_is_too_fast_is_reported(log, settings):
+    """It moves at up to 0.07 m/s."""
+    speed = teleoperation_metrics(log, settings)["largest_handle_speed"].value
+    assert speed == pytest.approx(0.07, rel=1e-3)
+    leader = settings.teleoperation.leader
+    faster, slower = dc.replace(leader, largest_speed=0.06), dc.replace(leader, largest_speed=0.08)
+    for device, said in ((slower, 0), (faster, 1)):
+        way = dc.replace(settings.teleoperation, leader=device)
+        found = handle_warnings(log, dc.replace(settings, teleoperation=way))
+        assert len(found) == said
+    assert "up to 0.07 m/s, faster than teleoperation.leader.largest_speed = 0.06 m/s" in found[0]
 
 
 def test_what_a_side_owes_is_a_requirement(log, settings):
