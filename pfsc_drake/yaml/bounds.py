@@ -86,8 +86,9 @@ def bounds_of(owner: type, name: str) -> Bounds:
     known = (unit for unit in _BRACKETS.findall(text) if _largest(unit) is not None)
     unit = next(known, "deg" if name.endswith("_deg") else "")
     largest = _largest(unit) or _OTHERS
+    least = -math.inf if field.default == -math.inf else -largest
     no_limit = field.default == math.inf or bool(re.search(r"\binf(inite)?\b", text))
-    return Bounds(-largest, largest, unit, no_limit)
+    return Bounds(least, largest, unit, no_limit)
 
 
 def attribute_text(owner: type, name: str) -> str | None:

@@ -34,6 +34,7 @@ class Block(Parent):
         checked: Checked by itself [s], up to 2.
         share: A share ``[a, b]``.
         never: End [s].
+        lowest: Least height [m].
     """
 
     lengths: list[float] = field(default_factory=lambda: [1.0, 2.0])
@@ -43,6 +44,7 @@ class Block(Parent):
     checked: float = 1.0
     share: float = 0.0
     never: float = math.inf
+    lowest: float = -math.inf
     untold: float = 0.0
 
     def __post_init__(self) -> None:
@@ -71,6 +73,7 @@ class Whole:
         ("own", Bounds(0.0, 5.0, "m")),
         ("share", Bounds(-1e9, 1e9)),
         ("never", Bounds(-1e6, 1e6, "s", True)),
+        ("lowest", Bounds(-math.inf, 1e4, "m")),
         ("untold", Bounds(-math.inf, math.inf)),
     ],
 )
