@@ -27,6 +27,7 @@ _LARGEST = {
 # of shares, factors, directions and counts, and of units that are rare
 _OTHERS = 1e9
 _BRACKETS = re.compile(r"\[([^\[\]]*)\]")
+_LITERAL = re.compile(r"``[^`]*``")
 _SEVERAL = re.compile(r", | or ")
 _KEY = "bounds"
 
@@ -83,7 +84,9 @@ def bounds_of(owner: type, name: str) -> Bounds:
     text = attribute_text(owner, name)
     if text is None:
         return Bounds(-math.inf, math.inf)
-    known = (unit for unit in _BRACKETS.findall(text) if _largest(unit) is not None)
+    # what is literal are lists
+    brackets = _BRACKETS.findall(_LITERAL.sub("", text))
+    known = (unit for unit in brackets if _largest(unit) is not None)
     unit = next(known, "deg" if name.endswith("_deg") else "")
     largest = _largest(unit) or _OTHERS
     least = -math.inf if field.default == -math.inf else -largest

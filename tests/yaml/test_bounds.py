@@ -32,7 +32,7 @@ class Block(Parent):
         turn_deg: Angle.
         own: Own range.
         checked: Checked by itself [s], up to 2.
-        share: A share ``[a, b]``.
+        share: A share of ``[N]``, of ``N`` joints.
         never: End [s].
         lowest: Least height [m].
     """
