@@ -289,6 +289,19 @@ def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
     assert run.overrun.max() <= 1e-12
 
 
+def test_what_was_refused_is_remembered_at_rest():
+    """Further way points of the same path come after it has stopped, and change nothing."""
+    w = bend(41)
+    rows, times = w[1:].copy(), even(40)
+    rows[25], times[30:] = [np.nan, 0.3, 1.0], times[30:] + 2.5
+    stream = make_stream(BEND, w[0])
+    run = stream.run(sent_at(stream.layout, rows, times), 5500)
+    at_rest = round(times[30] / PERIOD) - 50
+    np.testing.assert_allclose(run.sigma[at_rest], w[25], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(run.stream[at_rest:, 0], StreamStatus.REFUSED)
+    np.testing.assert_allclose(run.sigma[-1], w[25], rtol=0, atol=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
     random = np.random.default_rng(seed)

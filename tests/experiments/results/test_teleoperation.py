@@ -195,6 +195,16 @@ def test_the_bound_counts_the_true_work_on_both_ends(log):
     np.testing.assert_allclose(energy_above_bound(back, 1.0), expected, atol=1e-12)
 
 
+def test_energy_is_counted_at_the_follower(log, settings):
+    """A hand that is pushed back with 3 N at half the motion and a quarter of the force."""
+    log["leader_hand"].values[:] *= -1.0
+    settings.teleoperation.motion_scale, settings.teleoperation.force_scale = 2.0, 0.25
+    farthest = log["leader_position"].values[:, 0].max()
+    expected = 1.0 - 2.0 / 0.25 * 3.0 * farthest
+    found = teleoperation_metrics(log, settings)["energy_margin"].value
+    assert found == pytest.approx(expected, rel=1e-6)
+
+
 def test_the_channel_stores_what_is_under_way(log):
     stored = stored_in_channel(log)
     way = 0.1 * np.sin(0.7 * TIME) ** 2
