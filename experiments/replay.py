@@ -223,7 +223,7 @@ def _misfit(said: Any) -> str:
     if not isinstance(said, dict):
         return "no mapping"
     period = said.get("sampling_time")
-    if not (type(period) in (int, float) and 1e-6 <= period <= 1.0):
+    if not (isinstance(period, (int, float)) and 1e-6 <= period <= 1.0):
         return f"sampling_time = {shortened(repr(period))}, not from 1e-6 to 1 s"
     for key in ("inputs", "outputs"):
         ports = said.get(key)

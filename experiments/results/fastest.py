@@ -58,10 +58,10 @@ def given_metrics(log: RunLog, plan: DrivePlan | None) -> Metrics:
         metrics.add("given_torque_share", float(share[k]), source=f"at t = {log.time[k]:.3f} s")
     if log.time.size > 1:
         unit, rates = f"{torque.unit}/s", _rates(log, torque)
-        k, i = np.unravel_index(int(rates.argmax()), rates.shape)
-        where = f"axis {i + 1} at t = {log.time[k]:.3f} s"
+        row, i = np.unravel_index(int(rates.argmax()), rates.shape)
+        where = f"axis {i + 1} at t = {log.time[row]:.3f} s"
         metrics.add("planned_torque_rate", float(_planned(log, plan).max()), unit)
-        metrics.add("given_torque_rate", float(rates[k, i]), unit, source=where)
+        metrics.add("given_torque_rate", float(rates[row, i]), unit, source=where)
     return metrics
 
 

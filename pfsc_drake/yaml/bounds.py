@@ -110,9 +110,10 @@ def out_of_bounds(value: Any) -> Iterator[tuple[str, float, Bounds]]:
     Args:
         value: Instance of a dataclass; other dataclasses in it are not looked into.
     """
+    owner: Any = type(value)
     for field in dataclasses.fields(value):
         for place, number in _numbers(getattr(value, field.name), field.name):
-            bounds = bounds_of(type(value), field.name)
+            bounds = bounds_of(owner, field.name)
             if not bounds.allow(number):
                 yield place, number, bounds
 

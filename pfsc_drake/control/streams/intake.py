@@ -285,8 +285,9 @@ class WaypointIntake(Block):
         reason = where(over, 0.0, reason)
         none = ca.logic_or(ca.logic_or(starts, is_still), offer.new)
         count, real = where(none, 0.0, count), where(none, 0.0, real)
-        told = phase, count, real, last, taken, begun, counts.silence, counts.heard, reason
-        told += counts.most, counts.behind
+        told = counts._replace(
+            phase=phase, fresh=count, real=real, last=last, taken=taken, begun=begun, reason=reason
+        )
         return {
             "course": ca.vertcat(*course.values()),
             "older": older,
