@@ -19,6 +19,11 @@ from pfsc_drake.errors import InputError
 
 _FUNCTIONS = "controller_functions"
 _DOUBLE = 8  # bytes
+# of joints that turn, and that slide; the longer ones first
+_UNITS_OF_JOINTS = (
+    *(("rad, rad/s", "m, m/s"), ("rad/s", "m/s"), ("rad", "m")),
+    *(("Nm s/rad", "N s/m"), ("Nm", "N")),
+)
 _HEADER = """\
 /* {title}
 
@@ -97,6 +102,8 @@ class CController:
         presets: States that it begins with, by name; the others are what the inputs say.
         scenario: Name of what it was made from.
         hash: SHA-256 of that.
+        turning: Whether each joint turns, else it slides; ports name both units if it is empty, or
+            where some do.
     """
 
     program: Program
@@ -105,6 +112,7 @@ class CController:
     presets: Mapping[str, np.ndarray] = field(default_factory=dict)
     scenario: str = ""
     hash: str = ""
+    turning: tuple[bool, ...] = ()
 
     @classmethod
     def of(cls, network: Network, period: float, **about: Any) -> "CController":
@@ -173,11 +181,11 @@ class CController:
         """Return what ``interface.json`` says."""
         network = self.program.network
         inputs = [
-            {"name": name, "size": port.size, "unit": port.unit}
+            {"name": name, "size": port.size, "unit": self._unit(port.unit)}
             for name, port in network.inputs.items()
         ]
         outputs = [
-            {"name": name, "size": network.wires[wire], "unit": network.units[name]}
+            {"name": name, "size": network.wires[wire], "unit": self._unit(network.units[name])}
             for name, wire in network.outputs.items()
         ]
         return {
@@ -189,6 +197,14 @@ class CController:
             "scenario": self.scenario,
             "hash": self.hash,
         }
+
+    def _unit(self, unit: str) -> str:
+        """Return a port's unit as it is for joints that all turn, or all slide."""
+        if not self.turning or any(self.turning) != all(self.turning):
+            return unit
+        for turns, slides in _UNITS_OF_JOINTS:
+            unit = unit.replace(f"{turns} or {slides}", turns if all(self.turning) else slides)
+        return unit
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the states that are set before the start, and which: ``x`` and ``preset``."""

@@ -332,4 +332,5 @@ def make_law(
         safe_state(parameters, robot, faults or FaultParameters()),
         tells_reference_velocity=parameters.friction.needs_reference_velocity,
         posture=make_posture(parameters.posture, robot, gains.posture, rest),
+        max_beyond_end=parameters.max_beyond_end,
     )
