@@ -17,6 +17,7 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
+from pfsc_drake.control.streams.messages import WaypointLayout
 from pfsc_drake.errors import InputError, require, require_one_of
 from pfsc_drake.following.carried import add_framed_point, add_seen_tool, carried
 from pfsc_drake.following.compliance import reference_order
@@ -71,7 +72,8 @@ class Follower(Diagram):
         drive_torque (output): Drive torques within their limits, shape (N,) [Nm or N]; of velocity
             servos
         velocity_reference (output): Joint velocities, shape (N,) [rad/s or m/s].
-        actuation (output): The same in the order of the plant's actuators, held from tick to tick.
+        actuation (output): The same in the order of the plant's actuators, held from tick to tick;
+            absent with velocity servos if a joint has no actuator.
         reference (output): Derivatives 0..r of the virtual output's reference by rows.
         manifold_force (output): Where it yields: forces along the coordinates, shape (m,) [N, Nm].
         limit_force (output): Where a hand leads it along a manifold: by what forces the robot's
@@ -123,7 +125,7 @@ class Follower(Diagram):
         if not plant.HasFrameNamed(tool):
             raise InputError(f"tool = {tool}: the plant has no frame of this name")
         self.robot, self._coordinates = chain_from_plant(plant, plant.GetFrameByName(tool))
-        self._actuation = self._coordinates.actuation_rows(plant.num_actuators())
+        self._actuation = self._rows_of_actuation(plant, law)
         near = self._near(options.posture)
         followed = make(self.robot, near, RELATIVE_DEGREE[law])
         self._own, self._moves = followed.manifold, options.frame is not None
@@ -145,6 +147,17 @@ class Follower(Diagram):
         """State ``[q, v]`` of the plant at rest at the start; elastic joints carry the weight."""
         return state_at_rest(self.robot, self._coordinates, self.start_posture)
 
+    @property
+    def messages(self) -> WaypointLayout:
+        """Layout of messages with waypoints.
+
+        Raises:
+            InputError: If the path does not come as waypoints.
+        """
+        if self.followed.streamed is None:
+            raise InputError("messages: this path is known beforehand; see add_path_streaming")
+        return self.followed.streamed.messages
+
     def stepper(self, connected: tuple[str, ...] = ()) -> Stepper:
         """Return the controller as something to call at every tick, without Drake.
 
@@ -154,6 +167,16 @@ class Follower(Diagram):
             connected: Optional inputs that are given at every tick.
         """
         return Stepper(fuse(self).network, connected)
+
+    def _rows_of_actuation(self, plant: MultibodyPlant, law: str) -> np.ndarray | None:
+        """Return the matrix from drives to the plant's actuation; None for servos without motors.
+
+        Raises:
+            InputError: If a law commands torques, and a joint has no actuator.
+        """
+        if RELATIVE_DEGREE[law] == 1 and self._coordinates.undriven:
+            return None
+        return self._coordinates.actuation_rows(plant.num_actuators())
 
     def _near(self, posture: np.ndarray | None) -> np.ndarray:
         """Return from where the posture at the start is looked for, shape (N,)."""
@@ -209,12 +232,13 @@ class Follower(Diagram):
         told = signals | {"desired_reference": desired}
         made |= add_reference(builder, controller, linearization, robot, compliance, wanted, told)
         drive = controller.GetOutputPort(controller.drive_port)
-        hold = self._add("hold", Hold(self.robot.dimension))
-        builder.Connect(drive, hold.GetInputPort("value"))
-        actuation = self._add("actuation", Linear(self._actuation))
-        builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
         builder.ExportOutput(drive, controller.drive_port)
-        builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
+        if self._actuation is not None:
+            hold = self._add("hold", Hold(self.robot.dimension))
+            builder.Connect(drive, hold.GetInputPort("value"))
+            actuation = self._add("actuation", Linear(self._actuation))
+            builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
+            builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
         for name in (
             *("reference", "manifold_force", "limit_force"),
             *("mode", "record", "guides", "stream", "watch"),

@@ -1,5 +1,6 @@
 """Path following of a user's own plant: one call, a diagram, and what it refuses."""
 
+import re
 import subprocess
 
 import numpy as np
@@ -14,6 +15,7 @@ from pfsc_drake import (
     FollowerOptions,
     StreamLimits,
     WaypointTable,
+    add_actuators,
     add_path_following,
     path_from_waypoints,
 )
@@ -122,6 +124,49 @@ def test_velocity_servos_are_told_velocities(path):
     told = read(simulator, follower, "velocity_reference")
     np.testing.assert_allclose(told, 0.0, atol=1e-9)
     assert not follower.HasOutputPort("drive_torque")
+
+
+@pytest.fixture(name="undriven")
+def fixture_undriven(tmp_path):
+    """The model whose third joint Drake gives no actuator."""
+    text = (models_directory() / "comau_racer_1_4" / "comau_racer_1_4.sdf").read_text("utf-8")
+    before, after = text.split('<joint name="joint_3"')
+    model = tmp_path / "undriven.sdf"
+    changed = re.sub("<effort>.*?</effort>", "<effort>0</effort>", after, count=1)
+    model.write_text(f'{before}<joint name="joint_3"{changed}', encoding="utf-8")
+    return model
+
+
+def test_a_joint_without_actuator_is_named_where_torques_are_commanded(path, undriven):
+    builder = DiagramBuilder()
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(undriven))
+    plant.Finalize()
+    with pytest.raises(InputError, match=r"joints without actuator: 'joint_3'; .*add_actuators"):
+        add_path_following(builder, plant, "tool_point", path, "rigid")
+    servos = add_path_following(builder, plant, "tool_point", path, "velocity_servo")
+    assert servos.HasOutputPort("velocity_reference") and not servos.HasOutputPort("actuation")
+
+
+def test_actuators_that_are_added_drive_their_joints(path, undriven):
+    """The third joint's actuator is the last of the plant then."""
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    Parser(plant).AddModels(str(undriven))
+    add_actuators(plant, undriven, effort_limits={"joint_3": 800.0})
+    plant.Finalize()
+    follower = add_path_following(builder, plant, "tool_point", path, "rigid")
+    builder.Connect(plant.get_state_output_port(), follower.GetInputPort("plant_state"))
+    builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
+    simulator = Simulator(builder.Build())
+    own = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositionsAndVelocities(own, follower.start_state)
+    simulator.AdvanceTo(0.1)
+    drive, actuation = (read(simulator, follower, name) for name in ("drive_torque", "actuation"))
+    # held since the last sample
+    np.testing.assert_allclose(actuation, drive[[0, 1, 3, 4, 5, 2]], rtol=0, atol=0.2)
+    assert np.abs(np.subtract.outer(drive, drive))[~np.eye(6, dtype=bool)].min() > 0.5
+    assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
 
 
 def test_an_override_slows_the_progress_and_not_the_tool(path):
