@@ -53,10 +53,10 @@ from diagrams.tasks.held_frame import law_manifold
 from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.waiting import plan_waiting
 from diagrams.turntable_station import add_turntable
-from diagrams.warnings.law_warnings import MODES
 from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.following.law import make_law
+from pfsc_drake.following.law_warnings import MODES
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess

@@ -10,7 +10,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from diagrams.fault_description import FaultScene, FoundFault, describe, first_instant
+from diagrams.fault_instant import first_instant
 from diagrams.named_builder import PrefixingBuilder
 from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.drives import add_drives, add_friction, believed_friction
@@ -45,6 +45,7 @@ from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame, 
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.fault_description import FaultScene, FoundFault, describe
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress

@@ -16,7 +16,6 @@ from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import record
 from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
 from experiments.results.drives import (
@@ -52,6 +51,7 @@ from experiments.simulation import SimulationResult, measure_tick
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
 from pfsc_drake.following.fixtures import free_motion
+from pfsc_drake.robot.coordinate_text import posture_text
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
 from reporting.page import Report, report_page, write_report

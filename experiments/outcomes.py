@@ -147,7 +147,7 @@ def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
 
 def judge_commands(console: Console, commands: "Commands") -> int:
     """Tells what drives would have been told; returns the exit status."""
-    from pfsc_drake.control.law.fault import Fault
+    from pfsc_drake.codegen.c_faults import fault_sentences
 
     told = commands.told
     change = np.abs(np.diff(told, axis=0)).max(axis=0, initial=0.0)
@@ -170,7 +170,7 @@ def judge_commands(console: Console, commands: "Commands") -> int:
         console.print(commands.assumed, highlight=False, markup=False, soft_wrap=True)
     console.print(f"all outputs: {commands.file}", highlight=False, markup=False, soft_wrap=True)
     if commands.fault:
-        why = Fault(commands.fault).explanation
+        why = fault_sentences()[int(commands.fault)]
         print_error(f"fault: {why}, from t = {commands.fault_time:.3f} s on")
         return FAULT
     return 0

@@ -13,6 +13,7 @@ import numpy as np
 
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
+from pfsc_drake.codegen.c_faults import CFault, fault_sentences
 from pfsc_drake.compiled.c_source import c_source, parameters
 from pfsc_drake.compiled.operations import Untranslatable
 from pfsc_drake.errors import InputError
@@ -24,6 +25,8 @@ _UNITS_OF_JOINTS = (
     *(("rad, rad/s", "m, m/s"), ("rad/s", "m/s"), ("rad", "m")),
     *(("Nm s/rad", "N s/m"), ("Nm", "N")),
 )
+# what may be NaN before it is first measured, and stops the motion until then
+_UNKNOWN_AT_START = "obstacles"
 _HEADER = """\
 /* {title}
 
@@ -43,6 +46,7 @@ extern "C" {{
 typedef struct {{
     double tick; /* number of the next tick */
     double x[{size}];
+    double phase; /* initialized, or a fault that stays until it is again */
 }} controller_state;
 
 typedef struct {{
@@ -53,10 +57,11 @@ typedef struct {{
 {outputs}
 }} controller_outputs;
 
-/* Begin where the inputs say. */
+/* Begin where the inputs say; if they are no start, every step is a fault. */
 void controller_initialize(controller_state *state, const controller_inputs *inputs);
 
-/* Evaluate one tick; returns the fault, 0 for none. */
+/* Evaluate one tick; returns the fault, 0 for none. From {first} on there is no state to
+   stop from: all outputs but the fault are 0. */
 int controller_step(
     controller_state *state, const controller_inputs *inputs, controller_outputs *outputs);
 
@@ -73,20 +78,57 @@ _SOURCE = """\
 
 #include "{functions}.h"
 
+#define INITIALIZED 4503601774854145.0 /* which memory does not hold by chance */
+#define LARGEST_START 1e9
+
+static int is_valid(const double *values, size_t size)
+{{
+    size_t i;
+    for (i = 0; i < size; ++i) {{
+        if (!(values[i] >= -LARGEST_START && values[i] <= LARGEST_START)) {{
+            return 0;
+        }}
+    }}
+    return 1;
+}}
+
+static int refuse(controller_state *state, controller_outputs *outputs, int fault)
+{{
+    memset(outputs, 0, sizeof *outputs);
+    outputs->{fault}[0] = fault;{status}
+    state->phase = fault;
+    return fault;
+}}
+
 void controller_initialize(controller_state *state, const controller_inputs *inputs)
 {{
-    {unused}state->tick = 0.0;
-    {functions}_initial({initial});
+    {unused}memset(state, 0, sizeof *state);
+    state->phase = {start_invalid};
+    if ({is_valid}) {{
+        {functions}_initial({initial});
+        state->phase = INITIALIZED;
+    }}
 }}
 
 int controller_step(
     controller_state *state, const controller_inputs *inputs, controller_outputs *outputs)
 {{
     double x_next[{size}];
+    double fault;
+    if (state->phase == {start_invalid} || state->phase == {fault_invalid}) {{
+        return refuse(state, outputs, (int)state->phase);
+    }}
+    if (state->phase != INITIALIZED) {{
+        return refuse(state, outputs, {not_initialized});
+    }}
     {functions}_step({step});
     memcpy(state->x, x_next, sizeof x_next);
     state->tick += 1.0;
-    return {fault};
+    fault = outputs->{fault}[0];
+    if (!(fault >= 0.0 && fault < {not_initialized})) {{
+        return refuse(state, outputs, {fault_invalid});
+    }}
+    return (int)fault;
 }}
 """
 
@@ -143,12 +185,19 @@ class CController:
         step, initial = self._step, self._initial
         size = max(self.program.size, 1)
         given = {"x": "state->x", "t": "&state->tick", "x_next": "x_next"}
-        fault = f"(int) outputs->{_identifier('fault')}[0]"
+        network = self.program.network
+        checked = [
+            f"is_valid(inputs->{_identifier(name)}, {network.inputs[name].size})"
+            for name in self.program.initial_inputs
+            if not name.startswith(_UNKNOWN_AT_START)
+        ]
+        status = "status" in network.outputs
         return self._functions | {
             "controller.h": _HEADER.format(
                 title=self.title,
                 period=self.period,
                 drives=self.interface()["outputs"][0]["size"],
+                first=int(CFault.NOT_INITIALIZED),
                 size=size,
                 inputs=_members(self.interface()["inputs"]),
                 outputs=_members(self.interface()["outputs"]),
@@ -156,10 +205,15 @@ class CController:
             "controller.c": _SOURCE.format(
                 functions=_FUNCTIONS,
                 size=size,
-                unused="" if initial.n_in() > 1 else "(void)inputs;\n    ",
+                unused="" if checked else "(void)inputs;\n    ",
+                is_valid=" && ".join(checked) or "is_valid(&state->tick, 1)",
                 initial=", ".join(self._arguments(initial, given | {"x_start": "state->x"})),
                 step=", ".join(self._arguments(step, given)),
-                fault=fault,
+                fault=_identifier("fault"),
+                status=f"\n    outputs->{_identifier('status')}[0] = fault;" if status else "",
+                not_initialized=int(CFault.NOT_INITIALIZED),
+                start_invalid=int(CFault.START_INVALID),
+                fault_invalid=int(CFault.FAULT_INVALID),
             ),
             "interface.json": json.dumps(self.interface(), indent=2) + "\n",
         }
@@ -191,7 +245,8 @@ class CController:
         return {
             "inputs": inputs,
             "outputs": outputs,
-            "state_bytes": _DOUBLE * (1 + max(self.program.size, 1)),
+            "faults": {str(number): text for number, text in fault_sentences().items()},
+            "state_bytes": _DOUBLE * (2 + max(self.program.size, 1)),
             "sampling_time": self.period,
             "table_bytes": self.table_bytes,
             "scenario": self.scenario,

@@ -68,6 +68,11 @@ Generated C99: no allocation, nothing but the mathematical library, no memory bu
     fault = controller_step(&state, &inputs, &outputs);   /* every {period:g} s */
 
 A fault other than 0 holds until the next `controller_initialize`; the outputs then stop the robot.
+With faults above 100 there is no state to stop it from: drives get 0, and brakes have to hold it.
+
+| fault | cause |
+|---|---|
+{faults}
 
 | input | size | unit |
 |---|---|---|
@@ -122,6 +127,7 @@ def write_project(
             period=controller.period,
             inputs=_rows(said["inputs"]),
             outputs=_rows(said["outputs"]),
+            faults="\n".join(f"| {n} | {cause} |" for n, cause in said["faults"].items()),
             state=said["state_bytes"],
             tables=said["table_bytes"],
             origin=f"`{said['scenario']}`, SHA-256 `{said['hash']}`" if said["hash"] else "blocks",

@@ -10,7 +10,13 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, quaternion_to_matrix
+from pfsc_drake.geometry import (
+    Path,
+    PiecewisePolynomialCurve,
+    quaternion_to_matrix,
+    shape_report,
+)
+from pfsc_drake.geometry.paths.path_warnings import path_warnings
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -86,6 +92,7 @@ def add_path_following(
             lap=lap,
             length=path.length,
             projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+            warnings=path_warnings(path, shape_report(path), "path_from_waypoints: "),
         )
 
     follower = Follower(plant, tool, law, followed, chosen)

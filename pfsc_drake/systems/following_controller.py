@@ -180,6 +180,19 @@ class FollowingController(Diagram):
             builder.ExportOutput(motion.GetOutputPort("joint_jet"), "joint_jet")
         builder.BuildInto(self)
 
+    def suspects(self, context: Context) -> np.ndarray:
+        """Return which components of the joint state are implausible, nonzero if so, shape (4N,).
+
+        Args:
+            context: Own context.
+        """
+        found = [
+            self.GetSubsystemByName(name).GetOutputPort(port)
+            for name, port in (("supervision", "suspects"), ("safe_stop", "ignored"))
+        ]
+        values = [p.Eval(self.GetSubsystemContext(p.get_system(), context)) for p in found]
+        return np.maximum(*values)
+
 
 class ControllerAccess(FaultAccess):
     """What a diagram's controller is told, found and remembers, fused with other blocks or not.

@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.fault_description import FaultInstant, FaultScene, describe, first_instant
+from diagrams.fault_instant import first_instant
 from diagrams.scenario import (
     Circle,
     ForcePulse,
@@ -20,6 +20,7 @@ from diagrams.scenario import (
 from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe
 from pfsc_drake.geometry import matrix_to_zyx, zyx_to_matrix
 from pfsc_drake.geometry.rotation import matrix_to_zyz, zyz_to_matrix
 

@@ -76,6 +76,10 @@ class FaultParameters:
         require(good, "effort_share", self.effort_share, "above 0, at most 1")
 
 
+# at a sample, so that a region that comes near is found beside those that are
+_FEWEST_LOOKS = 2
+
+
 @dc.dataclass
 class FixtureOptions:
     """What limits a tool that is led through space.
@@ -86,7 +90,7 @@ class FixtureOptions:
         smoothing: Time constant [s] of each of the r - 1 lags that make the reference smooth
             enough for laws that give torques.
         looks: Most distances that are computed at a tick beside those of regions that are near;
-            0 for as many as are due.
+            0 for as many as are due, else 2 or more.
     """
 
     guidance: GuidanceParameters = dc.field(default_factory=GuidanceParameters)
@@ -96,7 +100,8 @@ class FixtureOptions:
 
     def __post_init__(self) -> None:
         require_between("smoothing", self.smoothing, 1e-3, 0.1, "s")
-        require_not_negative("looks", self.looks)
+        good = self.looks == 0 or self.looks >= _FEWEST_LOOKS
+        require(good, "looks", self.looks, f"0, or {_FEWEST_LOOKS} and more")
 
 
 @dc.dataclass

@@ -1,24 +1,21 @@
-"""Why a station stopped, and where: from what its log knows of that instant."""
+"""Sentences on faults: cause, place and joints, from the signals of that instant."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from pydrake.systems.framework import Context
 
-from diagrams.scenario.checks import coordinate_text, listed, posture_text
-from diagrams.signal_log import SignalLog
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import PlaceManifold, indices
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import euler_margin
+from pfsc_drake.robot.coordinate_text import coordinate_text, listed, posture_text
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture, singularity_name
-from pfsc_drake.systems.fuse import BlockAccess
 
 _STATE = ("q_J", "v_J", "q_M", "v_M")
 # m, from which on a distance from the path is worth a word where an arm becomes singular
@@ -29,7 +26,7 @@ _NEARLY = 0.1
 
 @dataclass(frozen=True)
 class FoundFault:
-    """Why a station stopped.
+    """Cause of a stop.
 
     Attributes:
         sentence: What, and where.
@@ -42,11 +39,11 @@ class FoundFault:
 
 @dataclass(frozen=True)
 class FaultInstant:
-    """What a station's log knows of one instant.
+    """Signals of one instant.
 
     Attributes:
         time: When [s].
-        signals: By name, each of shape (size,), see :class:`~diagrams.station.Station`.
+        signals: By name, each of shape (size,).
     """
 
     time: float
@@ -60,7 +57,7 @@ class FaultInstant:
 
 @dataclass(frozen=True)
 class FaultScene:
-    """Who was in a fault, and when.
+    """Robot, law and signals of a fault.
 
     Attributes:
         law: The law that moved the robot.
@@ -80,32 +77,6 @@ class FaultScene:
     now: FaultInstant
     before: FaultInstant | None
     suspects: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-
-def first_instant(
-    log: SignalLog, blocks: BlockAccess, root: Context, signal: str, column: int
-) -> tuple[FaultInstant, FaultInstant | None]:
-    """Return the first instant at which a logged fault was there, and the one before.
-
-    Args:
-        log: The log.
-        blocks: Blocks of the diagram.
-        root: Context of the diagram, in which the fault holds.
-        signal: Logged signal with the fault.
-        column: Column of the signal, where the fault is.
-    """
-    times, raw = log.read(root)
-    faults = np.flatnonzero(raw[signal][:, column])
-    k = int(faults[0]) if len(faults) else len(times)
-    instants = [
-        FaultInstant(float(times[i]), {name: x[i] for name, x in raw.items()})
-        for i in (k - 1, k)
-        if 0 <= i < len(times)
-    ]
-    if k == len(times):
-        # it is so new that it has not been logged
-        instants.append(FaultInstant(root.get_time(), log.now(blocks, root)))
-    return instants[-1], instants[0] if len(instants) > 1 else None
 
 
 def describe(fault: Fault, scene: FaultScene) -> str:
