@@ -97,7 +97,7 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
         ),
         Rule(
             "controller.max_beyond_end",
-            any(coordinate.ends for coordinate in followed.manifold.coordinates),
+            any(np.isfinite(c.ends).any() for c in followed.manifold.coordinates),
             "needs an open path",
         ),
         Rule("controller.model", False, "the plant of the call is the model"),

@@ -113,7 +113,8 @@ def follow(options, law="rigid", model="comau_racer_1_4_3r"):
 
 def follow_open(options):
     """Return the like along a path with ends."""
-    path = path_from_waypoints(WaypointTable(np.array(POINTS)), smoothness=6)
+    line = np.array([[0.9, y, 0.8] for y in np.linspace(-0.3, 0.3, 9)])
+    path = path_from_waypoints(WaypointTable(line), smoothness=6)
     place = plant_of("comau_racer_1_4_3r"), "tool_point", path, "rigid"
     return add_path_following(DiagramBuilder(), *place, options=options)
 
