@@ -51,7 +51,7 @@ from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import law_manifold
 from diagrams.tasks.streaming import StreamTask
-from diagrams.tasks.waiting import plan_waiting
+from diagrams.tasks.waiting import Approach, plan_waiting
 from diagrams.turntable_station import add_turntable
 from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.control.planning.course import CourseStart
@@ -145,7 +145,8 @@ def build_station(
     elif crossing is not None:
         given, allowed = scenario.compliance.is_given, "left out where progress waits"
         require(not given, "compliance", "given", allowed)
-        waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
+        approach = Approach(start_posture, scenario.start.transition)
+        waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction, approach)
         following = replace(following, waiting=waiting)
 
     true_state = part.joint_state(builder)

@@ -227,7 +227,7 @@ def _measure(
         progress(end, "measuring the tick")
         tick = measure_tick(station, result.root, log) * 1e6
     metrics = path_following_metrics(
-        log, settings.settling_tolerance, converged_after(settings), _MOVING
+        log, settings.settling_tolerance, converged_after(settings, log), _MOVING
     )
     metrics.update(press_metrics(log))
     metrics.update(guidance_metrics(log))
@@ -276,13 +276,20 @@ def _measure(
     return _Measured(log, motion, metrics, warnings, result.fault, broken, end, stop)
 
 
-def converged_after(settings: Scenario) -> float:
+def converged_after(settings: Scenario, log: RunLog) -> float:
     """Return the time from which deviations count [s]: until then the tool comes to the path.
+
+    Where it waits for obstacles its approach waits, too, by the time that is lost.
 
     Args:
         settings: Scenario of the run.
+        log: Its log.
     """
-    return max(settings.reference.dwell, settings.start.transition)
+    begin = max(settings.reference.dwell, settings.start.transition)
+    if "time_lost" not in log:
+        return begin
+    there = log.time[log.time - log["time_lost"].values[:, 0] >= begin]
+    return float(there[0]) if there.size else np.inf
 
 
 def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:

@@ -121,12 +121,12 @@ def broken_promises(metrics: Metrics, *, whole: bool) -> list[str]:
     Args:
         metrics: With their targets. One without a value has missed its target.
         whole: Whether the run lasted as long as its scenario, without a fault. Of others only
-            those promises count that hold at every instant.
+            those promises count that hold at every instant, and of which there is a value.
     """
     return [
         _phrase(name, metric)
         for name, metric in metrics.items()
-        if metric.passed is False and (whole or name in _ALWAYS)
+        if metric.passed is False and (whole or (name in _ALWAYS and not math.isnan(metric.value)))
     ]
 
 
