@@ -14,6 +14,7 @@ import numpy as np
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
 from pfsc_drake.codegen.c_faults import CFault, fault_sentences
+from pfsc_drake.codegen.manifest import MANIFEST, refuse_foreign, write_own
 from pfsc_drake.compiled.c_source import c_source, parameters
 from pfsc_drake.compiled.operations import Untranslatable
 from pfsc_drake.errors import InputError
@@ -215,13 +216,13 @@ class CController:
 
         Args:
             folder: Made if it does not exist.
+
+        Raises:
+            InputError: If the folder holds other files of these names, or cannot be written.
         """
-        folder.mkdir(parents=True, exist_ok=True)
-        written = []
-        for name, text in self.files().items():
-            (folder / name).write_text(text, encoding="utf-8")
-            written.append(folder / name)
-        return written
+        files = {name: text.encode("utf-8") for name, text in self.files().items()}
+        refuse_foreign(folder, (*files, MANIFEST))
+        return write_own(folder, files)
 
     def interface(self) -> dict[str, Any]:
         """Return what ``interface.json`` says."""
