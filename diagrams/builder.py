@@ -240,9 +240,9 @@ def build_station(
             initial_state,
         )
         signals |= further
-    faults = [controller.GetOutputPort("fault")]
-    faults += [signals["servo_fault"]] if "servo_fault" in signals else []
-    signals |= add_friction(builder, part, true_state, rubbing, faults)
+    stops = [] if remote else [signals["stop_category"]]
+    stops += [signals["servo_stop_category"]] if "servo_stop_category" in signals else []
+    signals |= add_friction(builder, part, true_state, rubbing, stops)
     known = joint_state if remote else true_state
     signals |= states_to_log(known, place.signals["joint_state"])
     if holder is not None and carrier is not None:

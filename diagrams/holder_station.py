@@ -200,7 +200,7 @@ def add_holder(
         builder.Connect(drive, links.drive_torque)
     ports = place.signals | {"drive": drive}
     add_drives(named, part, None, DriverParameters(), period, ports, state)
-    rubs = add_friction(named, part, true_state, rubbing, [controller.GetOutputPort("fault")])
+    rubs = add_friction(named, part, true_state, rubbing, [made["stop_category"]])
     motion = _add_motion(named, holder, following, order, controller, plan)
     pose = np.array(pose_function(part.robot)(q_J)).ravel()
     logged = place.signals | made | rubs | forces | {"frame_jet": motion}

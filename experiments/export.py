@@ -61,6 +61,7 @@ def export_scenario(
             presets=part.presets(station, root),
             scenario=prepared.settings.name,
             hash=scenario.fingerprint,
+            turning=tuple(station.robot.gather("is_revolute").tolist()),
         )
         progress(0.0, "recording a run")
         recorded = record(station, part, prepared.settings.simulation, duration)

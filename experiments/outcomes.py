@@ -42,7 +42,8 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
     if outcome.interrupted:
         status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
     if outcome.fault is not None:
-        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {time:.3f} s"]
+        stop = outcome.stop or f"ended at t = {time:.3f} s"
+        status, ends = FAULT, [f"fault: {outcome.fault}; {stop}"]
     if outcome.broken:
         status, ends = status or FAULT, [*ends, _missed(outcome.broken)]
     if outcome.problem is not None:
@@ -133,10 +134,10 @@ def print_export(console: Console, export: "Export", out: Path) -> None:
 def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
     """Tells what a controller in C made of its record; returns the exit status."""
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in ("Ticks", "differing", "median [us]", "p99 [us]", "worst [us]"):
+    for title in ("Ticks", "differing", "largest", "median [us]", "p99 [us]", "worst [us]"):
         table.add_column(title, justify="right")
     times = [f"{time:.2f}" for time in (replay.median, replay.p99, replay.worst)]
-    table.add_row(str(replay.ticks), str(replay.differing), *times)
+    table.add_row(str(replay.ticks), str(replay.differing), f"{replay.largest:.3g}", *times)
     console.print(table)
     if replay.differing:
         print_error(f"error: {out}: {replay.text.splitlines()[0]}")

@@ -92,6 +92,7 @@ class PathTask(Task):
             "oriented": self.path.orientation is not None,
             **followed_angles(said),
             "turning": self.path.frame.turns,
+            "length": None if self.path.closed else self.path.length,
         }
         self.place = PathManifold(self.relative_degree, **followed)
         self.manifold = self._law_manifold(self.relative_degree, **followed)

@@ -23,6 +23,11 @@ _FUNCTIONS = "controller_functions"
 _DOUBLE = 8  # bytes
 # what may be NaN before it is first measured, and stops the motion until then
 _UNKNOWN_AT_START = "obstacles"
+# of joints that turn, and that slide; the longer ones first
+_UNITS_OF_JOINTS = (
+    *(("rad, rad/s", "m, m/s"), ("rad/s", "m/s"), ("rad", "m")),
+    *(("Nm s/rad", "N s/m"), ("Nm", "N")),
+)
 _HEADER = """\
 /* {title}
 
@@ -140,6 +145,8 @@ class CController:
         presets: States that it begins with, by name; the others are what the inputs say.
         scenario: Name of what it was made from.
         hash: SHA-256 of that.
+        turning: Whether each joint turns, else it slides; ports name both units if it is empty, or
+            where some do.
     """
 
     program: Program
@@ -148,6 +155,7 @@ class CController:
     presets: Mapping[str, np.ndarray] = field(default_factory=dict)
     scenario: str = ""
     hash: str = ""
+    turning: tuple[bool, ...] = ()
 
     @classmethod
     def of(cls, network: Network, period: float, **about: Any) -> "CController":
@@ -228,11 +236,11 @@ class CController:
         """Return what ``interface.json`` says."""
         network = self.program.network
         inputs = [
-            {"name": name, "size": port.size, "unit": port.unit}
+            {"name": name, "size": port.size, "unit": self._unit(port.unit)}
             for name, port in network.inputs.items()
         ]
         outputs = [
-            {"name": name, "size": network.wires[wire], "unit": network.units[name]}
+            {"name": name, "size": network.wires[wire], "unit": self._unit(network.units[name])}
             for name, wire in network.outputs.items()
         ]
         return {
@@ -245,6 +253,14 @@ class CController:
             "scenario": self.scenario,
             "hash": self.hash,
         }
+
+    def _unit(self, unit: str) -> str:
+        """Return a port's unit as it is for joints that all turn, or all slide."""
+        if not self.turning or any(self.turning) != all(self.turning):
+            return unit
+        for turns, slides in _UNITS_OF_JOINTS:
+            unit = unit.replace(f"{turns} or {slides}", turns if all(self.turning) else slides)
+        return unit
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the states that are set before the start, and which: ``x`` and ``preset``."""

@@ -91,6 +91,7 @@ def describe(fault: Fault, scene: FaultScene) -> str:
         Fault.PROJECTION_FAILED: _projection_failed,
         Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD: _outside,
         Fault.SINGULAR: _singular,
+        Fault.BEYOND_END: _beyond_end,
         Fault.MEASUREMENT_IMPLAUSIBLE: _implausible,
         Fault.JOINT_LIMIT: _joint_limit,
         Fault.JOINT_SPEED: _joint_speed,
@@ -194,6 +195,13 @@ def _outside(scene: FaultScene) -> str:
         f"{Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD.explanation} {_place(scene)}: "
         f"xi = [{xi}] mm, alpha = {alpha:.3g}"
     )
+
+
+def _beyond_end(scene: FaultScene) -> str:
+    eta = scene.now.signals["manifold_point"][scene.place.layout.eta].item()
+    first, last = scene.place.coordinates[0].ends
+    end, beyond = ("start", first - eta) if eta < first else ("end", eta - last)
+    return f"{Fault.BEYOND_END.explanation} {_place(scene)}: {1e3 * beyond:.1f} mm beyond its {end}"
 
 
 def _singular(scene: FaultScene) -> str:

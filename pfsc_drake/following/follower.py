@@ -94,6 +94,8 @@ class Follower(Diagram):
         manifold_point (output): Where on the manifold the tool is.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).
+        stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`, shape
+            (1,): at 0 the robot's brakes are to be closed.
 
     Args:
         plant: The robot, finalized; as it is believed.
@@ -312,7 +314,7 @@ class Follower(Diagram):
             if name in made:
                 builder.ExportOutput(made[name], name)
         builder.ExportOutput(ports["manifold_point"], "manifold_point")
-        for name in ("manifold_state", "status", "fault"):
+        for name in ("manifold_state", "status", "fault", "stop_category"):
             builder.ExportOutput(controller.GetOutputPort(name), name)
 
     def _place(self, tool_pose: OutputPort) -> tuple[BlockSystem, OutputPort]:

@@ -69,8 +69,12 @@ def add_path_following(
 
     def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         oriented = path.orientation is not None
-        manifold = PathManifold(relative_degree, oriented=oriented, turning=path.frame.turns)
-
+        manifold = PathManifold(
+            relative_degree,
+            oriented=oriented,
+            turning=path.frame.turns,
+            length=None if path.closed else path.length,
+        )
         evaluator = path.evaluator(relative_degree)
         eta = float(along.derivatives(np.array([along.domain[0]]), 0)[0, 0, 0])
         point = evaluator.evaluate_at(path.arc_length.parameter(eta))

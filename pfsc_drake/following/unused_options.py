@@ -119,7 +119,12 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
                 "faults.effort_share",
             )
         ),
-        Rule("faults.brakes", False, "brakes belong to the plant"),
+        Rule("faults.brakes.torque", False, "it is the plant's"),
+        Rule(
+            "controller.max_beyond_end",
+            bool(np.isfinite([c.ends for c in followed.manifold.coordinates]).any()),
+            "needs a path with ends",
+        ),
     ]
 
 

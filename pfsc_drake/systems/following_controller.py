@@ -77,6 +77,7 @@ class FollowingController(Diagram):
         manifold_state, virtual_input, reference_velocity (output): See :class:`SampledLaw`.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`Fault`, shape (1,).
+        stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`.
         law (output): All of these, laid out by the law's ``layout``.
         joint_jet (output): Of a robot that carries something, see :class:`JointJet`.
 
@@ -170,6 +171,7 @@ class FollowingController(Diagram):
                 builder.ExportOutput(sampled.GetOutputPort(name), name)
         builder.ExportOutput(report.GetOutputPort("status"), "status")
         builder.ExportOutput(fault, "fault")
+        builder.ExportOutput(stop.GetOutputPort("stop_category"), "stop_category")
         builder.ExportOutput(report.GetOutputPort("law"), "law")
         if carries:
             motion = add("joint_jet", JointJet(law.linearization, law.layout))

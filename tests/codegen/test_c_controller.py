@@ -61,6 +61,23 @@ def test_the_interface_says_what_there_is(controller, tmp_path):
     assert said["scenario"] == "damper"
 
 
+@pytest.mark.parametrize(
+    ("turning", "joints", "drives"),
+    [
+        ((True, True), "rad, rad/s", "Nm"),
+        ((False, False), "m, m/s", "N"),
+        ((True, False), "rad, rad/s or m, m/s", "Nm or N"),
+        ((), "rad, rad/s or m, m/s", "Nm or N"),
+    ],
+)
+def test_units_are_those_of_the_joints(turning, joints, drives):
+    block = Damper()
+    block.inputs = block.inputs | {"joint_state": Port(4, "rad, rad/s or m, m/s")}
+    block.outputs = block.outputs | {"drive_torque": Port(2, "Nm or N")}
+    said = CController.of(Network.of(block), 1e-3, turning=turning).interface()
+    assert (said["inputs"][0]["unit"], said["outputs"][0]["unit"]) == (joints, drives)
+
+
 @needs_gcc
 def test_c_is_python_to_the_last_bit(controller, tmp_path):
     controller.write(tmp_path)

@@ -97,6 +97,25 @@ def test_coordinates_to_blame(six_axes):
     assert "q_" not in sentence
 
 
+def test_beyond_an_end(six_axes):
+    """A push along the path, which the law alone resists, takes the tool over its start."""
+    six_axes.reference.points, six_axes.controller.max_beyond_end = [0.004, 0.1], 2e-3
+    six_axes.forces = [
+        ForcePulse(begin=0.0, end=1.0, ramp=0.01, frame="manifold", force=[-2e3, 0.0, 0.0])
+    ]
+    station, root = run(six_axes, 0.2)
+    assert station.controller.fault(station.blocks, root) is Fault.BEYOND_END
+    found = re.fullmatch(
+        r"the tool went beyond an end of the path at eta = (.*) m, t = 0\.\d+ s: "
+        r"(.*) mm beyond its start",
+        station.fault(root),
+    )
+    assert found is not None
+    eta, beyond = map(float, found.groups())
+    assert 2.0 < beyond < 3.0
+    assert -3e-3 < eta < 0.0
+
+
 def test_out_of_the_neighbourhood(load_scenario):
     """A ring, and a force through its middle."""
     settings = load_scenario("pfc_elastic_3r")

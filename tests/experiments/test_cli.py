@@ -31,6 +31,7 @@ class Outcome:
     problem: str | None = None
     margins: str | None = None
     broken: list[str] = field(default_factory=list)
+    stop: str = ""
 
 
 class FakeRun:
@@ -117,7 +118,10 @@ def test_fault(fake_run, scenario, tmp_path, capsys):
     fake_run.outcome.fault = "left the feasible\nneighbourhood"
     assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 3
     line = error_line(capsys)
-    assert line.startswith("fault: left the feasible neighbourhood; stopped at t = 1.000 s,")
+    assert line.startswith("fault: left the feasible neighbourhood; ended at t = 1.000 s,")
+    fake_run.outcome.stop = "still moving at t = 1.000 s, joint 2 at 0.3 rad/s"
+    assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 3
+    assert "; still moving at t = 1.000 s, joint 2 at 0.3 rad/s, " in error_line(capsys)
     assert f"kept in {tmp_path / 'out'}" in line
 
 
@@ -249,7 +253,7 @@ def test_quietly_errors_too(fake_run, scenario, capsys):
     assert main(["run", str(scenario), "--quiet"]) == 3
     captured = capsys.readouterr()
     assert captured.out == "Open the report: somewhere/report.html\n"
-    assert captured.err.startswith("fault: singular; stopped at t = ")
+    assert captured.err.startswith("fault: singular; ended at t = ")
     assert main(["run", "none.yaml", "--quiet"]) == 2
     assert error_line(capsys).startswith("error: scenario file none.yaml: no such file")
 

@@ -16,12 +16,12 @@ from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 @dc.dataclass
 class BrakeParameters:
-    """Holding brakes on the motors, which close after a fault.
+    """Holding brakes on the motors, which close at stop category 0.
 
     Attributes:
         torque: Holding torque [Nm, joint side; or N], one for all or of every joint; empty for
             the drive's limit.
-        delay: From the fault until they hold [s].
+        delay: From the request until they hold [s].
     """
 
     torque: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
@@ -51,7 +51,9 @@ class FaultParameters:
             forgotten with 0.2 s; 0 for any number.
         hold_bandwidth: Hold bandwidth of the position hold after a fault [rad/s].
         effort_share: Part of the drives' limits that braking is planned with, up to 1.
-        brakes: Holding brakes; none without the block or with ``brakes: null``.
+        brakes: Holding brakes, which are requested after a stop, and earlier where nothing is
+            measured of a joint (``stop_category``); ``null`` for a robot without, whose drives
+            hold it.
     """
 
     plausibility: float = 2e-3
@@ -61,7 +63,7 @@ class FaultParameters:
     chatter_turns: float = 6.0
     hold_bandwidth: float = 60.0
     effort_share: float = 0.7
-    brakes: BrakeParameters | None = None
+    brakes: BrakeParameters | None = dc.field(default_factory=BrakeParameters)
 
     def __post_init__(self) -> None:
         require_not_negative("plausibility", self.plausibility)
