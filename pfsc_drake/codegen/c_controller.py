@@ -14,19 +14,20 @@ import numpy as np
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
 from pfsc_drake.codegen.c_faults import CFault, fault_sentences
+from pfsc_drake.codegen.manifest import MANIFEST, refuse_foreign, write_own
 from pfsc_drake.compiled.c_source import c_source, parameters
 from pfsc_drake.compiled.operations import Untranslatable
 from pfsc_drake.errors import InputError
 
 _FUNCTIONS = "controller_functions"
 _DOUBLE = 8  # bytes
+# what may be NaN before it is first measured, and stops the motion until then
+_UNKNOWN_AT_START = "obstacles"
 # of joints that turn, and that slide; the longer ones first
 _UNITS_OF_JOINTS = (
     *(("rad, rad/s", "m, m/s"), ("rad/s", "m/s"), ("rad", "m")),
     *(("Nm s/rad", "N s/m"), ("Nm", "N")),
 )
-# what may be NaN before it is first measured, and stops the motion until then
-_UNKNOWN_AT_START = "obstacles"
 _HEADER = """\
 /* {title}
 
@@ -223,13 +224,13 @@ class CController:
 
         Args:
             folder: Made if it does not exist.
+
+        Raises:
+            InputError: If the folder holds other files of these names, or cannot be written.
         """
-        folder.mkdir(parents=True, exist_ok=True)
-        written = []
-        for name, text in self.files().items():
-            (folder / name).write_text(text, encoding="utf-8")
-            written.append(folder / name)
-        return written
+        files = {name: text.encode("utf-8") for name, text in self.files().items()}
+        refuse_foreign(folder, (*files, MANIFEST))
+        return write_own(folder, files)
 
     def interface(self) -> dict[str, Any]:
         """Return what ``interface.json`` says."""

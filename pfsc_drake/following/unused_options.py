@@ -95,11 +95,6 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
             chosen.manifold == followed.manifold.name,
             f"the call follows a {followed.manifold.name}",
         ),
-        Rule(
-            "controller.max_beyond_end",
-            any(np.isfinite(c.ends).any() for c in followed.manifold.coordinates),
-            "needs an open path",
-        ),
         Rule("controller.model", False, "the plant of the call is the model"),
         *(
             Rule(f"controller.{key}", False, "the link side is measured, see the option measures")
@@ -124,7 +119,12 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
                 "faults.effort_share",
             )
         ),
-        Rule("faults.brakes.torque", False, "the brakes belong to the robot"),
+        Rule("faults.brakes.torque", False, "it is the plant's"),
+        Rule(
+            "controller.max_beyond_end",
+            bool(np.isfinite([c.ends for c in followed.manifold.coordinates]).any()),
+            "needs a path with ends",
+        ),
     ]
 
 

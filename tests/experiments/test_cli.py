@@ -8,7 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+import typer
 
+import identification.cli
+from experiments import cli
 from experiments.cli import main
 from experiments.scenario_file import CatalogEntry
 from pfsc_drake import InputError
@@ -207,6 +210,28 @@ def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, argume
     assert line.startswith("error: ")
     assert message in line
     assert fake_run.calls == []
+
+
+def _with_out(group, words=()):
+    """Yield the words of all commands that have an option --out."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _with_out(command, (*words, name))
+        elif any("--out" in parameter.opts for parameter in command.params):
+            assert all(p.opts == ["--out"] for p in command.params if "--out" in p.opts)
+            yield (*words, name)
+
+
+@pytest.mark.parametrize("program", [main, identification.cli.main])
+def test_a_folder_without_a_name_is_refused_by_every_command(program, capsys):
+    app = {main: cli.app, identification.cli.main: identification.cli.app}[program]
+    commands = list(_with_out(typer.main.get_command(app)))
+    assert len(commands) > 4
+    for words in commands:
+        for out in (("--out", ""), ("--out=",)):
+            assert program([*words, *out]) == 2
+            error = "error: --out '': no name of a folder; allowed: a folder, '.' for this one\n"
+            assert capsys.readouterr().err == error
 
 
 def test_a_file_with_nearly_that_name(scenario, capsys):

@@ -73,6 +73,7 @@ OTHERS = {
     "controller.posture.elbow_joints": [1, 3, 5],
     "controller.posture.yields": "known",
     "faults.saturation_time": 0.3,
+    "faults.brakes": None,
     "friction": (np.full(3, 2.0), np.full(3, 5.0)),
     "posture": np.array([0.2, 0.3, 0.4]),
     "compliance.source": "observed",
@@ -113,8 +114,9 @@ def follow(options, law="rigid", model="comau_racer_1_4_3r"):
 
 def follow_open(options):
     """Return the like along a path with ends."""
-    line = np.array([[0.9, y, 0.8] for y in np.linspace(-0.3, 0.3, 9)])
-    path = path_from_waypoints(WaypointTable(line), smoothness=6)
+    y = np.linspace(-0.2, 0.2, 8)
+    points = np.stack([0.9 + 0.2 * y**2, y, 0.8 + 0.0 * y], axis=-1)
+    path = path_from_waypoints(WaypointTable(points), smoothness=3)
     place = plant_of("comau_racer_1_4_3r"), "tool_point", path, "rigid"
     return add_path_following(DiagramBuilder(), *place, options=options)
 
@@ -259,7 +261,6 @@ CONDITIONAL = [
     (follow, FollowerOptions(compliance=SENSED), "compliance.limits", None),
     (follow, MODEL, "controller.friction", ["smoothing", "velocity"]),
     (follow, MODEL, "", ["friction"]),
-    (follow_open, FollowerOptions(), "controller", ["max_beyond_end"]),
     (follow, OBSERVER, "controller.friction", ["rate"]),
     (follow, KALMAN, "controller.friction", ["smoothing", "velocity"]),
     (follow, KALMAN, "controller.friction.kalman", None),
@@ -267,6 +268,8 @@ CONDITIONAL = [
     (redundant, FollowerOptions(), "controller.posture", ["reference_deg", "joint_weights"]),
     (redundant, FollowerOptions(), "controller.posture", ["stiffness", "filter_rate", "yields"]),
     (elastic, FollowerOptions(), "", ["bandwidth"]),
+    (follow_open, FollowerOptions(), "controller", ["max_beyond_end"]),
+    (follow, FollowerOptions(), "faults", ["brakes"]),
     (composite, DAMPED, "controller", ["boundary_layer_damping"]),
     (guide, BASES["space"][1], "fixtures.limits", None),
     (guide, BASES["space"][1], "fixtures.guidance", ["approach_time", "braking", "largest_speed"]),
@@ -330,8 +333,8 @@ def test_resolved_poles_keep_the_bandwidth_that_chose_them():
         ),
         (
             follow,
-            FollowerOptions(faults=FaultParameters(brakes=BrakeParameters([5.0]))),
-            "faults.brakes.torque",
+            FollowerOptions(faults=FaultParameters(brakes=BrakeParameters(torque=[50.0]))),
+            r"faults.brakes.torque = \[50.0\]: has no effect; it is the plant's",
         ),
         (guide, GuidanceOptions(override=True), "override = True: has no effect; needs a path"),
         (
