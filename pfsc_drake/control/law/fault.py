@@ -30,6 +30,7 @@ class Fault(enum.IntEnum):
     DRIVE_CHATTERS = 14
     PRESS_FORCE_LOST = 15
     STOP_REQUESTED = 16
+    FORCE_SENSOR_JUMPED = 18
 
     @property
     def explanation(self) -> str:
@@ -55,6 +56,7 @@ _EXPLANATIONS = {
     Fault.DRIVE_CHATTERS: "a drive jumps between its limits",
     Fault.PRESS_FORCE_LOST: "the force on the workpiece is far from its reference",
     Fault.STOP_REQUESTED: "a stop was asked for",
+    Fault.FORCE_SENSOR_JUMPED: "the force/torque sensor has jumped as no force does",
 }
 
 
