@@ -180,22 +180,29 @@ def test_brakes_stop_servos_that_have_lost_a_joint(seven):
     assert log["servo_stop_category"][-1] == 0.0
 
 
-@pytest.mark.parametrize("kind", ["nan", "jump"])
-def test_a_force_sensor(six_axes, kind):
+@pytest.mark.parametrize(
+    ("kind", "size", "time", "expected"),
+    [
+        ("nan", 0.0, 0.45, "is lost"),
+        ("jump", 1e4, 0.45, "is at the end of its range"),
+        ("jump", -100.0, 0.452, "has jumped as no force does"),
+    ],
+)
+def test_a_force_sensor(six_axes, kind, size, time, expected):
     failure = six_axes.simulation.force_sensor_failure
     six_axes.forces = [ForcePulse(begin=0.2, end=9.0, ramp=0.05, frame="world", force=[0, 20, 0])]
-    failure.time, failure.kind, failure.size = 0.45, kind, 1e4
+    failure.time, failure.kind, failure.size = 0.45, kind, size
     station, result, times, log = go_on(six_axes, 1.0)
-    expected = "is lost" if kind == "nan" else "is at the end of its range"
     assert result.fault.startswith(f"the force/torque sensor {expected} at eta = ")
-    assert result.fault_time == pytest.approx(0.45)
+    assert result.fault_time == pytest.approx(time)
     check_rest(station, result, times, log)
 
 
-@pytest.mark.parametrize("whole", [False, True])
-def test_a_force_sensor_that_stands_still(six_axes, whole):
+@pytest.mark.parametrize(("whole", "noisy"), [(False, True), (True, True), (True, False)])
+def test_a_force_sensor_that_stands_still(six_axes, whole, noisy):
     failure = six_axes.simulation.force_sensor_failure
     failure.whole_joint = whole
+    six_axes.sensor.noise = six_axes.sensor.noise * noisy
     six_axes.forces = [ForcePulse(begin=0.2, end=9.0, ramp=0.05, frame="world", force=[0, 20, 0])]
     failure.time, failure.kind, failure.component = 0.45, "frozen", 1
     station, result, times, log = go_on(six_axes, 1.0)

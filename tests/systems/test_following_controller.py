@@ -190,6 +190,7 @@ def test_a_fault_without_measurement_bears_the_weight(bench, arm):
         ([0, 1, 0, 0], Fault.NONE),
         ([SensorFault.LOST, 0, 0, 0], Fault.FORCE_SENSOR_LOST),
         ([SensorFault.SATURATED, 1, 0, 0], Fault.FORCE_SENSOR_SATURATED),
+        ([SensorFault.JUMPED, 1, 0, 0], Fault.FORCE_SENSOR_JUMPED),
         ([SensorFault.SATURATED, 0, 0, 0], Fault.NONE),
         ([0, 1, ImpedanceStatus.FORCE_NOT_FINITE, 0], Fault.COMPLIANCE_INVALID),
         ([0, 1, 0, 1], Fault.PRESS_FORCE_LOST),

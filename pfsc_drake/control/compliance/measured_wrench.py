@@ -110,7 +110,12 @@ def memory_size(size: int) -> int:
 
 
 def stands_still(
-    measured: ca.SX, memory: ca.SX, at_range: ca.SX, samples: int, noisy: np.ndarray
+    measured: ca.SX,
+    memory: ca.SX,
+    at_range: ca.SX,
+    samples: int,
+    noisy: np.ndarray,
+    robot_moves: ca.SX,
 ) -> tuple[ca.SX, ca.SX]:
     """Return whether components of a sensor stand still that should not.
 
@@ -119,7 +124,8 @@ def stands_still(
     some. One is enough if at least three others changed within the last three samples; there only
     components count that changed at each of as many samples in a row before. What is constant
     anyway, as without noise, never did; and a sensor at rest with coarse steps repeats its values,
-    too, but in all components.
+    too, but in all components. All of those that count, if they are more than three, must not do so
+    while the robot moves, whatever their noise.
 
     Args:
         measured: The measurement, shape (n,).
@@ -128,6 +134,7 @@ def stands_still(
         at_range: Whether each is at the end of its range, where it stays, shape (n,).
         samples: Number of samples.
         noisy: Whether each is believed to have noise larger than its steps, shape (n,).
+        robot_moves: Whether the robot moves.
 
     Returns:
         0 or 1, and the next memory.
@@ -142,7 +149,9 @@ def stands_still(
     still = ca.logic_and(counts, stayed >= samples)
     one = ca.logic_and(ca.sum1(still) > 0, ca.sum1(moving) >= _OTHERS)
     most = ca.dot(stayed >= samples, ca.DM(np.asarray(noisy, dtype=float))) > _OTHERS
-    return ca.logic_or(one, most), ca.vertcat(measured, stayed, changed)
+    number = ca.sum1(still)
+    every = all_of(number > _OTHERS, number == ca.sum1(counts), robot_moves)
+    return ca.logic_or(ca.logic_or(one, most), every), ca.vertcat(measured, stayed, changed)
 
 
 class SensorFault(IntEnum):
@@ -151,6 +160,7 @@ class SensorFault(IntEnum):
     NONE = 0
     LOST = 1  # no finite number, or a component that stands still
     SATURATED = 2
+    JUMPED = 3  # by a step that no force makes
 
 
 class MeasuredWrench(Block):

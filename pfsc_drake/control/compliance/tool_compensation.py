@@ -7,8 +7,9 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, where
+from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, latched, where
 from pfsc_drake.compiled.content import once_per_content
+from pfsc_drake.control.compliance.jump_watch import JumpWatch
 from pfsc_drake.control.compliance.measured_wrench import (
     STILL_TIME,
     TARING_BLOCK,
@@ -26,6 +27,8 @@ from pfsc_drake.robot.tool_load import ToolLoad, dead_band, predicted_load
 from pfsc_drake.yaml.typed import equal
 
 _INERTIA = ("none", "differentiated", "given")
+# rad/s or m/s, of a joint, with which no load on a sensor stays the same
+_MOVING = 1e-2
 
 
 @dataclass
@@ -46,6 +49,9 @@ class ToolCompensationParameters:
         torque_dead_band: [Nm].
         noise: Standard deviation of a sample as it is believed, shape (6,) [N, Nm]: a sensor that
             has some and repeats itself to the last bit is lost. 0 where steps are larger.
+        jump: Steps within one sample that are judged, shape (6,) [N, Nm]: a larger one that stays
+            is a fault of the sensor, see
+            :class:`~pfsc_drake.control.compliance.jump_watch.JumpWatch`. ``.inf`` for none.
     """
 
     inertia: str = "differentiated"
@@ -60,6 +66,9 @@ class ToolCompensationParameters:
     force_dead_band: float = 0.0
     torque_dead_band: float = 0.0
     noise: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=equal(6, parts=2))
+    jump: np.ndarray = field(
+        default_factory=lambda: np.repeat([25.0, 1.0], 3), metadata=equal(6, parts=2)
+    )
 
     def __post_init__(self) -> None:
         if self.inertia not in _INERTIA:
@@ -68,7 +77,7 @@ class ToolCompensationParameters:
             _require_sign(key, getattr(self, key), zero_allowed=False)
         for key in ("force_dead_band", "torque_dead_band"):
             _require_sign(key, getattr(self, key), zero_allowed=True)
-        for key in ("taring_spread", "taring_bias"):
+        for key in ("taring_spread", "taring_bias", "jump"):
             value = np.asarray(getattr(self, key), dtype=float)
             if value.shape != (6,) or not np.all(value > 0.0):
                 raise InputError(f"{key} = {value.tolist()}: must be 6 positive numbers")
@@ -162,8 +171,9 @@ class ToolCompensation(Block):
     The joints' motion goes through the same filter as the sensor's signal, so that load
     and measurement are of the same age.
 
-    A measurement or joint state that is not finite, or a component of the measurement that
-    stands still while others move (see :func:`stands_still`), makes the output zero, and a fault
+    A measurement or joint state that is not finite, components of the measurement that stand
+    still while others or the robot move (see :func:`stands_still`), and, once it is tared, a
+    reading that jumps (see :class:`JumpWatch`) make the output zero, and a fault
     that only a new initialization clears. A saturated sensor is reported while it lasts; its
     output is the clipped one.
 
@@ -179,10 +189,11 @@ class ToolCompensation(Block):
             [N, Nm].
 
     State:
-        The ``bias``, shape (6,); whether it is ``tared``; the ``fault`` that stays, LOST or none;
+        The ``bias``, shape (6,); whether it is ``tared``; the ``fault`` that stays, LOST, JUMPED
+        or none;
         the stretch of taring (``taring_..``); the ``filter`` of the joints' motion, shape (2N,) or
-        (3N,), which rests on the first motion as long as it is not ``known``; and what is
-        ``watched`` of the measurement, shape (18,).
+        (3N,), which rests on the first motion as long as it is not ``known``; what is ``watched``
+        of the measurement, and the ``last`` three r, each of shape (18,).
 
     Args:
         robot: The robot with the tool.
@@ -219,6 +230,7 @@ class ToolCompensation(Block):
         )
         self._still_samples = max(10, round(STILL_TIME / period))
         self._is_noisy = np.asarray(parameters.noise) > 0.0
+        self._jumps = JumpWatch(parameters.jump, parameters.noise, parameters.bandwidth, period)
         self._range = ca.DM(np.asarray(measurement_range, dtype=float))
         self._measured_motion = 2 * n
         self.inputs = {"measured_wrench": Port(6, "N, Nm"), "joint_state": Port(4 * n)}
@@ -230,7 +242,11 @@ class ToolCompensation(Block):
             "fault": Port(1),
             "residual": Port(6, "N, Nm"),
         }
-        remembered = {"filter": self._function.numel_in("state"), "watched": memory_size(6)}
+        remembered = {
+            "filter": self._function.numel_in("state"),
+            "watched": memory_size(6),
+            "last": JumpWatch.size,
+        }
         self.inner = {f"next_{name}": size for name, size in remembered.items()}
         self.states = {"bias": 6, "tared": 1, "fault": 1, "known": 1} | remembered
         self.states |= Taring.states
@@ -241,41 +257,52 @@ class ToolCompensation(Block):
         if "joint_acceleration" in self.inputs:
             motion = ca.vertcat(motion, u.joint_acceleration)
         at_range = ca.fabs(measured) >= self._range
+        speeds = u.joint_state[self._measured_motion // 2 : self._measured_motion]
+        moves = any_of(ca.fabs(speeds) > _MOVING)
         still, watched = stands_still(
-            measured, x.watched, at_range, self._still_samples, self._is_noisy
+            measured, x.watched, at_range, self._still_samples, self._is_noisy, moves
         )
         wrench, residual, filtered = self._function(motion, x.filter, x.known, measured, x.bias)
-        good = all_of(
-            all_finite(wrench, residual, filtered), x.fault != SensorFault.LOST, ca.logic_not(still)
+        jumped, last = self._jumps.step(residual, x.last, at_range)
+        lost = ca.logic_or(ca.logic_not(all_finite(wrench, residual, filtered)), still)
+        found = first_of(
+            (lost, SensorFault.LOST),
+            (all_of(jumped, x.tared), SensorFault.JUMPED),
+            otherwise=SensorFault.NONE,
         )
+        broken = latched(x.fault, found)
+        good = ca.logic_not(broken)
         return {
             "wrench": where(all_of(good, x.tared), wrench, 0.0),
             "tared": x.tared,
             "fault": first_of(
-                (ca.logic_not(good), SensorFault.LOST),
+                (broken, broken),
                 (any_of(at_range), SensorFault.SATURATED),
                 otherwise=SensorFault.NONE,
             ),
             "residual": where(good, residual, 0.0),
             "next_filter": where(good, filtered, x.filter),
             "next_watched": where(good, watched, x.watched),
+            "next_last": where(good, last, x.last),
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
-        lost = y.fault == SensorFault.LOST
+        is_quiet = y.fault == SensorFault.NONE
+        broken = all_of(ca.logic_not(is_quiet), y.fault != SensorFault.SATURATED)
         stretch = self._taring.extended(x, y.residual)
         bias, is_long, is_believed = self._taring.bias(stretch)
-        is_quiet, tares = y.fault == SensorFault.NONE, ca.logic_not(ca.logic_or(lost, x.tared))
+        tares = ca.logic_not(ca.logic_or(broken, x.tared))
         found = all_of(tares, is_quiet, is_long, is_believed)
         goes_on = ca.logic_and(is_quiet, ca.logic_not(is_long))
         return {
             "bias": where(found, bias, x.bias),
             "tared": ca.logic_or(x.tared, found),
-            "fault": where(lost, SensorFault.LOST, x.fault),
-            "known": ca.logic_or(x.known, ca.logic_not(lost)),
+            "fault": where(broken, y.fault, x.fault),
+            "known": ca.logic_or(x.known, ca.logic_not(broken)),
             "filter": y.next_filter,
             "watched": y.next_watched,
+            "last": y.next_last,
         } | {
             name: where(tares, where(goes_on, getattr(stretch, name), 0.0), getattr(x, name))
             for name in Taring.states
@@ -318,6 +345,7 @@ class Alarms(Block):
                 ca.logic_and(sensor == SensorFault.SATURATED, tared),
                 Fault.FORCE_SENSOR_SATURATED,
             ),
+            (sensor == SensorFault.JUMPED, Fault.FORCE_SENSOR_JUMPED),
             (compliance, Fault.COMPLIANCE_INVALID),
             (press_lost, Fault.PRESS_FORCE_LOST),
             otherwise=asked,

@@ -31,6 +31,7 @@ class Fault(enum.IntEnum):
     PRESS_FORCE_LOST = 15
     STOP_REQUESTED = 16
     BEYOND_END = 17
+    FORCE_SENSOR_JUMPED = 18
 
     @property
     def explanation(self) -> str:
@@ -57,6 +58,7 @@ _EXPLANATIONS = {
     Fault.PRESS_FORCE_LOST: "the force on the workpiece is far from its reference",
     Fault.STOP_REQUESTED: "a stop was asked for",
     Fault.BEYOND_END: "the tool went beyond an end of the path",
+    Fault.FORCE_SENSOR_JUMPED: "the force/torque sensor has jumped as no force does",
 }
 
 

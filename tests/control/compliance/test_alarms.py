@@ -14,6 +14,7 @@ from pfsc_drake.control.law.fault import Fault
         ([SensorFault.NONE, 0, 0, 0], Fault.NONE),
         ([SensorFault.LOST, 0, 3, 1], Fault.FORCE_SENSOR_LOST),
         ([SensorFault.SATURATED, 1, 3, 1], Fault.FORCE_SENSOR_SATURATED),
+        ([SensorFault.JUMPED, 1, 3, 1], Fault.FORCE_SENSOR_JUMPED),
         # before it is tared its range does not matter
         ([SensorFault.SATURATED, 0, 0, 0], Fault.NONE),
         ([SensorFault.NONE, 1, 3, 1], Fault.COMPLIANCE_INVALID),

@@ -128,11 +128,11 @@ def test_the_first_motion_is_where_the_filter_rests(arm):
 
 def test_a_sensor_that_fails_gives_zero_and_a_fault_until_it_is_tared_again(arm):
     readings = np.zeros((51, 6))
-    readings[:, 2] = np.where(np.arange(51) > 20, 16.0, -14.0)
+    readings[:, 2] = np.where(np.arange(51) > 20, 9.0, -14.0)
     readings[30, 5] = np.nan
     block = stepper(arm)
     found = watch(block, readings)
-    assert np.linalg.norm(found["wrench"][25, :3]) == pytest.approx(30.0)
+    assert np.linalg.norm(found["wrench"][25, :3]) == pytest.approx(23.0)
     assert np.all(found["fault"][30:] == SensorFault.LOST)
     assert not found["wrench"][30:].any() and not found["residual"][30:].any()
     assert all(np.isfinite(value).all() for value in found.values())
@@ -233,6 +233,37 @@ def test_a_sensor_with_noise_that_stands_still_as_a_whole_is_lost(arm):
     assert not faults(arm, np.round(readings / (3.0 * noise)) * 3.0 * noise, noise).any()
 
 
+def test_a_sensor_without_noise_that_stands_still_while_the_robot_moves_is_lost(arm):
+    """At rest it may: nothing else changes either."""
+    readings = np.random.default_rng(5).normal(0.0, 0.1, (200, 6))
+    readings[120:] = readings[119]
+    states = np.tile(RESTING, (200, 1))
+    assert not watch(stepper(arm), readings, states)["fault"].any()
+    states[:, 8] = 0.02  # of the joint that turns the hand
+    found = watch(stepper(arm), readings, states)["fault"].ravel()
+    assert np.flatnonzero(found)[0] == 119 + STILL
+    assert set(found[119 + STILL :]) == {SensorFault.LOST}
+    states[:, 8] = 0.005
+    assert not watch(stepper(arm), readings, states)["fault"].any()
+
+
+@pytest.mark.parametrize(
+    ("component", "size", "judged"),
+    [(0, 27.0, True), (1, -27.0, True), (2, 23.0, False), (3, 1.1, True), (5, -0.9, False)],
+)
+def test_a_reading_that_jumps_is_a_fault_once_it_is_tared(arm, component, size, judged):
+    readings = np.random.default_rng(component).normal(BIAS, [0.05] * 3 + [0.002] * 3, (60, 6))
+    readings[40:, component] += size
+    noise = np.repeat([0.05, 0.002], 3)
+    found = watch(stepper(arm, noise=noise), readings)
+    expected = np.where(judged & (np.arange(60) >= 42), SensorFault.JUMPED, SensorFault.NONE)
+    np.testing.assert_array_equal(found["fault"].ravel(), expected)
+    assert found["wrench"][50].any() != judged
+    assert not watch(stepper(arm, noise=noise, jump=np.full(6, np.inf)), readings)["fault"].any()
+    # while it is being tared, that begins anew
+    assert not watch(stepper(arm, noise=noise, taring_time=0.05), readings)["fault"].any()
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [
@@ -243,6 +274,7 @@ def test_a_sensor_with_noise_that_stands_still_as_a_whole_is_lost(arm):
         ("torque_dead_band", np.inf),
         ("taring_spread", np.ones(3)),
         ("taring_bias", np.zeros(6)),
+        ("jump", np.zeros(6)),
         ("noise", np.full(6, -0.1)),
         ("noise", np.array([0.1, 0.1, 0.1, 0.0, 0.0, np.inf])),
     ],
