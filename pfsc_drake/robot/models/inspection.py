@@ -7,6 +7,7 @@ and lets the rest through. Here each is refused in one line that names file, lin
 from dataclasses import dataclass, field
 
 from pfsc_drake.robot.models.joint_edits import Mimic, mimics_of
+from pfsc_drake.robot.models.mjcf_drives import MjcfDrive, mjcf_drives
 from pfsc_drake.robot.models.model_parts import (
     DRIVE_NUMBERS,
     MOMENTS,
@@ -26,7 +27,8 @@ class ModelFacts:
     Attributes:
         without_inertia: Where each link without ``<inertial>`` stands, by its name.
         assumed_inertia: Links for whose moments of inertia SDF takes 1 kg m^2.
-        effort_limits: Effort limits of URDF joints, by name [Nm or N].
+        effort_limits: Effort limits of joints of URDF and MJCF, by name [Nm or N].
+        drives: Drives of MJCF joints, by name.
         friction: Joints with dry friction.
         springs: Stiffness of the sprung joints of the model itself, by name.
         mimics: Joints that follow others, by name.
@@ -36,6 +38,7 @@ class ModelFacts:
     without_inertia: dict[str, str] = field(default_factory=dict)
     assumed_inertia: list[str] = field(default_factory=list)
     effort_limits: dict[str, float] = field(default_factory=dict)
+    drives: dict[str, MjcfDrive] = field(default_factory=dict)
     friction: list[str] = field(default_factory=list)
     springs: dict[str, float] = field(default_factory=dict)
     mimics: dict[str, Mimic] = field(default_factory=dict)
@@ -59,6 +62,9 @@ def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -
         if inspect is not None:
             inspect(model, facts, fixed)
             facts.mimics |= mimics_of(model)
+    facts.drives = mjcf_drives(models)
+    facts.effort_limits |= {name: drive.effort_limit for name, drive in facts.drives.items()}
+    facts.friction += [name for name, drive in facts.drives.items() if drive.friction > 0.0]
     return facts
 
 

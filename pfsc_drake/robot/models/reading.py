@@ -135,7 +135,10 @@ def read_model(
                 springs = facts.springs.items()
                 add_springs(plant, [(plant.GetJointByName(j), K_s) for j, K_s in springs])
             _require_inertia(plant, model, facts)
-            drive_joints(plant, drivable_joints(plant), file, facts.effort_limits)
+            _take_actuators(plant, facts)
+            driven = drive_joints(plant, drivable_joints(plant), file, facts.effort_limits)
+            for drive in (d for d in driven if d.joint().name() in facts.drives):
+                drive.set_default_rotor_inertia(facts.drives[drive.joint().name()].armature)
             unlimited = _release_velocities(plant)
             make_elastic(plant, options.elastic)
             set_joint_damping(plant, options.joint_damping)
@@ -148,6 +151,8 @@ def read_model(
     rubbing = [name for name in facts.friction if name not in options.fixed_joints]
     # or of no account, since all that follows others is fixed
     said_below = ("joint friction", "mimic", "equality")
+    if facts.drives:
+        said_below += ("actuatorfrcrange", "frictionloss", "child of 'actuator'")
     warnings = [m for m in messages.warnings if not any(text in m for text in said_below)]
     if rubbing:
         warnings.append(
@@ -157,6 +162,13 @@ def read_model(
     if facts.assumed_inertia:
         named = ", ".join(facts.assumed_inertia)
         warnings.append(f"{file}: without <inertia> SDF takes 1 kg m^2 for moments of {named}")
+    if facts.drives:
+        limits = [
+            f"{name} {drive.effort_limit:g} ({drive.source})"
+            for name, drive in facts.drives.items()
+            if name not in options.fixed_joints
+        ]
+        warnings.append(f"{file}: torque limits [Nm or N]: {', '.join(limits)}")
     if unlimited:
         named = ", ".join(unlimited)
         warnings.append(f"{file}: velocity limits of 0 ({named}) are taken for none")
@@ -216,6 +228,13 @@ def _take_constraints(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> N
         )
     for constraint in constraints:
         plant.RemoveConstraint(constraint)
+
+
+def _take_actuators(plant: MultibodyPlant, facts: ModelFacts) -> None:
+    """Take out what Drake makes of MJCF actuators: limits of controls, and servos' own gains."""
+    if facts.drives:
+        for index in plant.GetJointActuatorIndices():
+            plant.RemoveJointActuator(plant.get_joint_actuator(index))
 
 
 def _require_inertia(plant: MultibodyPlant, model: ModelXml, facts: ModelFacts) -> None:

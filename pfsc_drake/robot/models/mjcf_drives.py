@@ -1,0 +1,178 @@
+"""Drives of an MJCF model, as MuJoCo takes their limits from actuators, joints and classes.
+
+The force of an actuator on its joint is ``gear * clamp(gain * ctrl + bias, forcerange)``, the sum
+of a joint's actuators is limited by its ``actuatorfrcrange``, and ``armature`` is inertia on the
+joint's side. The control bounds the force where there is no bias; of servos (``position``,
+``velocity``, affine bias) it is an angle or a speed and does not.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.model_xml import Element, ModelXml
+
+# shortcuts of actuators, which share one set of defaults in a class
+_ACTUATORS = {
+    *("general", "motor", "position", "velocity", "intvelocity"),
+    *("damper", "cylinder", "muscle", "adhesion", "dcmotor"),
+}
+_MAIN = "main"
+
+Attributes = dict[str, str]
+
+
+@dataclass
+class MjcfDrive:
+    """Drive of a joint.
+
+    Attributes:
+        armature: Inertia of the rotor, on the joint's side [kg m^2 or kg].
+        friction: Dry friction, ``frictionloss`` [Nm or N].
+        effort_limit: Largest magnitude of the force on the joint, infinite if nothing limits it
+            [Nm or N]; of an uneven range its smaller side.
+        source: Attributes that the limit is from.
+    """
+
+    armature: float = 0.0
+    friction: float = 0.0
+    effort_limit: float = math.inf
+    source: str = "no limit in the model"
+
+
+@dataclass
+class _Classes:
+    """Attributes of default classes, by class and kind of element."""
+
+    known: dict[str, dict[str, Attributes]] = field(default_factory=dict)
+
+    def read(self, default: Element, above: str | None = None) -> None:
+        """Add a class and those in it."""
+        name = default.attributes.get("class", _MAIN)
+        inherited = {} if above is None else self.known[above]
+        own = self.known.setdefault(name, {kind: dict(given) for kind, given in inherited.items()})
+        for element in default.children:
+            if element.name != "default":
+                kind = "actuator" if element.name in _ACTUATORS else element.name
+                own.setdefault(kind, {}).update(element.attributes | _servo(element))
+        for element in default.all("default"):
+            self.read(element, name)
+
+    def resolved(self, element: Element, kind: str, inherited: str = _MAIN) -> Attributes:
+        """Return the attributes of an element with those of its class."""
+        name = element.attributes.get("class", inherited)
+        return self.known.get(name, {}).get(kind, {}) | element.attributes
+
+
+def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
+    """Return the drives of all joints of an MJCF model that have a name.
+
+    Args:
+        models: The model and what it includes.
+
+    Raises:
+        InputError: If a range, a gear or a gain is not made of numbers; one line.
+    """
+    roots = [model.root for model in models if model.root.name.startswith("mujoco")]
+    classes, limits_by_range = _Classes(), True
+    for root in roots:
+        for default in root.all("default"):
+            classes.read(default)
+        for compiler in root.all("compiler"):
+            limits_by_range = compiler.attributes.get("autolimits", "true") != "false"
+    places = {id(e): model for model in models for e in model.root.within()}
+    joints = {
+        attributes["name"]: (element, attributes)
+        for root in roots
+        for body in root.all("worldbody")
+        for element, attributes in _joints(body, _MAIN, classes)
+        if "name" in attributes
+    }
+    drives: dict[str, MjcfDrive] = {}
+    for name, (element, given) in joints.items():
+        numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+        drives[name] = MjcfDrive(numbers.of("armature", 0.0), numbers.of("frictionloss", 0.0))
+    driven: dict[str, list[tuple[float, str]]] = {}
+    for root in roots:
+        for element in (e for group in root.all("actuator") for e in group.children):
+            given = classes.resolved(element, "actuator") | _servo(element)
+            joint = given.get("joint", given.get("jointinparent"))
+            if joint in drives:
+                numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+                driven.setdefault(joint, []).append(_limit_of_actuator(numbers))
+    for name, (element, given) in joints.items():
+        numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+        limits = driven.get(name, [])
+        total = sum(limit for limit, _ in limits) if limits else math.inf
+        source = " + ".join(source for _, source in limits)
+        of_joint = numbers.limit("actuatorfrc")
+        if of_joint < total:
+            total, source = of_joint, "actuatorfrcrange"
+        if total < math.inf:
+            drives[name].effort_limit, drives[name].source = total, source
+    return drives
+
+
+def _joints(
+    body: Element, inherited: str, classes: _Classes
+) -> Iterator[tuple[Element, Attributes]]:
+    """Yield the joints below a body, with the attributes of their classes."""
+    inherited = body.attributes.get("childclass", inherited)
+    for element in body.all("joint"):
+        yield element, classes.resolved(element, "joint", inherited)
+    for child in body.all("body"):
+        yield from _joints(child, inherited, classes)
+
+
+def _servo(element: Element) -> Attributes:
+    """Return what a shortcut says of gain and bias, in the words of a general actuator."""
+    if element.name == "motor":
+        return {"biastype": "none", "gainprm": "1"}
+    if element.name in _ACTUATORS - {"general"}:
+        return {"biastype": "affine"}
+    return {}
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """Attributes of an element as numbers, with messages that name them."""
+
+    model: ModelXml
+    element: Element
+    given: Attributes
+    limits_by_range: bool
+
+    def all(self, key: str) -> list[float]:
+        text = self.given.get(key, "")
+        try:
+            return [float(word) for word in text.split()]
+        except ValueError:
+            raise InputError(
+                f"{self.model.place(self.element)}: {self.element.name} "
+                f"'{self.given.get('name', '')}': {key} = '{text}'; allowed: numbers"
+            ) from None
+
+    def of(self, key: str, otherwise: float) -> float:
+        return next(iter(self.all(key)), otherwise)
+
+    def limit(self, kind: str) -> float:
+        """Return the smaller side of a range that limits, else infinity."""
+        values = self.all(f"{kind}range")
+        limited = self.given.get(f"{kind}limited", "auto")
+        if limited == "auto":
+            limited = "true" if self.limits_by_range and values else "false"
+        return min(map(abs, values), default=math.inf) if limited == "true" else math.inf
+
+
+def _limit_of_actuator(numbers: _Numbers) -> tuple[float, str]:
+    """Return the largest force of an actuator on its joint, and the attributes it is from."""
+    gear = abs(numbers.of("gear", 1.0))
+    force, source = numbers.limit("force"), "forcerange"
+    if numbers.given.get("biastype", "none") == "none":
+        by_control = abs(numbers.of("gainprm", 1.0)) * numbers.limit("ctrl")
+        if by_control < force:
+            force, source = by_control, "ctrlrange"
+    if gear != 1.0:
+        source += f" x gear {gear:g}"
+    return gear * force, source
