@@ -102,6 +102,9 @@ def build_station(
     spring = make_spring(scenario, workpiece) if with_slope else None
     touched = workpiece if spring is None else None
     part = add_robot(builder, scenario, folder, touched, remote=remote)
+    if with_slope and part.robot.is_massless:
+        allowed = "a model with masses for margins, which are about its dynamics"
+        require(False, "robot.model", scenario.robot.model, allowed)
     if parametric:
         assert isinstance(part, Arm)
         part = replace(part, belief=part.belief.with_symbols())

@@ -18,6 +18,7 @@ from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario, Streamed
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.massless import check_massless
 from diagrams.surroundings.forces import Outside
 from diagrams.surroundings.leader import Leading
 from diagrams.surroundings.mounting import Mounting, make_mounting
@@ -201,7 +202,10 @@ def add_robot(
         require(not is_delta(model), "robot.model", model, "an arm, where it stands elsewhere")
         return add_remote_arm(builder, source, has_sensor=scenario.needs_sensor)
     if not is_delta(scenario.robot.model):
-        return add_arm(builder, source, workpiece)
+        arm = add_arm(builder, source, workpiece)
+        if arm.robot.is_massless:
+            check_massless(scenario)
+        return arm
     step = free_step(controller.sampling_time, scenario.simulation.max_step)
     part = add_delta(builder, source, step, workpiece)
     # what cannot be read is said before what it could not do
@@ -216,7 +220,14 @@ def belief_source(scenario: Scenario, folder: FilePath) -> BeliefSource:
         scenario: The scenario.
         folder: Where its relative file names start.
     """
-    return BeliefSource(scenario.robot, scenario.controller.model, scenario.model_error, folder)
+    controller = scenario.controller
+    return BeliefSource(
+        scenario.robot,
+        controller.model,
+        scenario.model_error,
+        folder,
+        by_velocity=controller.law == "velocity_servo",
+    )
 
 
 def friction_options(scenario: Scenario, folder: FilePath) -> FrictionOptions:

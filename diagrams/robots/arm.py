@@ -285,7 +285,12 @@ def add_arm(
         return _add_coupled_arm(builder, source, workpiece)
     if workpiece is not None:
         return _add_touching_arm(builder, source, workpiece)
-    true = read_arm(source.robot, source.folder, before_finalizing=source.carried)
+    true = read_arm(
+        source.robot,
+        source.folder,
+        before_finalizing=source.carried,
+        by_velocity=source.by_velocity,
+    )
     builder.AddNamedSystem("plant", true.plant)
     return MultibodyArm(true, *believe_arm(true, source))
 

@@ -104,6 +104,8 @@ def read_arm(
     folder: FilePath,
     time_step: float = 0.0,
     before_finalizing: Callable[[MultibodyPlant], None] | None = None,
+    *,
+    by_velocity: bool = False,
 ) -> ArmModel:
     """Read a serial arm.
 
@@ -112,11 +114,14 @@ def read_arm(
         folder: Where relative file names start.
         time_step: Time step of the plant [s]; 0 for a continuous one.
         before_finalizing: What else is to be added to the plant.
+        by_velocity: Whether velocity servos move the joints, for which kinematics suffice.
 
     Raises:
         InputError: If the model cannot be read, or is no chain of joints.
     """
-    plant, warnings = read_robot(parameters, folder, time_step, before_finalizing)
+    plant, warnings = read_robot(
+        parameters, folder, time_step, before_finalizing, by_velocity=by_velocity
+    )
     tool = tool_frame(plant, parameters)
     return ArmModel(plant, *chain_from_plant(plant, tool), tool, warnings)
 
@@ -150,10 +155,18 @@ def _model(true: ArmModel, source: BeliefSource) -> ArmModel:
             found = _from_parameters(source.folder / model, true, source)
         else:
             robot = replace(source.robot, model=model)
-            found = read_arm(robot, source.folder, before_finalizing=source.carried)
+            found = read_arm(
+                robot,
+                source.folder,
+                before_finalizing=source.carried,
+                by_velocity=source.by_velocity,
+            )
     except InputError as error:
         message = str(error).removeprefix("robot.model: ")
         raise InputError(f"{key}: {message}") from None
+    if found.chain.is_massless != true.chain.is_massless:
+        has = "no masses" if found.chain.is_massless else "masses"
+        raise InputError(f"{key} = {model}: has {has}, unlike the robot; allowed: a model like it")
     kinds, own = found.chain.gather("kind").tolist(), true.chain.gather("kind").tolist()
     if kinds != own:
         raise InputError(

@@ -30,6 +30,7 @@ class BeliefSource:
         folder: Where relative file names start.
         carried: Adds to the plant what the robot carries, with the tool frame, if it carries
             anything.
+        by_velocity: Whether velocity servos move the joints, for which kinematics suffice.
     """
 
     robot: RobotParameters
@@ -37,6 +38,7 @@ class BeliefSource:
     error: ModelErrorParameters
     folder: Path
     carried: Callable[[MultibodyPlant], None] | None = None
+    by_velocity: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Reading the robot of a diagram: an arm's plant, or a DELTA robot."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 from pydrake.multibody.plant import MultibodyPlant
@@ -32,6 +33,8 @@ def read_robot(
     folder: FilePath,
     time_step: float = 0.0,
     before_finalizing: Callable[[MultibodyPlant], None] | None = None,
+    *,
+    by_velocity: bool = False,
 ) -> tuple[MultibodyPlant, list[str]]:
     """Return a plant with a robot, without the robot's geometry and in no diagram.
 
@@ -40,6 +43,7 @@ def read_robot(
         folder: Where relative file names start.
         time_step: Time step of the plant [s]; 0 for a continuous one.
         before_finalizing: What else is to be added to the plant.
+        by_velocity: Whether velocity servos move the joints, for which kinematics suffice.
 
     Returns:
         The plant, and what there is to say about the model, one sentence each.
@@ -47,7 +51,8 @@ def read_robot(
     Raises:
         InputError: If the model cannot be read.
     """
-    file, options = locate_model(parameters, folder), parameters.options(folder)
+    file = locate_model(parameters, folder)
+    options = replace(parameters.options(folder), by_velocity=by_velocity)
     try:
         if before_finalizing is None:
             read, said = _read_once(time_step, file, _text_of(file, options), options)

@@ -235,7 +235,9 @@ def plan_metrics(plan: DrivePlan | None) -> Metrics:
         shares["planned"] = plan.demand
         metrics.add("slowest_pace", float(plan.pace.min()))
         metrics.add("waiting_time", float(plan.waiting_time))
-    for name, demand in shares.items():
+    # drives whose limits nobody knows have no share of them
+    limited = np.isfinite(plan.limits[:joints]).any()
+    for name, demand in shares.items() if limited else ():
         share = np.max(np.abs(demand[:, :joints]) / plan.limits[:joints])
         metrics.add(f"{name}_torque_share", float(share))
     return metrics

@@ -234,8 +234,16 @@ def final_joint_speed(log: RunLog) -> float:
     NaN if the tool does not rest there.
     """
     late = log.time >= log.time[-1] - REST
-    rests = finite_peak(log["eta_dot"].values[late]) < AT_REST
+    rests = finite_peak(_progress_rate(log)[late]) < AT_REST
     return finite_peak(log["v_J"].values[late]) if rests else math.nan
+
+
+def _progress_rate(log: RunLog) -> np.ndarray:
+    """Return the rate of progress [m/s]; velocity servos leave it to be told from progress."""
+    if "eta_dot" in log:
+        return log["eta_dot"].values
+    eta = log["eta"].values
+    return np.gradient(eta, log.time, axis=0) if len(eta) > 1 else np.zeros_like(eta)
 
 
 def posture_return(log: RunLog, lap: float) -> float:
@@ -265,7 +273,7 @@ def posture_return(log: RunLog, lap: float) -> float:
 
 def _setting_off(log: RunLog) -> int:
     """Return the last sample at rest before the tool goes away from where it starts."""
-    eta, speed = log["eta"].values[:, 0], log["eta_dot"].values[:, 0]
+    eta, speed = log["eta"].values[:, 0], _progress_rate(log)[:, 0]
     away = eta - eta[0] > AWAY
     gone = int(np.argmax(away)) if away.any() else len(eta)
     resting = np.flatnonzero(np.abs(speed[:gone]) < AT_REST)

@@ -282,7 +282,8 @@ def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
     """Add the torques that a velocity servo gives, and what friction takes."""
     if station.servo is not None:
-        log.add("tau_d", raw["drive_torque"], limits=station.servo.limits)
+        if not station.robot.is_massless:
+            log.add("tau_d", raw["drive_torque"], limits=station.servo.limits)
         names = [fault.name.lower() for fault in Fault]
         log.add("servo_fault", raw["servo_fault"].astype(int), labels=names)
     add_friction(log, station, raw)

@@ -41,6 +41,11 @@ class RobotModel(Protocol):
         return not self.elastic_joints.any()
 
     @property
+    def is_massless(self) -> bool:
+        """Whether nothing of it has mass: its kinematics alone are known."""
+        return False
+
+    @property
     def numeric(self) -> "RobotModel":
         """The robot with numbers for all parameters: itself, unless some are symbols."""
         return self

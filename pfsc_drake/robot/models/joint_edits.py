@@ -115,6 +115,22 @@ def actuator_of(plant: MultibodyPlant, joint: Joint) -> JointActuator | None:
     return None
 
 
+def idealize_drives(plant: MultibodyPlant) -> None:
+    """Make integrators of the joints of an arm without masses: unit inertia, nothing damps.
+
+    Servos are designed for the inertia that drives see, so that its value changes no motion.
+
+    Args:
+        plant: The plant, not finalized, with an actuator at every joint that moves.
+    """
+    for joint in drivable_joints(plant):
+        actuator = actuator_of(plant, joint)
+        assert actuator is not None
+        actuator.set_default_rotor_inertia(1.0)
+        actuator.set_default_gear_ratio(1.0)
+        joint.set_default_damping(0.0)
+
+
 def pose_at(joint: Joint, value: float) -> RigidTransform:
     """Return the pose of a joint's moving frame in its fixed frame.
 

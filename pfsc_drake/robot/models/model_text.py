@@ -15,7 +15,9 @@ from pfsc_drake.robot.models.model_xml import Element, ModelXml
 Edit = tuple[Element, str]
 
 
-def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None:
+def usable_text(
+    model: ModelXml, *, without_springs: bool = False, without_masses: bool = False
+) -> str | None:
     """Return a model in another text, or None if Drake can use the file as it is.
 
     ROS tools repeat a material wherever it is used, and let the colour differ; Drake refuses
@@ -27,6 +29,7 @@ def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None
     Args:
         model: The model.
         without_springs: Whether to set the stiffness of its joints to zero.
+        without_masses: Whether to leave out inertia of links and transmissions of a URDF model.
     """
     edits = list(distinct_materials(model))
     edits += [(mimic, "") for _, mimic in mimic_elements(model)]
@@ -36,6 +39,9 @@ def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None
             for element in model.root.within()
             if element.name == "spring_stiffness"
         ]
+    if without_masses:
+        left_out = [*model.root.all("link", "inertial"), *model.root.all("transmission")]
+        edits += [(element, "") for element in left_out]
     return edited_text(model, [*edits, *absolute_names(model)]) if edits else None
 
 

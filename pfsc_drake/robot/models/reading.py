@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
+from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     ForceElementIndex,
@@ -15,9 +15,7 @@ from pydrake.multibody.tree import (
     JointActuator,
     PrismaticSpring,
     RevoluteSpring,
-    RigidBody,
     UniformGravityFieldElement,
-    WeldJoint,
 )
 
 from pfsc_drake.errors import InputError
@@ -32,12 +30,13 @@ from pfsc_drake.robot.models.inspection import ModelFacts, inspect_model
 from pfsc_drake.robot.models.joint_edits import (
     actuator_of,
     drivable_joints,
+    idealize_drives,
     inboard_joints,
-    joints_of,
     moving_joints,
     sprung_joints,
     with_followers,
 )
+from pfsc_drake.robot.models.masses import require_inertia, require_regular_mass_matrix
 from pfsc_drake.robot.models.model_text import (
     DrakeMessages,
     collected_messages,
@@ -50,8 +49,6 @@ from pfsc_drake.robot.models.placement import fix_joints, place_base
 _ROOTS = {".urdf": "robot", ".sdf": "sdf", ".xml": "mujoco"}
 # Drake says so when it takes another inertia than the model's
 _REPLACED = ("While re-expressing as central inertia", "While parsing inertia", "invalid inertia")
-# of a mass matrix scaled to ones on its diagonal; below, accelerations are rounding
-_SMALLEST_EIGENVALUE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -68,6 +65,9 @@ class ModelOptions:
             ``ROS_PACKAGE_PATH``.
         elastic: What the joints become.
         joint_damping: ``K_d`` of the elastic joints, base first; empty for the model's.
+        by_velocity: Whether velocity servos move the joints. Kinematics suffice then: effort
+            limits of 0 in a URDF are taken for none, and if one of its links moves without mass
+            nothing has any, and nothing damps, see :func:`idealize_drives`.
     """
 
     base: str = ""
@@ -77,6 +77,7 @@ class ModelOptions:
     packages: Mapping[str, Path] = field(default_factory=dict)
     elastic: ElasticJoints = field(default_factory=ElasticJoints)
     joint_damping: list[float] = field(default_factory=list)
+    by_velocity: bool = False
 
     @property
     def moves_joints(self) -> bool:
@@ -122,10 +123,8 @@ def read_model(
     if sprung:
         raise InputError(f"fixed_joints: '{sprung[0]}' carries a spring; allowed: other joints")
     with collected_messages() as messages:
-        parser = Parser(plant)
-        parser.package_map().AddMap(packages)
-        with _named(file, "cannot be read"):
-            _parse(parser, model, without_springs=options.moves_joints)
+        massless = options.by_velocity and _moves_without_mass(model, options, facts, packages)
+        _parse(plant, model, options, packages, without_masses=massless)
         _refuse_replaced_inertia(file, messages)
         with _named(file, "cannot be simulated"):
             _take_constraints(plant, file, facts)
@@ -134,27 +133,33 @@ def read_model(
             if options.moves_joints:
                 springs = facts.springs.items()
                 add_springs(plant, [(plant.GetJointByName(j), K_s) for j, K_s in springs])
-            _require_inertia(plant, model, facts)
+            if not massless:
+                require_inertia(plant, model, facts)
             _take_actuators(plant, facts)
-            driven = drive_joints(plant, drivable_joints(plant), file, facts.effort_limits)
+            limits, weak = _drive_limits(plant, facts, options, massless=massless)
+            driven = drive_joints(plant, drivable_joints(plant), file, limits)
             for drive in (d for d in driven if d.joint().name() in facts.drives):
                 drive.set_default_rotor_inertia(facts.drives[drive.joint().name()].armature)
             unlimited = _release_velocities(plant)
+            if massless:
+                _require_no_dynamics(options)
+                idealize_drives(plant)
             make_elastic(plant, options.elastic)
             set_joint_damping(plant, options.joint_damping)
             _require_rotors(plant, file)
-            plant.mutable_gravity_field().set_gravity_vector(options.gravity)
+            gravity = np.zeros(3) if massless else options.gravity
+            plant.mutable_gravity_field().set_gravity_vector(gravity)
             if before_finalizing is not None:
                 before_finalizing(plant)
             plant.Finalize()
-            _require_regular_mass_matrix(plant, file)
+            require_regular_mass_matrix(plant, file)
     rubbing = [name for name in facts.friction if name not in options.fixed_joints]
     # or of no account, since all that follows others is fixed
-    said_below = ("joint friction", "mimic", "equality")
+    said_below = ["joint friction", "mimic", "equality"]
     if facts.drives:
-        said_below += ("actuatorfrcrange", "frictionloss", "child of 'actuator'")
+        said_below += ["actuatorfrcrange", "frictionloss", "child of 'actuator'"]
     warnings = [m for m in messages.warnings if not any(text in m for text in said_below)]
-    if rubbing:
+    if rubbing and not massless:
         warnings.append(
             f"{file}: dry friction in the model ({', '.join(rubbing)}) is not simulated; "
             "give it as friction of the joints"
@@ -163,12 +168,20 @@ def read_model(
         named = ", ".join(facts.assumed_inertia)
         warnings.append(f"{file}: without <inertia> SDF takes 1 kg m^2 for moments of {named}")
     if facts.drives:
-        limits = [
+        known = [
             f"{name} {drive.effort_limit:g} ({drive.source})"
             for name, drive in facts.drives.items()
             if name not in options.fixed_joints
         ]
-        warnings.append(f"{file}: torque limits [Nm or N]: {', '.join(limits)}")
+        warnings.append(f"{file}: torque limits [Nm or N]: {', '.join(known)}")
+    if massless:
+        warnings.append(
+            f"{file}: links move without mass: kinematics alone are simulated, without torques, "
+            "weight, damping and friction"
+        )
+    elif weak:
+        named = ", ".join(weak)
+        warnings.append(f"{file}: effort limits of 0 ({named}) are taken for none")
     if unlimited:
         named = ", ".join(unlimited)
         warnings.append(f"{file}: velocity limits of 0 ({named}) are taken for none")
@@ -199,12 +212,61 @@ def _named(file: Path, trouble: str) -> Iterator[None]:
         raise InputError(f"{file}: {trouble}: {one_line(error)}") from None
 
 
-def _parse(parser: Parser, model: ModelXml, without_springs: bool) -> None:
-    edited = usable_text(model, without_springs=without_springs)
-    if edited is None:
-        parser.AddModels(str(model.file))
-    else:
-        parser.AddModelsFromString(edited, model.file.suffix[1:].lower())
+def _parse(
+    plant: MultibodyPlant,
+    model: ModelXml,
+    options: ModelOptions,
+    packages: PackageMap,
+    *,
+    without_masses: bool = False,
+) -> None:
+    parser = Parser(plant)
+    parser.package_map().AddMap(packages)
+    edited = usable_text(model, without_springs=options.moves_joints, without_masses=without_masses)
+    with _named(model.file, "cannot be read"):
+        if edited is None:
+            parser.AddModels(str(model.file))
+        else:
+            parser.AddModelsFromString(edited, model.file.suffix[1:].lower())
+
+
+def _moves_without_mass(
+    model: ModelXml, options: ModelOptions, facts: ModelFacts, packages: PackageMap
+) -> bool:
+    """Return whether a link of a URDF model moves without mass, as it is fixed and placed."""
+    if model.root.name != "robot":
+        return False
+    plant = MultibodyPlant(0.0)
+    _parse(plant, model, options, packages)
+    with _named(model.file, "cannot be simulated"):
+        fix_joints(plant, options.fixed_joints)
+        place_base(plant, options.base, options.base_pose)
+    try:
+        require_inertia(plant, model, facts)
+    except InputError:
+        return True
+    return False
+
+
+def _drive_limits(
+    plant: MultibodyPlant, facts: ModelFacts, options: ModelOptions, *, massless: bool
+) -> tuple[dict[str, float], list[str]]:
+    """Return effort limits by joint, and the joints whose limits of 0 are taken for none."""
+    joints = [joint.name() for joint in drivable_joints(plant)]
+    if massless:
+        return dict.fromkeys(joints, np.inf), []
+    limits = facts.effort_limits
+    weak = [name for name in joints if options.by_velocity and limits.get(name) == 0.0]
+    return {**limits, **dict.fromkeys(weak, np.inf)}, weak
+
+
+def _require_no_dynamics(options: ModelOptions) -> None:
+    for key, given in (
+        ("elastic", options.elastic.is_given),
+        ("joint_damping", bool(options.joint_damping)),
+    ):
+        if given:
+            raise InputError(f"{key}: given; allowed: none where links move without mass")
 
 
 def _refuse_replaced_inertia(file: Path, messages: DrakeMessages) -> None:
@@ -235,41 +297,6 @@ def _take_actuators(plant: MultibodyPlant, facts: ModelFacts) -> None:
     if facts.drives:
         for index in plant.GetJointActuatorIndices():
             plant.RemoveJointActuator(plant.get_joint_actuator(index))
-
-
-def _require_inertia(plant: MultibodyPlant, model: ModelXml, facts: ModelFacts) -> None:
-    """Refuse what moves without mass, or with a mass that nobody wrote."""
-    carriers = {joint.parent_body().index() for joint in moving_joints(plant)}
-    for group in _moving_groups(plant):
-        mass = sum(body.default_mass() for body in group)
-        unsaid = [body.name() for body in group if body.name() in facts.without_inertia]
-        # a body between two joints may be without mass if the model says so
-        between = not unsaid and any(body.index() in carriers for body in group)
-        if mass > 0.0 or between:
-            if not (unsaid and model.root.name == "sdf"):
-                continue
-            hint = "; SDF takes 1 kg for it"
-        else:
-            hint = ""
-        name = (unsaid or [group[0].name()])[0]
-        place = facts.without_inertia.get(name, str(model.file))
-        raise InputError(
-            f"{place}: link '{name}': moves and has no {'<inertial>' if unsaid else 'mass'}{hint}; "
-            "allowed: <inertial> with a positive mass, or a link fixed to one that has it"
-        )
-
-
-def _moving_groups(plant: MultibodyPlant) -> list[list[RigidBody]]:
-    """Return what is welded together, for all that is not welded to the world, base first."""
-    world = plant.world_body()
-    group = {world.index(): [world]}
-    for joint in joints_of(plant):
-        carried = joint.child_body()
-        welded = isinstance(joint, WeldJoint)
-        group[carried.index()] = group[joint.parent_body().index()] if welded else []
-        group[carried.index()].append(carried)
-    groups = {id(bodies): bodies for bodies in group.values() if bodies[0] is not world}
-    return list(groups.values())
 
 
 def drive_joints(
@@ -325,21 +352,3 @@ def _release_velocities(plant: MultibodyPlant) -> list[str]:
             joint.set_velocity_limits(-unlimited, unlimited)
             names.append(joint.name())
     return names
-
-
-def _require_regular_mass_matrix(plant: MultibodyPlant, file: Path) -> None:
-    """Refuse joints that move nothing that has inertia about them."""
-    context = plant.CreateDefaultContext()
-    if plant.num_velocities() == 0 or plant.num_positions() != plant.num_velocities():
-        return
-    plant.SetPositions(context, np.random.default_rng(0).uniform(0.1, 0.7, plant.num_positions()))
-    mass_matrix = plant.CalcMassMatrix(context)
-    scale = np.sqrt(np.maximum(np.diag(mass_matrix), 1e-300))
-    eigenvalues, vectors = np.linalg.eigh(mass_matrix / np.outer(scale, scale))
-    if eigenvalues[0] < _SMALLEST_EIGENVALUE or not np.isfinite(eigenvalues).all():
-        worst = int(np.argmax(np.abs(vectors[:, 0])))
-        name = plant.GetVelocityNames(add_model_instance_prefix=False)[worst].rsplit("_", 1)[0]
-        raise InputError(
-            f"{file}: joint '{name}': moves no inertia (singular mass matrix); allowed: links "
-            "with mass, and moments of inertia about their joints"
-        )

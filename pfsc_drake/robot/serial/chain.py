@@ -25,6 +25,11 @@ class SerialChain(Linkage, RobotModel):
         """Number of joints N."""
         return len(self.links)
 
+    @property
+    def is_massless(self) -> bool:
+        """Whether nothing of it has mass: its kinematics alone are known."""
+        return not self.numeric.gather("mass").any()
+
     @cached_property
     def reach(self) -> float:
         """How far the tool point can be from the origin of the first joint at most [m]."""

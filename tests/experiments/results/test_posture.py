@@ -43,6 +43,18 @@ def test_all_metrics(log):
     assert metrics["largest_push"].value == pytest.approx(5.0)
 
 
+def test_servos_log_no_rate_of_progress(log):
+    """It is told from progress then."""
+    bare = RunLog(log.time)
+    for name in ("q_J", "v_J", "eta", "xi", "phi"):
+        bare.add(name, log[name].values, log[name].unit)
+    expected, metrics = posture_metrics(log, LAP), posture_metrics(bare, LAP)
+    for name in ("posture_return", "final_joint_speed"):
+        assert metrics[name].value == pytest.approx(expected[name].value, abs=1e-9)
+    bare["eta"].values[:, 0] = 0.5 * log.time
+    assert math.isnan(posture_metrics(bare, None)["final_joint_speed"].value)
+
+
 def test_a_run_that_ends_in_motion_has_no_final_speed(log):
     log["eta_dot"].values[:] = 0.5
     assert math.isnan(posture_metrics(log, LAP)["final_joint_speed"].value)
