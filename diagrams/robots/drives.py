@@ -313,6 +313,13 @@ def _bristles(
     options: FrictionOptions, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
     """Return friction whose bristles suit how the plant is integrated, however it drifts."""
+    simulation = options.simulation
+    allowed = (AUTO, *FRICTION_INTEGRATORS)
+    if drives.step is None and simulation.accuracy == 0.0 and simulation.integrator not in allowed:
+        raise InputError(
+            f"simulation.integrator = {simulation.integrator} with friction; allowed: "
+            f"{', '.join(allowed)}, or error control"
+        )
     drift = options.friction.drift
     stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
     now = _bristles_now(options, stiffest, f_v, drives, 1.0)
@@ -331,15 +338,8 @@ def _bristles_now(
         return bristles_for_step(
             f_c, f_v, drives.inertia, drives.step, frequency=share * _BRISTLES_PER_STEP
         )
-    simulation = options.simulation
-    allowed = (AUTO, *FRICTION_INTEGRATORS)
-    if simulation.accuracy == 0.0 and simulation.integrator not in allowed:
-        raise InputError(
-            f"simulation.integrator = {simulation.integrator} with friction; allowed: "
-            f"{', '.join(allowed)}, or error control"
-        )
     # stiff enough for the step of the integration, or of the hold if that is shorter
-    step = min(simulation.max_step, options.period)
+    step = min(options.simulation.max_step, options.period)
     return bristles_for_step(f_c, f_v, drives.inertia, step, frequency=share)
 
 
