@@ -71,7 +71,7 @@ class StreamTask(Task):
         keyframes = f"{len(said.keyframes)} given"
         require(not said.keyframes, "path.orientation.keyframes", keyframes, "none of a stream")
         period, order = controller.sampling_time, RELATIVE_DEGREE[controller.law]
-        self.plane, self._period = shape.plane, period
+        self.plane, self.period = shape.plane, period
         self.arrivals: Arrivals | None = None
         self.drawn: list[Event] | None = None
         if shape.plane is None:
@@ -88,7 +88,7 @@ class StreamTask(Task):
             self.arrivals = without_orientation(self.arrivals)
         if shape.inputs:
             try:
-                self.drawn = read_drawn(str(folder / shape.inputs), len(begin))
+                self.drawn = read_drawn(str(folder / shape.inputs), len(begin), period)
             except InputError as error:
                 raise InputError(f"path.shape.inputs: {error}") from None
         require(any(ahead), "path.shape.file", shape.file, "way points that differ")
@@ -107,7 +107,7 @@ class StreamTask(Task):
             raise InputError("duration = 0: must be a positive number [s] where a person draws")
         places = np.vstack([self.path.start, self.arrivals.rows[:, :-1]])[:, :POSITION]
         way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-        come = self.arrivals.ends * self._period
+        come = self.arrivals.ends * self.period
         return float(np.ceil(max(come, way / (_SLOWEST * shape.follow.velocity)) + _SETTLES))
 
     @property

@@ -87,7 +87,7 @@ def test_the_tool_follows_while_one_draws_and_a_take_is_repeated_to_the_last_bit
 def test_messages_of_a_drawing_are_those_that_were_told(tmp_path):
     name = tmp_path / DRAWING
     name.write_text("tick,kind,x,y,z\n10,0,1,2,3\n10,0,1.5,2,3\n30,1,4,5,6\n40,2,4,5,6\n")
-    events = read_drawn(str(name), 3)
+    events = read_drawn(str(name), 3, 1e-3)
     assert [event.kind for event in events] == [WAY_POINT, WAY_POINT, NEW_PATH, END]
     ticks, rows = told_messages(events, WaypointLayout(3, 4))
     assert ticks.tolist() == [0, 10, 30, 40]
