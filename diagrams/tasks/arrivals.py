@@ -115,7 +115,9 @@ def tell(sender: WaypointSender, event: Event) -> None:
 
 
 def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.ndarray, np.ndarray]:
-    """Return when messages change, shape (k,), and what they become, shape (k, size).
+    """Return when messages change, shape (k + 1,), and what they become, shape (k + 1, size).
+
+    The first is that before all events, at tick 0.
 
     Args:
         events: What a person did.
@@ -125,11 +127,8 @@ def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.n
     ticks, rows = [0], [sender.message]
     for event in events:
         tell(sender, event)
-        if event.tick == ticks[-1]:
-            rows[-1] = sender.message
-        else:
-            ticks.append(event.tick)
-            rows.append(sender.message)
+        ticks.append(event.tick)
+        rows.append(sender.message)
     return np.array(ticks), np.array(rows)
 
 

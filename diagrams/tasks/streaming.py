@@ -24,7 +24,8 @@ from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.waypoint_source import Arrivals, WaypointSource
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel
+from pfsc_drake.systems.physics.recorded_pen import RecordedPen
 
 _SETTLES = 3.0  # s, after the last way point has come, of a run that tells no duration
 _SLOWEST = 0.3  # of the largest speed, to tell how long a run may take
@@ -172,7 +173,9 @@ class StreamTask(Task):
         builder.Connect(panel.GetOutputPort("waypoints"), stream.waypoints)
         if self.drawn is not None:
             told = told_messages(self.drawn, messages)
-            player = builder.AddNamedSystem("recorded_pen", RecordedControls(*told, period))
+            pen = RecordedPen(*told, messages.length, period)
+            player = builder.AddNamedSystem("recorded_pen", pen)
+            builder.Connect(stream.stream, player.get_input_port())
             builder.Connect(player.get_output_port(), panel.GetInputPort("controls"))
         return panel
 
