@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from diagrams.recorded_times import TIME, sampling_instants, time_column, time_text
+from diagrams.scenario.recorded_times import TIME, sampling_instants, time_column, time_text
 from diagrams.scenario.simulation import OperatorParameters
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, REQUESTS
 from pfsc_drake.control.manifolds.manifold import ToolKinematics

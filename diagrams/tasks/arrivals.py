@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagrams.recorded_times import TIME, sampling_instants, time_column, time_text
+from diagrams.scenario.recorded_times import TIME, sampling_instants, time_column, time_text
 from diagrams.scenario.streamed import Streamed
 from pfsc_drake.control.streams.course import POSE, POSITION
 from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.recorded_times import sampling_instants, time_column, time_text
+from diagrams.scenario.recorded_times import sampling_instants, time_column, time_text
 from pfsc_drake.errors import InputError
 
 
