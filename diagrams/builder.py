@@ -51,12 +51,12 @@ from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import law_manifold
 from diagrams.tasks.streaming import StreamTask
-from diagrams.tasks.waiting import plan_waiting
+from diagrams.tasks.waiting import Approach, plan_waiting
 from diagrams.turntable_station import add_turntable
-from diagrams.warnings.law_warnings import MODES
 from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.following.law import make_law
+from pfsc_drake.following.law_warnings import MODES
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess
@@ -145,7 +145,8 @@ def build_station(
     elif crossing is not None:
         given, allowed = scenario.compliance.is_given, "left out where progress waits"
         require(not given, "compliance", "given", allowed)
-        waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction)
+        approach = Approach(start_posture, scenario.start.transition)
+        waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction, approach)
         following = replace(following, waiting=waiting)
 
     true_state = part.joint_state(builder)
@@ -240,9 +241,9 @@ def build_station(
             initial_state,
         )
         signals |= further
-    faults = [controller.GetOutputPort("fault")]
-    faults += [signals["servo_fault"]] if "servo_fault" in signals else []
-    signals |= add_friction(builder, part, true_state, rubbing, faults)
+    stops = [] if remote else [signals["stop_category"]]
+    stops += [signals["servo_stop_category"]] if "servo_stop_category" in signals else []
+    signals |= add_friction(builder, part, true_state, rubbing, stops)
     known = joint_state if remote else true_state
     signals |= states_to_log(known, place.signals["joint_state"])
     if holder is not None and carrier is not None:

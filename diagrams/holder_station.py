@@ -10,7 +10,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from diagrams.fault_description import FaultScene, FoundFault, describe, first_instant
+from diagrams.fault_instant import first_instant
 from diagrams.named_builder import PrefixingBuilder
 from diagrams.oscillation import oscillation_before
 from diagrams.robots.arm import Arm, add_arm
@@ -46,6 +46,7 @@ from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame, 
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.fault_description import FaultScene, FoundFault, describe
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
@@ -203,7 +204,7 @@ def add_holder(
         builder.Connect(drive, links.drive_torque)
     ports = place.signals | {"drive": drive}
     add_drives(named, part, None, DriverParameters(), period, ports, state)
-    rubs = add_friction(named, part, true_state, rubbing, [controller.GetOutputPort("fault")])
+    rubs = add_friction(named, part, true_state, rubbing, [made["stop_category"]])
     motion = _add_motion(named, holder, following, order, controller, plan)
     pose = np.array(pose_function(part.robot)(q_J)).ravel()
     logged = place.signals | made | rubs | forces | {"frame_jet": motion}

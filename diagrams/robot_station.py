@@ -194,8 +194,8 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     signals, _ = add_drives(
         builder, part, servo_options(scenario), beyond_the_link, period, drive, initial_state
     )
-    faults = [signals["servo_fault"]] if "servo_fault" in signals else []
-    add_friction(builder, part, true_state, friction_options(scenario, folder), faults)
+    stops = [signals["servo_stop_category"]] if "servo_stop_category" in signals else []
+    add_friction(builder, part, true_state, friction_options(scenario, folder), stops)
     measured = _name(joint_state)
     if scenario.simulation.fused:
         fuse_blocks(builder)

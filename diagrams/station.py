@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
-from diagrams.fault_description import FaultScene, FoundFault, describe, first_instant
+from diagrams.fault_instant import first_instant
 from diagrams.holder_station import Holder
 from diagrams.oscillation import oscillation_before
 from diagrams.robots.part import RobotPart
@@ -22,6 +22,7 @@ from diagrams.turntable_station import Turntable
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+from pfsc_drake.following.fault_description import FaultScene, FoundFault, describe
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess

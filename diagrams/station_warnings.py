@@ -10,12 +10,6 @@ from diagrams.scenario import Scenario
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
-from diagrams.warnings.law_warnings import (
-    law_warnings,
-    observed_force_warnings,
-    servo_warnings,
-    unused_parameters,
-)
 from diagrams.warnings.obstacles import obstacle_warnings
 from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
 from diagrams.warnings.teleoperation import rest_warnings
@@ -29,6 +23,12 @@ from diagrams.warnings.untold_forces import (
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.following.law import sampled_robot
+from pfsc_drake.following.law_warnings import (
+    law_warnings,
+    observed_force_warnings,
+    servo_warnings,
+    unused_parameters,
+)
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.operator_hand import LiveHandParameters
 

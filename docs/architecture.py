@@ -7,12 +7,15 @@ The picture is drawn from the packages' own docstrings and imports; tests hold t
 
 import ast
 import functools
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 
+# its door names everything for type checkers, and loads what is used
+LIBRARY = "pfsc_drake"
 # from the top down; a file imports from its own room and from those below, not from one beside
 FLOORS = [
     ["experiments"],
@@ -69,7 +72,8 @@ def imports() -> dict[str, set[str]]:
         for file in sorted((ROOT / top).rglob("*.py")):
             name = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
             imported: set[str] = set()
-            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            tree = ast.parse(file.read_text(encoding="utf-8"))
+            for node in _loaded(tree) if name == LIBRARY else ast.walk(tree):
                 if isinstance(node, ast.Import):
                     imported |= {alias.name for alias in node.names}
                 elif isinstance(node, ast.ImportFrom) and node.module:
@@ -78,6 +82,13 @@ def imports() -> dict[str, set[str]]:
                     imported |= {node.module, *(f"{node.module}.{a.name}" for a in node.names)}
             found[name] = imported
     return found
+
+
+def _loaded(tree: ast.Module) -> Iterator[ast.AST]:
+    """Yield the nodes of a module without imports for type checkers."""
+    for statement in tree.body:
+        if not (isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING"):
+            yield from ast.walk(statement)
 
 
 def is_inside(module: str, room: str) -> bool:

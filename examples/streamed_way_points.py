@@ -37,7 +37,7 @@ def main() -> None:
     builder.Connect(plant.get_state_output_port(), follower.GetInputPort("plant_state"))
     builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
 
-    sender = WaypointSender(follower.followed.streamed.messages)
+    sender = WaypointSender(follower.messages)
     simulator = Simulator(builder.Build())
     root = simulator.get_mutable_context()
     context = follower.GetMyMutableContextFromRoot(root)

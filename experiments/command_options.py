@@ -70,21 +70,26 @@ Driver = Annotated[
     str, typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone).")
 ]
 
+_LONGEST = 1e6  # s, of anything
 _BUSES = ("udpm", "tcpq", "memq")
 
 
-def read_duration(text: str) -> float:
+def read_duration(text: str, longest: float = _LONGEST) -> float:
     """Return the value of ``--duration`` [s].
 
     Args:
         text: As it was written.
+        longest: Largest value [s].
 
     Raises:
-        InputError: If it is no positive number.
+        InputError: If it is no positive number, or larger.
     """
     seconds = float(text) if is_number(text) else math.nan
-    if not (math.isfinite(seconds) and seconds > 0.0):
-        raise InputError(f"--duration {shortened(text)}: allowed: a positive number of seconds")
+    if not 0.0 < seconds <= longest:
+        raise InputError(
+            f"--duration {shortened(text)}: allowed: a positive number of seconds, at most "
+            f"{longest:,.0f} s"
+        )
     return seconds
 
 

@@ -13,7 +13,7 @@ from experiments.preparation import naming, prepare
 from experiments.scenario_file import ScenarioFile
 from experiments.simulation import configure
 from pfsc_drake.codegen.c_controller import CController
-from pfsc_drake.codegen.export import write_project
+from pfsc_drake.codegen.export import check_project, write_project
 from reporting.progress import ProgressListener
 
 
@@ -42,8 +42,10 @@ def export_scenario(
         progress: Told what goes on.
 
     Raises:
-        InputError: If the scenario is wrong, or something in its controller is no block.
+        InputError: If the scenario is wrong, something in its controller is no block, or the folder
+            holds files that no export has written; nothing has been simulated then.
     """
+    check_project(out)
     simulation = (scenario.data.get("simulation") or {}) | {"fused": False}
     whole = replace(scenario, data=scenario.data | {"simulation": simulation})
     prepared = prepare(whole, None, recording=False, progress=progress)
@@ -59,6 +61,7 @@ def export_scenario(
             presets=part.presets(station, root),
             scenario=prepared.settings.name,
             hash=scenario.fingerprint,
+            turning=tuple(station.robot.gather("is_revolute").tolist()),
         )
         progress(0.0, "recording a run")
         recorded = record(station, part, prepared.settings.simulation, duration)

@@ -16,7 +16,6 @@ from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import record
 from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
 from experiments.results.drives import (
@@ -26,7 +25,7 @@ from experiments.results.drives import (
     plan_metrics,
     saturation_warnings,
 )
-from experiments.results.fastest import given_metrics
+from experiments.results.fastest import given_metrics, rate_warnings
 from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
 from experiments.results.guides import guide_metrics
@@ -45,12 +44,14 @@ from experiments.results.promises import (
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
+from experiments.results.stop import MotionAfterFault
 from experiments.results.streaming import stream_metrics
-from experiments.results.teleoperation import teleoperation_metrics
+from experiments.results.teleoperation import handle_warnings, teleoperation_metrics
 from experiments.simulation import SimulationResult, measure_tick
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
 from pfsc_drake.following.fixtures import free_motion
+from pfsc_drake.robot.coordinate_text import posture_text
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
 from reporting.page import Report, report_page, write_report
@@ -73,6 +74,7 @@ class RunOutcome:
         problem: Which results could not be written, why, and where they are instead; or None.
         margins: What the loop bears at the start, in one line; None if nobody asked.
         broken: What was promised and not kept, one phrase each.
+        stop: How the robot moved after a fault, in words; empty without one.
     """
 
     fault: str | None
@@ -83,6 +85,7 @@ class RunOutcome:
     problem: str | None = None
     margins: str | None = None
     broken: list[str] = field(default_factory=list)
+    stop: str = ""
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,7 @@ class _Measured:
         fault: Why the run was stopped, or None.
         broken: What was promised and not kept, one phrase each.
         end: When it ended [s].
+        stop: How the robot moved after a fault, in words; empty without one.
     """
 
     log: RunLog
@@ -129,6 +133,7 @@ class _Measured:
     fault: str | None
     broken: list[str]
     end: float
+    stop: str
 
 
 def write_outcome(
@@ -177,6 +182,7 @@ def write_outcome(
         report.problem,
         None if run.analysis is None else one_line(run.analysis),
         measured.broken,
+        measured.stop,
     )
 
 
@@ -220,9 +226,8 @@ def _measure(
         )
         progress(end, "measuring the tick")
         tick = measure_tick(station, result.root, log) * 1e6
-    # the tool comes to the path during the first rest; from then on deviations count
     metrics = path_following_metrics(
-        log, settings.settling_tolerance, settings.reference.dwell, _MOVING
+        log, settings.settling_tolerance, converged_after(settings, log), _MOVING
     )
     metrics.update(press_metrics(log))
     metrics.update(guidance_metrics(log))
@@ -238,10 +243,15 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
     metrics.update(limits.metrics(log))
+    stop = ""
+    if "fault_time" in log.attributes and log.time.size:
+        motion_after = MotionAfterFault(log, limits)
+        metrics.update(motion_after.metrics())
+        stop = motion_after.sentence()
     metrics.update(found_links_metrics(log))
     metrics.update(link_metrics(log))
     metrics.update(plan_metrics(station.task.drive_plan))
-    metrics.update(given_metrics(log))
+    metrics.update(given_metrics(log, station.task.drive_plan))
     metrics.update(posture_metrics(log, station.task.lap))
     metrics.add("real_time_factor", result.real_time_factor)
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
@@ -256,12 +266,30 @@ def _measure(
         *prepared.warnings,
         *limits.warnings(log),
         *saturation_warnings(log),
+        *rate_warnings(log, station.task.drive_plan, settings.reference),
         *_sensor_warnings(log),
+        *handle_warnings(log, settings),
         *guidance_warnings(log, settings),
         *unpromised_distance(metrics, settings.controller.law),
     ]
     broken = broken_promises(metrics, whole=lasted and result.fault is None)
-    return _Measured(log, motion, metrics, warnings, result.fault, broken, end)
+    return _Measured(log, motion, metrics, warnings, result.fault, broken, end, stop)
+
+
+def converged_after(settings: Scenario, log: RunLog) -> float:
+    """Return the time from which deviations count [s]: until then the tool comes to the path.
+
+    Where it waits for obstacles its approach waits, too, by the time that is lost.
+
+    Args:
+        settings: Scenario of the run.
+        log: Its log.
+    """
+    begin = max(settings.reference.dwell, settings.start.transition)
+    if "time_lost" not in log:
+        return begin
+    there = log.time[log.time - log["time_lost"].values[:, 0] >= begin]
+    return float(there[0]) if there.size else np.inf
 
 
 def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:

@@ -42,7 +42,8 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
     if outcome.interrupted:
         status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
     if outcome.fault is not None:
-        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {time:.3f} s"]
+        stop = outcome.stop or f"ended at t = {time:.3f} s"
+        status, ends = FAULT, [f"fault: {outcome.fault}; {stop}"]
     if outcome.broken:
         status, ends = status or FAULT, [*ends, _missed(outcome.broken)]
     if outcome.problem is not None:
@@ -133,10 +134,10 @@ def print_export(console: Console, export: "Export", out: Path) -> None:
 def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
     """Tells what a controller in C made of its record; returns the exit status."""
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in ("Ticks", "differing", "median [us]", "p99 [us]", "worst [us]"):
+    for title in ("Ticks", "differing", "largest", "median [us]", "p99 [us]", "worst [us]"):
         table.add_column(title, justify="right")
     times = [f"{time:.2f}" for time in (replay.median, replay.p99, replay.worst)]
-    table.add_row(str(replay.ticks), str(replay.differing), *times)
+    table.add_row(str(replay.ticks), str(replay.differing), f"{replay.largest:.3g}", *times)
     console.print(table)
     if replay.differing:
         print_error(f"error: {out}: {replay.text.splitlines()[0]}")
@@ -146,7 +147,7 @@ def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
 
 def judge_commands(console: Console, commands: "Commands") -> int:
     """Tells what drives would have been told; returns the exit status."""
-    from pfsc_drake.control.law.fault import Fault
+    from pfsc_drake.codegen.c_faults import fault_sentences
 
     told = commands.told
     change = np.abs(np.diff(told, axis=0)).max(axis=0, initial=0.0)
@@ -169,7 +170,7 @@ def judge_commands(console: Console, commands: "Commands") -> int:
         console.print(commands.assumed, highlight=False, markup=False, soft_wrap=True)
     console.print(f"all outputs: {commands.file}", highlight=False, markup=False, soft_wrap=True)
     if commands.fault:
-        why = Fault(commands.fault).explanation
+        why = fault_sentences()[int(commands.fault)]
         print_error(f"fault: {why}, from t = {commands.fault_time:.3f} s on")
         return FAULT
     return 0

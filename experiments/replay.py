@@ -14,14 +14,15 @@ import numpy as np
 
 from experiments.results.run_log import RunLog
 from pfsc_drake.codegen.export import LOG
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers
 from reporting.progress import ProgressListener
 
 COMMANDS = "commands.csv"
 _LONGEST = 1200.0  # s
 _RESULT = re.compile(
-    r"ticks (\d+) differing (\d+) median_us ([\d.]+) p99_us ([\d.]+) worst_us ([\d.]+)"
+    r"ticks (\d+) differing (\d+) largest (\S+) "
+    r"median_us ([\d.]+) p99_us ([\d.]+) worst_us ([\d.]+)"
 )
 _TOOLS = ("gcc", "make")
 # a force sensor's, whatever led it to the controller
@@ -31,6 +32,8 @@ _TORQUES_OF_JOINTS = {"joint_torque": "tau_J_measured"}
 _LINKS, _MOTORS = ("q_J", "v_J"), ("q_M", "v_M")
 _TORQUE = "drive_torque"
 _ROUNDING = 1e-6  # of a tick
+# of an interface
+_PORT, _LARGEST_PORT = {"name": str, "size": int, "unit": str}, 100_000
 
 
 @dataclass(frozen=True)
@@ -40,12 +43,14 @@ class Replay:
     Attributes:
         ticks: Ticks of the run.
         differing: How many of them have an output that is not the same to the last bit.
+        largest: Largest difference of an output from the record, infinite where one is NaN.
         median, p99, worst: Times of a step, in a row [us].
         text: What was printed.
     """
 
     ticks: int
     differing: int
+    largest: float
     median: float
     p99: float
     worst: float
@@ -107,8 +112,8 @@ def check_export(
     if found is None:
         raise InputError(f"{folder}/replay ended with status {replayed.returncode}")
     ticks, differing = int(found[1]), int(found[2])
-    median, p99, worst = (float(found[i]) for i in (3, 4, 5))
-    return Replay(ticks, differing, median, p99, worst, replayed.stdout)
+    largest, median, p99, worst = (float(found[i]) for i in (3, 4, 5, 6))
+    return Replay(ticks, differing, largest, median, p99, worst, replayed.stdout)
 
 
 def compile_replay(folder: Path, progress: ProgressListener, optimization: str = "") -> None:
@@ -202,12 +207,37 @@ class _Recorded:
 def _interface(folder: Path) -> dict[str, Any]:
     file = folder / "interface.json"
     try:
-        said: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        said = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
         raise InputError(
             f"{file}: cannot be read; allowed: a folder that export has written"
         ) from None
-    return said
+    wrong = _misfit(said)
+    if wrong:
+        raise InputError(f"{file}: {wrong}; allowed: what export has written")
+    return dict(said)
+
+
+def _misfit(said: Any) -> str:
+    """Return what of an interface is not as export writes it, empty if all is."""
+    if not isinstance(said, dict):
+        return "no mapping"
+    period = said.get("sampling_time")
+    if not (isinstance(period, (int, float)) and 1e-6 <= period <= 1.0):
+        return f"sampling_time = {shortened(repr(period))}, not from 1e-6 to 1 s"
+    for key in ("inputs", "outputs"):
+        ports = said.get(key)
+        if not (isinstance(ports, list) and ports):
+            return f"no list of {key}"
+        for number, port in enumerate(ports):
+            fits = isinstance(port, dict) and all(
+                isinstance(port.get(name), kind) for name, kind in _PORT.items()
+            )
+            if not (fits and 0 < port["size"] <= _LARGEST_PORT):
+                return f"{key}[{number}] = {shortened(repr(port))}, no port"
+    if "fault" not in [port["name"] for port in said["outputs"]]:
+        return "no output fault"
+    return ""
 
 
 def _of_run(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
@@ -276,7 +306,13 @@ def _fed(folder: Path, inputs: np.ndarray, size: int) -> np.ndarray:
         done = _run([str(folder.resolve() / "replay"), "-w", str(given), str(made)], folder)
         if done.returncode != 0:
             raise InputError(f"{folder}/replay ended with status {done.returncode}")
-        return np.fromfile(made).reshape(len(inputs), size)
+        outputs = np.fromfile(made)
+    if outputs.size != len(inputs) * size:
+        raise InputError(
+            f"{folder}/interface.json: {size} outputs; the controller beside it has another number "
+            "of inputs or outputs; allowed: both from one export"
+        )
+    return outputs.reshape(len(inputs), size)
 
 
 def make(folder: Path, target: str, options: Sequence[str] = ()) -> None:

@@ -207,7 +207,7 @@ def sweep_command(
         ),
     ] = None,
     samples: Annotated[int | None, typer.Option(help="Number of random draws.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the random draws.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random draws.")] = 0,
     scheduler: Annotated[
         str | None,
         typer.Option(

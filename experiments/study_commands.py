@@ -31,6 +31,7 @@ from experiments.command_options import (
 )
 
 # what the command says of itself, by the studies' names
+_LONGEST_RECORD = 600.0  # s, of a run beside an exported controller
 _STUDIES = {
     "stiffness": "which law when, all laws on joints of rising stiffness",
     "robustness": "all laws on robots that are not their models",
@@ -194,7 +195,7 @@ def export_command(
     from experiments.replay import check_export, missing_tool
     from experiments.scenario_file import read_scenario
 
-    seconds = read_duration(duration)
+    seconds = read_duration(duration, _LONGEST_RECORD)
     with interruptible():
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out)

@@ -62,7 +62,7 @@ def excite_command(
     starts: Annotated[
         int, typer.Option(min=1, max=MOST_STARTS, help="Random motions to start from.")
     ] = 16,
-    seed: Annotated[int, typer.Option(help="Of the first one.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first one.")] = 0,
     limits: Annotated[
         list[str] | None,
         typer.Option(
@@ -119,7 +119,7 @@ def simulate_command(
         Path | None, typer.Option(help="excitation.yaml. Default: the one that is shipped")
     ] = None,
     runs: Annotated[int, typer.Option(min=1, max=MOST_RUNS, help="How often.")] = 7,
-    seed: Annotated[int, typer.Option(help="Of the first run.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first run.")] = 1,
     realistic: Annotated[
         bool,
         typer.Option(help="Coloured disturbance, and friction that differs from run to run."),

@@ -19,6 +19,8 @@ point downwards:
 * :mod:`pfsc_drake.jets`: truncated Taylor arithmetic.
 """
 
+from typing import TYPE_CHECKING
+
 from pfsc_drake.door import door
 from pfsc_drake.errors import InputError
 
@@ -49,6 +51,7 @@ _DOOR = {
     "WatchParameters": "pfsc_drake.control.obstacles.parameters",
     "WaypointSender": "pfsc_drake.control.streams.messages",
     "WaypointTable": "pfsc_drake.geometry",
+    "add_actuators": "pfsc_drake.robot.models.actuators",
     "add_guidance": "pfsc_drake.following.guidance",
     "add_path_following": "pfsc_drake.following.path_following",
     "add_path_streaming": "pfsc_drake.following.streaming",
@@ -60,6 +63,46 @@ _DOOR = {
     "rest_to_rest": "pfsc_drake.control.law.reference",
     "straight_lines": "pfsc_drake.control.law.reference",
 }
+
+if TYPE_CHECKING:  # what type checkers see of the same
+    from pfsc_drake.codegen.export import export as export
+    from pfsc_drake.control.compliance.impedance_parameters import (
+        CoordinateImpedance as CoordinateImpedance,
+    )
+    from pfsc_drake.control.compliance.impedance_parameters import Profile as Profile
+    from pfsc_drake.control.fixtures.guides import Guide as Guide
+    from pfsc_drake.control.fixtures.parameters import Fixture as Fixture
+    from pfsc_drake.control.law.reference import rest_to_rest as rest_to_rest
+    from pfsc_drake.control.law.reference import straight_lines as straight_lines
+    from pfsc_drake.control.law.timed_reference import StreamLimits as StreamLimits
+    from pfsc_drake.control.obstacles.parameters import WatchParameters as WatchParameters
+    from pfsc_drake.control.obstacles.shapes import Capsule as Capsule
+    from pfsc_drake.control.obstacles.shapes import ObstacleShape as ObstacleShape
+    from pfsc_drake.control.streams.messages import WaypointSender as WaypointSender
+    from pfsc_drake.control.streams.parameters import StreamParameters as StreamParameters
+    from pfsc_drake.following.follower import Follower as Follower
+    from pfsc_drake.following.guidance import GuidanceOptions as GuidanceOptions
+    from pfsc_drake.following.guidance import add_guidance as add_guidance
+    from pfsc_drake.following.options.compliance import ComplianceParameters as ComplianceParameters
+    from pfsc_drake.following.options.controller import ControllerParameters as ControllerParameters
+    from pfsc_drake.following.options.controller import GainParameters as GainParameters
+    from pfsc_drake.following.options.controller import LawGains as LawGains
+    from pfsc_drake.following.options.follower import FaultParameters as FaultParameters
+    from pfsc_drake.following.options.follower import FollowerOptions as FollowerOptions
+    from pfsc_drake.following.options.follower import ObstacleOptions as ObstacleOptions
+    from pfsc_drake.following.path_following import add_path_following as add_path_following
+    from pfsc_drake.following.streaming import add_path_streaming as add_path_streaming
+    from pfsc_drake.following.surface_following import (
+        add_surface_following as add_surface_following,
+    )
+    from pfsc_drake.geometry import Path as Path
+    from pfsc_drake.geometry import WaypointTable as WaypointTable
+    from pfsc_drake.geometry import path_from_waypoints as path_from_waypoints
+    from pfsc_drake.geometry.regions.shapes import HalfSpace as HalfSpace
+    from pfsc_drake.geometry.regions.shapes import SphereRegion as SphereRegion
+    from pfsc_drake.robot.models.actuators import add_actuators as add_actuators
+    from pfsc_drake.robot.models.files import models_directory as models_directory
+    from pfsc_drake.systems.fuse import fuse as fuse
 
 __all__ = ["InputError", "__version__", *_DOOR]
 

@@ -26,6 +26,11 @@ NARROW_SPACE = "\u202f"
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 # Lowest and highest power of ten a prefix may stand for, for units that take one.
 _PREFIX_RANGE = {"m": (-9, 0), "rad": (-9, 0), "m/s": (-6, 0), "s": (-9, 0), "N": (-3, 3)}
+# Below it a value is what rounding leaves, by unit; of others nothing is known.
+_NOISE = {
+    **dict.fromkeys(("m", "rad", "s", "m/s", "rad/s", "J"), 1e-12),
+    **dict.fromkeys(("rad/m", "1/m", "m/s^2", "N", "Nm", "N/m"), 1e-9),
+}
 _SPELLINGS = {"us": "µs", "Nm": "N\u2009m", "1": "", "-": ""}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -181,10 +186,13 @@ def format_quantity(value: float, unit: str) -> str:
             ``"1"``, ``"-"`` and ``""`` are no unit.
 
     Returns:
-        Text with a narrow no-break space before the unit; an en dash for NaN and infinity.
+        Text with a narrow no-break space before the unit; an en dash for NaN and infinity; 0 for
+        what is left by rounding.
     """
     if not math.isfinite(value):
         return NOT_A_NUMBER
+    if abs(value) < _NOISE.get(unit, 0.0):
+        value = 0.0
     exponent = _prefix_exponent(value, unit)
     number = _format_number(value / 10.0**exponent)
     symbol = _PREFIXES[exponent] + _SPELLINGS.get(unit, unit)

@@ -113,7 +113,7 @@ class ProgressDisplay(_Display):
                 else it is where the work is, and each phase begins anew.
         """
         super().__init__(console, title)
-        self.simulated_time = 0.0
+        self.simulated_time = self._time = 0.0  # the latter where the phase is
         self._duration = duration
         self._paced = paced
         self._phase = ""
@@ -142,7 +142,10 @@ class ProgressDisplay(_Display):
             self._phase = phase
             self._phase_start = (time.monotonic(), simulated_time)
         if new_phase and not self._paced:
-            self.simulated_time = self._next_line = 0.0
+            self.simulated_time = 0.0
+        if new_phase and (not self._paced or simulated_time < self.simulated_time):
+            self._next_line = 0.0
+        self._time = simulated_time
         self.simulated_time = max(self.simulated_time, simulated_time)
         if self._bar is not None:
             self._bar.update(self._task, completed=self.simulated_time, status=self._status())
@@ -155,14 +158,14 @@ class ProgressDisplay(_Display):
     def _status(self) -> str:
         """Phase, simulated time and, once time advances, how much faster than real time."""
         wall = time.monotonic() - self._phase_start[0]
-        advanced = self.simulated_time - self._phase_start[1]
+        advanced = self._time - self._phase_start[1]
         if advanced <= 0.0 or wall <= 0.0:
             return self._phase
         total = f" of {self._duration:.2f}" if self._duration else ""
         if not self._paced:
-            return f"{self._phase}, t = {self.simulated_time:.2f}{total} s"
+            return f"{self._phase}, t = {self._time:.2f}{total} s"
         factor = advanced / wall
-        return f"{self._phase} {self.simulated_time:.2f}{total} s, {factor:.1f} x real time"
+        return f"{self._phase} {self._time:.2f}{total} s, {factor:.1f} x real time"
 
 
 class CountDisplay(_Display):

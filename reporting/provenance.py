@@ -4,11 +4,14 @@ import json
 import os
 import re
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from pfsc_drake.codegen.manifest import MANIFEST as MANIFEST
+from pfsc_drake.codegen.manifest import manifest_text as manifest_text
+from pfsc_drake.codegen.manifest import read_manifest
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import find_status
 
@@ -80,7 +83,6 @@ def _version(distribution: str) -> str:
         return "unknown"
 
 
-MANIFEST = "manifest.json"
 FIGURES = "figures"
 RESULTS = (
     "scenario.yaml",
@@ -97,23 +99,11 @@ RESULTS = (
     "follow.yaml",
 )
 UNFINISHED = ".unfinished"  # a file while it is being written
+STAGED = ".next"  # folder of new results until they are complete
+READY = ".ready"  # and then, until they have replaced the earlier ones
 
 _FIGURE = re.compile(rf"{FIGURES}/\w+\.png")
 _PROGRAM = "pfsc_drake"
-
-
-def manifest_text(kind: str, files: Iterable[str], outcome: Mapping[str, Any] | None = None) -> str:
-    """Return the content of a manifest.
-
-    Args:
-        kind: Kind of results, e.g. ``run``.
-        files: Their names in the folder.
-        outcome: How it ended, if that is told.
-    """
-    content: dict[str, Any] = {"program": _PROGRAM, "results": kind, "files": list(files)}
-    if outcome is not None:
-        content["outcome"] = dict(outcome)
-    return json.dumps(content, indent=2) + "\n"
 
 
 def listed_results(folder: Path) -> list[str]:
@@ -124,6 +114,12 @@ def listed_results(folder: Path) -> list[str]:
     """
     manifest = _read_manifest(folder)
     return [] if manifest is None else manifest[1]
+
+
+def kind_of_results(folder: Path) -> str | None:
+    """Return the kind of results that the manifest of a folder names; None without one."""
+    manifest = _read_manifest(folder)
+    return None if manifest is None else manifest[0]
 
 
 def read_outcome(folder: Path, kind: str) -> dict[str, Any]:
@@ -168,7 +164,22 @@ def find_obstacle(folder: Path, kind: str, inputs: Sequence[Path]) -> str | None
     for name in _named_like_results(folder, names):
         if name not in own or not _is_regular(folder / name):
             return f"it holds {name}, which no {kind} has written"
+    for name in (STAGED, READY):
+        if name in names and not _is_staging(folder / name, kind):
+            return f"it holds {name}, which no {kind} has written"
     return None
+
+
+def _is_staging(folder: Path, kind: str) -> bool:
+    """Return whether a folder holds nothing but new results of a kind."""
+    if folder.is_symlink() or not folder.is_dir():
+        return False
+    known = {MANIFEST, UNFINISHED, FIGURES, *listed_results(folder)}
+    names = set(_names(folder))
+    if FIGURES in names and not (folder / FIGURES).is_dir():
+        return False
+    names |= set(_named_like_results(folder, [*names]))
+    return kind_of_results(folder) in (kind, None) and names <= known
 
 
 def _named_like_results(folder: Path, names: Sequence[str]) -> list[str]:
@@ -184,14 +195,11 @@ def _named_like_results(folder: Path, names: Sequence[str]) -> list[str]:
 
 def _read_manifest(folder: Path) -> tuple[str, list[str]] | None:
     """Kind of results and names of their files; None without manifest of this program."""
-    try:
-        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        if content["program"] != _PROGRAM:
-            return None
-        kind, names = str(content["results"]), [str(name) for name in content["files"]]
-    except (OSError, ValueError, KeyError, TypeError):
+    manifest = read_manifest(folder)
+    if manifest is None:
         return None
     # a manifest is a file like any other: it cannot name what no result is called
+    kind, names = manifest
     return kind, [name for name in names if name in RESULTS or _FIGURE.fullmatch(name)]
 
 

@@ -131,6 +131,7 @@ def run_app(app: typer.Typer, program: str, arguments: Sequence[str] | None = No
     """
     usage_error: Any = typer.BadParameter.__base__
     try:
+        _refuse_empty_out(sys.argv[1:] if arguments is None else arguments)
         status = app(
             args=None if arguments is None else list(arguments),
             prog_name=program,
@@ -145,6 +146,13 @@ def run_app(app: typer.Typer, program: str, arguments: Sequence[str] | None = No
         reason = one_line(error.format_message()).rstrip(".")
         return fail(f"{reason}; see {program} --help")
     return status if isinstance(status, int) else 0
+
+
+def _refuse_empty_out(arguments: Sequence[str]) -> None:
+    """Refuse a folder without a name, which a path takes for the current folder."""
+    for number, word in enumerate(arguments):
+        if word == "--out=" or (word == "--out" and [*arguments[number + 1 : number + 2]] == [""]):
+            raise InputError("--out '': no name of a folder; allowed: a folder, '.' for this one")
 
 
 @contextmanager

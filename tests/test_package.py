@@ -1,5 +1,6 @@
 """What is packaged: an installed wheel and a clone find the same models."""
 
+import ast
 import re
 import shutil
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import pfsc_drake
 from pfsc_drake import __version__
 from pfsc_drake.robot.models.files import models_directory
 
@@ -44,6 +46,20 @@ def test_wheel_carries_package_and_models():
     assert WHEEL["packages"] == ["pfsc_drake"]
     assert WHEEL["force-include"] == {"models": "pfsc_drake/models"}
     assert (ROOT / "pfsc_drake" / "py.typed").is_file()
+
+
+def test_type_checkers_see_what_users_import():
+    """The names that are loaded when they are used, from the modules that define them."""
+    tree = ast.parse((ROOT / "pfsc_drake" / "__init__.py").read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    assert ast.unparse(block.test) == "TYPE_CHECKING"
+    seen = {
+        alias.asname: statement.module
+        for statement in block.body
+        if isinstance(statement, ast.ImportFrom)
+        for alias in statement.names
+    }
+    assert seen == pfsc_drake._DOOR
 
 
 def test_models_of_a_wheel(tmp_path):

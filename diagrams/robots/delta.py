@@ -75,8 +75,9 @@ class DeltaPart(RobotPart):
     @property
     def coordinates(self) -> PlantCoordinates:  # type: ignore[override]
         """Slides and drives are one."""
-        size = 2 * self.robot.dimension
-        return PlantCoordinates(size, np.eye(size), np.eye(size), np.arange(self.robot.dimension))
+        names = tuple(self.robot.names)
+        size = 2 * len(names)
+        return PlantCoordinates(size, np.eye(size), np.eye(size), names, tuple(range(len(names))))
 
     @property
     def gravity(self) -> np.ndarray:

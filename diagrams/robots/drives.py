@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer
+from pydrake.systems.primitives import Adder, Multiplexer
 
 from diagrams.robots.belief import believed_robot
 from diagrams.robots.part import Drives, RobotPart
@@ -28,8 +28,9 @@ from pfsc_drake.physics.driver import DriveLowPass
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.physics.velocity_servo import BusDelay, VelocityServoLaw, joint_inertia, servo_gains
+from pfsc_drake.robot.inverse_kinematics import middle_posture
 from pfsc_drake.robot.models.parameters import load_parameters
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, mass_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.joint_friction import HoldingBrakes, JointFriction
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess, VelocityServo
@@ -39,6 +40,10 @@ from pfsc_drake.yaml.typed import spread
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
 _BRISTLES_PER_STEP = 0.5
+# share of that frequency of brakes, whose dampers act beside those of friction
+_OF_BRAKES = 0.3
+# of the links' inertia in the middle, what brakes of drives without a rotor count on
+_OF_LINKS = 0.25
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,8 @@ def add_drives(
 
     Returns:
         Further signals for the log, with servos ``drive_torque``, within its limits [Nm or N],
-        shape (N,), and ``servo_fault``, shape (1,); the servos, if there are any.
+        shape (N,), ``servo_fault`` and ``servo_stop_category``, each (1,); the servos, if there
+        are any.
 
     Raises:
         InputError: If the servos or the driver do not suit the robot or the controller.
@@ -116,7 +122,11 @@ def add_drives(
         servo = _add_servo(builder, chain, servos, ports, q_J)
         access, period = ServoAccess(servo), servo.period
         torque = servo.GetOutputPort("drive_torque")
-        signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
+        signals = {
+            "drive_torque": torque,
+            "servo_fault": servo.GetOutputPort("fault"),
+            "servo_stop_category": servo.GetOutputPort("stop_category"),
+        }
     if driver.low_pass > 0.0:
         filtering = DriveLowPass(chain.dimension, driver.low_pass, period)
         low_pass = builder.AddNamedSystem("drive_low_pass", BlockSystem(filtering, period))
@@ -178,7 +188,7 @@ def add_friction(
     part: RobotPart,
     joint_state: OutputPort,
     options: FrictionOptions,
-    faults: Sequence[OutputPort] = (),
+    stops: Sequence[OutputPort] = (),
 ) -> dict[str, OutputPort]:
     """Add friction and brakes, and return the friction's signal for the log.
 
@@ -187,7 +197,7 @@ def add_friction(
         part: The robot.
         joint_state: Its true ``[q_J, v_J, q_M, v_M]``.
         options: What there is of both.
-        faults: Nonzero after a fault, for the brakes.
+        stops: Stop categories that are requested, each (1,); without any there are no brakes.
 
     Returns:
         ``friction_torque``, positive against positive velocities [Nm or N], shape (N,).
@@ -195,21 +205,18 @@ def add_friction(
     Raises:
         InputError: If the friction does not suit the robot or the integration.
     """
-    drives, n, brakes = part.drives, part.robot.dimension, options.brakes
+    drives, n = part.drives, part.robot.dimension
     coefficients = _coefficients(options, part)
-    if coefficients is None and brakes is None:
-        return {}
-    if not np.all(drives.inertia > 0.0):
-        names = zip(part.robot.names, drives.inertia, strict=True)
-        without = ", ".join(name for name, inertia in names if not inertia > 0.0)
-        raise InputError(
-            f"{'faults.brakes' if coefficients is None else 'friction'}: needs a robot with "
-            f"rotor inertia in every drive, not so {without}: "
-            "write robot.elastic.rotor_inertia (kg m^2) and robot.elastic.gear_ratio"
-        )
     motors = np.eye(4 * n)[3 * n :]
     resistances, signals = [], {}
     if coefficients is not None:
+        if not np.all(drives.inertia > 0.0):
+            names = zip(part.robot.names, drives.inertia, strict=True)
+            without = ", ".join(name for name, inertia in names if not inertia > 0.0)
+            raise InputError(
+                f"friction: needs a robot with rotor inertia in every drive, not so {without}: "
+                "write robot.elastic.rotor_inertia (kg m^2) and robot.elastic.gear_ratio"
+            )
         bristles = _bristles(options, *coefficients, drives)
         friction = builder.AddNamedSystem(
             "joint_friction", JointFriction(bristles, options.friction.drift, motors)
@@ -217,13 +224,24 @@ def add_friction(
         builder.Connect(joint_state, friction.GetInputPort("velocity"))
         resistances.append(friction.GetOutputPort("resistance"))
         signals["friction_torque"] = friction.GetOutputPort("friction_torque")
-    if brakes is not None:
-        holding = _add_brakes(builder, part, options, brakes, faults)
-        velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(motors))
-        builder.Connect(joint_state, velocity.get_input_port())
-        builder.Connect(velocity.get_output_port(), holding.GetInputPort("velocity"))
-        resistances.append(holding.GetOutputPort("resistance"))
-    part.connect_resistance(builder, _sum(builder, resistances))
+    torque = _brake_torque(part.robot, options.brakes) if stops else None
+    if torque is not None:
+        assert options.brakes is not None
+        holding = replace(drives, inertia=_behind_brakes(part))
+        bristles = _bristles_now(options, torque, np.zeros(n), holding, _OF_BRAKES)
+        sizes = [port.size() for port in stops]
+        brakes = builder.AddNamedSystem(
+            "holding_brakes",
+            HoldingBrakes(bristles, sum(sizes), options.brakes.delay, options.period, motors),
+        )
+        together = builder.AddNamedSystem("all_stops", Multiplexer(sizes))
+        for i, port in enumerate(stops):
+            builder.Connect(port, together.get_input_port(i))
+        builder.Connect(together.get_output_port(), brakes.GetInputPort("request"))
+        builder.Connect(joint_state, brakes.GetInputPort("velocity"))
+        resistances.append(brakes.GetOutputPort("resistance"))
+    if resistances:
+        part.connect_resistance(builder, _sum(builder, resistances))
     return signals
 
 
@@ -237,34 +255,34 @@ def _sum(builder: DiagramBuilder, ports: list[OutputPort]) -> OutputPort:
     return adder.get_output_port()
 
 
-def _add_brakes(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    options: FrictionOptions,
-    parameters: BrakeParameters,
-    faults: Sequence[OutputPort],
-) -> HoldingBrakes:
-    """Add holding brakes that close after a fault.
+def _brake_torque(robot: RobotModel, brakes: BrakeParameters | None) -> np.ndarray | None:
+    """Return what brakes hold, shape (N,) [Nm or N]; None without brakes.
+
+    By default drives whose limits are not known have none.
 
     Raises:
-        InputError: If they do not suit the robot or the integration.
+        InputError: If the torques fit another number of joints.
     """
-    n, given = part.robot.dimension, np.array(parameters.torque, dtype=float)
+    if brakes is None:
+        return None
+    n, given = robot.dimension, np.array(brakes.torque, dtype=float)
     if given.size not in (0, 1, n):
         raise InputError(f"faults.brakes.torque: {given.size} values; the robot has {n} joints")
-    torque = np.broadcast_to(given, n) if given.size else part.robot.gather("effort_limit")
-    if not np.isfinite(torque).all():
-        raise InputError("faults.brakes.torque: the robot's drives have no limit; give numbers")
-    bristles = _bristles(options, np.array(torque), np.zeros(n), part.drives)
-    sizes, period = [port.size() for port in faults], options.period
-    brakes = builder.AddNamedSystem(
-        "holding_brakes", HoldingBrakes(bristles, sum(sizes), parameters.delay, period)
-    )
-    together = builder.AddNamedSystem("all_faults", Multiplexer(sizes))
-    for i, port in enumerate(faults):
-        builder.Connect(port, together.get_input_port(i))
-    builder.Connect(together.get_output_port(), brakes.GetInputPort("fault"))
-    return brakes
+    torque = np.array(np.broadcast_to(given, n)) if given.size else robot.gather("effort_limit")
+    return torque if np.isfinite(torque).all() else None
+
+
+def _behind_brakes(part: RobotPart) -> np.ndarray:
+    """Return the least inertia that each brake holds, shape (N,) [kg m^2 or kg].
+
+    Where a drive has none of its own that of the links is taken, a quarter of what it is in the
+    middle of the joints' ranges.
+    """
+    own = part.drives.inertia
+    if np.all(own > 0.0):
+        return own
+    M = np.array(mass_function(part.robot)(middle_posture(part.robot)))
+    return np.where(own > 0.0, own, _OF_LINKS / np.diag(np.linalg.inv(M + np.diag(own))))
 
 
 def believed_friction(
@@ -297,15 +315,21 @@ def _bristles(
     """Return friction whose bristles suit how the plant is integrated, however it drifts."""
     drift = options.friction.drift
     stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
-    return replace(_bristles_now(options, stiffest, f_v, drives), coulomb=f_c)
+    now = _bristles_now(options, stiffest, f_v, drives, 1.0)
+    return replace(now, coulomb=f_c)
 
 
 def _bristles_now(
-    options: FrictionOptions, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
+    options: FrictionOptions,
+    f_c: np.ndarray,
+    f_v: np.ndarray,
+    drives: Drives,
+    share: float,
 ) -> BristleFriction:
+    """Return friction with bristles of a share of the frequency that the step allows."""
     if drives.step is not None:
         return bristles_for_step(
-            f_c, f_v, drives.inertia, drives.step, frequency=_BRISTLES_PER_STEP
+            f_c, f_v, drives.inertia, drives.step, frequency=share * _BRISTLES_PER_STEP
         )
     simulation = options.simulation
     allowed = (AUTO, *FRICTION_INTEGRATORS)
@@ -316,7 +340,7 @@ def _bristles_now(
         )
     # stiff enough for the step of the integration, or of the hold if that is shorter
     step = min(simulation.max_step, options.period)
-    return bristles_for_step(f_c, f_v, drives.inertia, step)
+    return bristles_for_step(f_c, f_v, drives.inertia, step, frequency=share)
 
 
 def _coefficients(

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagrams.scenario.checks import posture_text
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.inverse_kinematics import ToolTarget, middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain

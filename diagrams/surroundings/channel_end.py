@@ -18,8 +18,8 @@ class ChannelEnd(LeafSystem):
     It waits for the clock, so that a simulation is never ahead of it, unless it is driven by one.
 
     Ports:
-        sent (input): Message of this side, shape (14,).
-        arrived (output): Newest message of the other one, shape (14,), that was there at the last
+        sent (input): Message of this side, shape (15,).
+        arrived (output): Newest message of the other one, shape (15,), that was there at the last
             tick; zero before.
 
     Args:

@@ -146,16 +146,21 @@ class DrivePlanner(MotionDemand):
         said = f"whether the drives can follow the reference is not known: its course is {error}"
         return DrivePlan(empty, nothing, nothing, self.limits, empty, self._task.motion, [said])
 
-    def course(self, longest: float) -> tuple[float, np.ndarray]:
+    def course(
+        self, longest: float, added: Callable[[np.ndarray], np.ndarray] | None = None
+    ) -> tuple[float, np.ndarray]:
         """Return the joints' course on an even grid of the time asked for, and its step [s].
 
         Args:
             longest: From sample to sample [s].
+            added: Derivatives 0..r that are added to those of the reference at times [s], shape
+                (samples, r + 1, m), if any are.
 
         Raises:
             InputError: If the joints cannot follow.
         """
-        return self.course_of(self._task.motion, self._step(longest), still=longest > _CHECKED)
+        still = longest > _CHECKED
+        return self.course_of(self._task.motion, self._step(longest), still=still, added=added)
 
     def _step(self, longest: float) -> float:
         """Return how far samples may be apart [s]: narrow bends need more of them."""

@@ -228,8 +228,8 @@ def add_law(
         forces: Forces of ``wrench_ext`` and ``wrench_measured`` what there is.
 
     Returns:
-        The controller, and its signals ``reference`` and ``law``; with compliance also
-        ``desired_reference`` and ``manifold_force``, with what estimates friction
+        The controller, and its signals ``reference``, ``law`` and ``stop_category``; with
+        compliance also ``desired_reference`` and ``manifold_force``, with what estimates friction
         ``friction_estimate``, with what observes forces ``tau_ext_observed`` and
         ``wrench_observed``.
 
@@ -250,7 +250,7 @@ def add_law(
         place.predictor,
         carries=following.carries,
     )
-    made |= {"law": controller.GetOutputPort("law")}
+    made |= {name: controller.GetOutputPort(name) for name in ("law", "stop_category")}
     desired = place.desired_reference
     if desired is None:
         guidance = _add_guidance(builder, following, signals)

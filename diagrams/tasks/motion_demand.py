@@ -1,5 +1,7 @@
 """What a task's motion asks of the drives, as they are believed."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from diagrams.scenario import ReferenceParameters
@@ -72,7 +74,12 @@ class MotionDemand:
         self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
 
     def course_of(
-        self, motion: PiecewisePolynomialCurve, step: float, *, still: bool
+        self,
+        motion: PiecewisePolynomialCurve,
+        step: float,
+        *,
+        still: bool,
+        added: Callable[[np.ndarray], np.ndarray] | None = None,
     ) -> tuple[float, np.ndarray]:
         """Return the joints' course on an even grid of a motion's time, and its step [s].
 
@@ -80,11 +87,15 @@ class MotionDemand:
             motion: Tangential coordinates over time.
             step: From sample to sample at most [s].
             still: Whether joints beyond the outputs only move with them, as little as they can.
+            added: Derivatives 0..r that are added to those of the reference at times [s], shape
+                (samples, r + 1, m), if any are.
 
         Raises:
             InputError: If the joints cannot follow.
         """
         times, reference = self._sampled(motion, step)
+        if added is not None:
+            reference += added(times)
         frames = self._frames(times)
         course = self._finder.find(self._start, reference, times, still=still, frames=frames)
         return float(times[1]), self._continued(course, times[1])

@@ -17,7 +17,6 @@ from diagrams.scenario import (
     Streamed,
     Waypoints,
 )
-from diagrams.tasks.manifold_warnings import far_waypoints, turning_back
 from diagrams.tasks.surface import make_surface
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
@@ -35,6 +34,7 @@ from pfsc_drake.geometry import (
     path_from_waypoints,
     read_waypoints,
 )
+from pfsc_drake.geometry.paths.path_warnings import far_waypoints, turning_back
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION
 from pfsc_drake.geometry.surfaces.surface import Surface

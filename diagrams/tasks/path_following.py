@@ -16,7 +16,6 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.checks import require
 from diagrams.tasks.drawing import PathDrawing
-from diagrams.tasks.manifold_warnings import closing_gap, euler_warnings, path_warnings
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
 from diagrams.tasks.surface import followed_angles, require_joints
@@ -33,6 +32,7 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.path import PathTarget
+from pfsc_drake.geometry.paths.path_warnings import closing_gap, euler_warnings, path_warnings
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.block_system import BlockSystem
 
@@ -92,6 +92,7 @@ class PathTask(Task):
             "oriented": self.path.orientation is not None,
             **followed_angles(said),
             "turning": self.path.frame.turns,
+            "length": None if self.path.closed else self.path.length,
         }
         self.place = PathManifold(self.relative_degree, **followed)
         self.manifold = self._law_manifold(self.relative_degree, **followed)

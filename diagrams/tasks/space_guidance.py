@@ -11,7 +11,6 @@ from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.drawing import SpaceDrawing
 from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.guides import make_guides
-from diagrams.tasks.manifold_warnings import euler_warnings
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead
@@ -19,6 +18,7 @@ from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.followed import Guided
 from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix
+from pfsc_drake.geometry.paths.path_warnings import euler_warnings
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.hand_way import Place
 

@@ -14,7 +14,6 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.checks import require, require_numbers
 from diagrams.tasks.drawing import SurfaceDrawing
-from diagrams.tasks.manifold_warnings import euler_warnings
 from diagrams.tasks.surface import (
     given_quaternion,
     make_surface,
@@ -27,6 +26,7 @@ from pfsc_drake.control.law.reference import straight_lines, together
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry.paths.path_warnings import euler_warnings
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator

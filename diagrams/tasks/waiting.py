@@ -1,5 +1,6 @@
 """Progress that waits for obstacles: what is known beforehand of the arm's way, and of stops."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from diagrams.tasks.path_following import TrajectoryTask
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.linearization import virtual_output_function
+from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.control.law.waiting_reference import WaitingReference
 from pfsc_drake.control.obstacles.elbow_room import ElbowRoom
 from pfsc_drake.control.obstacles.obstacle_watch import ArmAhead
@@ -21,8 +24,12 @@ from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.waiting import COURSE_STEP, JointCourse, add_waiting, waiting_motion
+from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.systems.block_system import BlockSystem
+
+# m or rad, from which on a tool starts beside its path
+_AT_THE_PATH = 5e-3
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,55 @@ class Waiting:
     pace: WaitingPace
 
 
+@dataclass(frozen=True)
+class Approach:
+    """Way of the tool from where it starts to its path.
+
+    Attributes:
+        q_J: Joint coordinates at the start, shape (N,).
+        duration: How long it takes [s], ``start.transition``.
+    """
+
+    q_J: np.ndarray
+    duration: float
+
+    def reference(
+        self, task: Task, law: FollowingLaw, start: CourseStart
+    ) -> Callable[[np.ndarray], np.ndarray] | None:
+        """Return what is added to derivatives 0..r of the reference at times [s], if anything is.
+
+        Args:
+            task: What the tool is to do.
+            law: The law that does it.
+            start: Where the robot starts.
+
+        Raises:
+            InputError: If the tool starts beside its path and would come to it at once.
+        """
+        robot, linearization = law.robot, law.linearization
+        y_t = np.array(pose_function(robot)(self.q_J)).ravel()[:3]
+        point = task.evaluate(y_t, start.memory)
+        output = virtual_output_function(robot, linearization.manifold)
+        distance = np.array(output(self.q_J, np.zeros(robot.dimension), point))[:, 0]
+        begun = task.motion.derivatives(task.motion.domain[:1], 0)[0, 0]
+        distance[: len(begun)] -= begun
+        if self.duration == 0.0:
+            far = float(np.abs(distance).max())
+            allowed = (
+                f"0.1 to 10 s where the tool starts beside its path (by {far:.3g} m or rad): only "
+                "a transition waits for obstacles"
+            )
+            require(far < _AT_THE_PATH, "start.transition", self.duration, allowed)
+            return None
+        transition = Transition(self.duration, linearization.relative_degree)
+
+        def added(times: np.ndarray) -> np.ndarray:
+            shares = np.array([transition.at(time).full().ravel() for time in times.tolist()])
+            return shares[:, :, None] * distance
+
+        return added
+
+
 def plan_waiting(
     crossing: CrossingParameters,
     reference: ReferenceParameters,
@@ -48,6 +104,7 @@ def plan_waiting(
     law: FollowingLaw,
     start: CourseStart,
     friction: tuple[np.ndarray, np.ndarray] | None,
+    approach: Approach,
 ) -> Waiting:
     """Return how the progress of a task waits for obstacles.
 
@@ -59,6 +116,7 @@ def plan_waiting(
         law: The law that does it.
         start: Where the robot starts.
         friction: Coefficients f_c and f_v that the drives overcome besides, if any are believed.
+        approach: How the tool comes to the path, which waits for obstacles as progress does.
 
     Raises:
         InputError: If nothing is followed that could wait, or the arm's way is not known.
@@ -77,7 +135,7 @@ def plan_waiting(
     watch = crossing.watch
     planner = DrivePlanner(reference, controller, 0.0, task, law, start, friction)
     try:
-        step, course = planner.course(COURSE_STEP)
+        step, course = planner.course(COURSE_STEP, approach.reference(task, law, start))
     except InputError as error:
         raise InputError(f"obstacles: the course of the reference is {error}") from None
     allowed_demand = planner.allowed(course, watch.reserve)
@@ -107,8 +165,8 @@ def add_waiting_reference(
             another pace.
 
     Returns:
-        ``reference``, and for the log ``clock`` and ``watch``; of an elbow that gives way
-        ``posture_torque``.
+        ``reference`` and its ``own_time``, and for the log ``clock`` and ``watch``; of an elbow
+        that gives way ``posture_torque``.
     """
     timed = WaitingReference(task.motion, waiting.pace, outputs, period)
     shapes = [obstacle.shape for obstacle in waiting.crossing.moving]
@@ -136,5 +194,6 @@ def add_waiting_reference(
     return made | {
         "reference": generator.GetOutputPort("reference"),
         "clock": generator.GetOutputPort("clock"),
+        "own_time": generator.GetOutputPort("own_time"),
         "watch": watch.GetOutputPort("record"),
     }

@@ -40,7 +40,7 @@ class _Block:
 
 def scenario_keys() -> str:
     """Return all keys of a scenario as Markdown: blocks in the order of a file."""
-    found = _blocks()
+    found = blocks()
     several = [block for block in found.values() if len(block.places) > 1]
     page = [_own_table(Scenario)]
     for field in dc.fields(Scenario):
@@ -79,7 +79,7 @@ def _top(place: str) -> str:
     return re.split(r"[.\[ ]", place)[0]
 
 
-def _blocks() -> dict[type, _Block]:
+def blocks() -> dict[type, _Block]:
     """Return all blocks by their classes, in the order in which a file may have them."""
     found: dict[type, _Block] = {}
 

@@ -3,6 +3,8 @@
 import inspect
 import re
 
+from pfsc_drake.yaml.bounds import attribute_text
+
 _ROLE = re.compile(r":\w+(?::\w+)*:`~?([^`]+)`")
 _LITERAL = re.compile(r"``([^`]+)``")
 # of the sections of a docstring, which begin what is no description
@@ -51,12 +53,10 @@ def attribute(owner: type, name: str) -> str:
     Raises:
         ValueError: If nobody says anything.
     """
-    entry = re.compile(rf"^    {name}: (.*(?:\n        .*)*)", re.MULTILINE)
-    for base in owner.__mro__:
-        found = entry.search(inspect.cleandoc(base.__dict__.get("__doc__") or ""))
-        if found:
-            return " ".join(found[1].split())
-    raise ValueError(f"{owner.__name__}.{name}: no docstring says what it is")
+    text = attribute_text(owner, name)
+    if text is None:
+        raise ValueError(f"{owner.__name__}.{name}: no docstring says what it is")
+    return text
 
 
 def table(head: list[str], rows: list[list[str]], kind: str = "") -> str:

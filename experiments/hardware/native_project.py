@@ -151,6 +151,7 @@ def write_native(
             presets=part.presets(station, root),
             scenario=settings.name,
             hash=scenario.fingerprint,
+            turning=tuple(station.robot.gather("is_revolute").tolist()),
         )
         inputs = [port["name"] for port in controller.interface()["inputs"]]
         unknown = [name for name in inputs if name not in _TOLD]

@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context
 from diagrams.robot_station import RobotStation
 from diagrams.scenario import Scenario
 from experiments.simulation import configure
-from pfsc_drake.checks import require_between, require_not_negative
+from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import DriverOptions, DriverRules
 from pfsc_drake.drivers.link import RobotEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotStatus
@@ -20,6 +20,7 @@ from pfsc_drake.physics.velocity_servo import joint_inertia
 from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6
+_MOST_LATE = 10_000  # ticks by which commands come later
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Transport:
 
     def __post_init__(self) -> None:
         require_between("--lose", self.lose, 0.0, 1.0, "")
-        require_not_negative("--delay", self.delay)
+        require_between("--delay", self.delay, 0, _MOST_LATE, "ticks")
 
 
 class SimulatedRobot:

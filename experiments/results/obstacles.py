@@ -1,7 +1,7 @@
 """Obstacles that cross a path: their distance from the arm, and what waiting for them costs.
 
 Signals used, as in the log: ``obstacle_position`` [samples, 3K] m, ``obstacle_distance``
-[samples, K] m, ``time_lost`` [samples, 1] s, ``eta`` [samples, k] m.
+[samples, K] m, ``arm_speed`` [samples, 1] m/s, ``time_lost`` [samples, 1] s.
 """
 
 import numpy as np
@@ -38,6 +38,7 @@ def add_obstacles(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> 
     if len(q_J):
         arm = outline_points(chain, outline).map(len(q_J))(q_J.T).full().T
     shapes = [obstacle.shape for obstacle in crossing.moving]
+    log.add("arm_speed", _fastest(arm, log.time))
     distance = least_distances(arm, log["obstacle_position"].values, shapes, radius)
     margin = np.array([[crossing.watch.margin, np.inf]])
     names = [f"obstacle_{k + 1}" for k in range(count)]
@@ -53,6 +54,14 @@ def add_obstacles(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> 
     if running.size:
         late[running[-1] + 1 :] = late[running[-1]]
     log.add("time_lost", late)
+
+
+def _fastest(arm: FloatArray, time: FloatArray) -> FloatArray:
+    """Return the largest speed of the points of an arm's outline [m/s], shape (samples,)."""
+    if len(time) < 2:
+        return np.zeros(len(time))
+    velocity = np.gradient(arm, time, axis=0).reshape(len(time), -1, 3)
+    return np.asarray(np.linalg.norm(velocity, axis=2).max(axis=1))
 
 
 def _positions(states: FloatArray, count: int) -> FloatArray:
@@ -73,7 +82,8 @@ def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metric
     # where the robot stands elsewhere nobody may have told of them
     known = np.isfinite(least)
     metrics.add("least_distance", float(least[known].min()) if known.any() else np.nan)
-    moving = moves(log, crossing.watch.resting_speed) & known
+    # however it moves: along its path, to it, beside it, or with its elbow
+    moving = known & (log["arm_speed"].values[:, 0] > crossing.watch.resting_speed)
     metrics.add(
         "least_distance_while_moving", float(least[moving].min()) if moving.any() else np.nan
     )
@@ -82,16 +92,3 @@ def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metric
     speed = np.linalg.norm(np.gradient(position, log.time, axis=0), axis=2)
     metrics.add("largest_obstacle_speed", peak(speed[np.isfinite(speed)]))
     return metrics
-
-
-def moves(log: RunLog, resting_speed: float) -> np.ndarray:
-    """Return when the tool is faster along its path than what counts as rest, shape (samples,).
-
-    Args:
-        log: With ``eta``.
-        resting_speed: [m/s].
-    """
-    if log.time.size < 2:
-        return np.zeros(log.time.size, dtype=bool)
-    speed = np.linalg.norm(np.gradient(log["eta"].values, log.time, axis=0), axis=1)
-    return np.asarray(speed > resting_speed)

@@ -26,9 +26,12 @@ from reporting.registry import possible_metrics
 _ALWAYS = (
     *("deepest_violation", "max_unanswered_force", "past_known_way"),
     *("least_port_tank", "energy_margin", "least_distance_while_moving"),
+    *("motion_after_fault", "slide_motion_after_fault"),
 )
 # m, by which a tool may be past the end of what it knows of its path: it follows its reference
 _PAST = 1e-3
+# m, that leader and follower may be apart in the end because energy lacks to tell it
+_OWED = 1e-3
 # how far a tool is from where it should be, the first of them that a run has, and from when on
 # that is worth a word [m]
 _DISTANCES = ("max_error_from_compliant_reference", "max_path_deviation")
@@ -102,6 +105,8 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     for name in ("least_port_tank", "energy_margin"):
         if way is not None and way.passive and name in metrics:
             metrics.set_target(name, ">= 0", "teleoperation.passive")
+    if way is not None and "owed_distance_end" in metrics:
+        metrics.set_target("owed_distance_end", f"<= {_OWED:g}", "leader and follower meet")
     if "past_known_way" in metrics:
         metrics.set_target("past_known_way", f"<= {_PAST:g}", "room to stop")
     for name, target in settings.targets.get(settings.controller.law, {}).items():
@@ -116,12 +121,12 @@ def broken_promises(metrics: Metrics, *, whole: bool) -> list[str]:
     Args:
         metrics: With their targets. One without a value has missed its target.
         whole: Whether the run lasted as long as its scenario, without a fault. Of others only
-            those promises count that hold at every instant.
+            those promises count that hold at every instant, and of which there is a value.
     """
     return [
         _phrase(name, metric)
         for name, metric in metrics.items()
-        if metric.passed is False and (whole or name in _ALWAYS)
+        if metric.passed is False and (whole or (name in _ALWAYS and not math.isnan(metric.value)))
     ]
 
 

@@ -189,6 +189,12 @@ def _add_manifold(log: RunLog, station: Station, raw: dict[str, np.ndarray], Y: 
     log.add("virtual_input", law[:, layout.virtual_input], unit, names)
     status = law[:, layout.status]
     log.add("fault", status[:, 0].astype(int), labels=[fault.name.lower() for fault in Fault])
+    requested = raw["stop_category"]
+    if "servo_stop_category" in raw:
+        requested = np.hstack([requested, raw["servo_stop_category"]])
+    # the lowest category is the most urgent, and below 0 there is none
+    urgent = np.where(requested < 0.0, np.inf, requested).min(axis=1)
+    log.add("stop_category", np.where(np.isfinite(urgent), urgent, -1.0).astype(int))
     log.add("rcond", status[:, 1])
     log.add("saturated_drives", status[:, 2].astype(int))
 

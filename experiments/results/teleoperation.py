@@ -52,18 +52,20 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     Returns:
         ``following_delay`` [s] and ``following_error`` [m]: by which delay the tool follows best,
         and how far it is from there, rms; ``led_distance_end`` [m]: between the two when all is
-        over; ``largest_felt_force`` [N]; ``least_port_tank`` [J]; ``energy_margin`` [J]: how far
-        the work of the hand and of what the tool touches, as it truly was, stayed above what was
-        stored at the start; with six axes ``led_turn_end`` [rad] and ``largest_felt_moment`` [Nm],
-        and moments do work, too; ``audit_ports`` [J]: beside the law of the tanks;
-        ``audit_channel`` [J]: what arrived beyond what was sent. Of a follower alone, whose leader
-        is in another process, what its own tank tells.
+        over; ``owed_distance_end`` [m]: what of it a side could not tell for want of energy;
+        ``largest_handle_speed`` [m/s]; ``largest_felt_force`` [N]; ``least_port_tank`` [J];
+        ``energy_margin`` [J]: how far the work of the hand and of what the tool touches, as it
+        truly was, stayed above what was stored at the start; with six axes ``led_turn_end`` [rad]
+        and ``largest_felt_moment`` [Nm], and moments do work, too; ``audit_ports`` [J]: beside the
+        law of the tanks; ``audit_channel`` [J]: what arrived beyond what was sent. Of a follower
+        alone, whose leader is in another process, what its own tank tells.
     """
     metrics = Metrics()
     way = settings.teleoperation
     if way is None or "port_force" not in log or log.time.size < 2:
         return metrics
     metrics.add("least_port_tank", float(log["port_tank"].values.min()))
+    metrics.add("owed_distance_end", float(log["port_owed"].values[-1].max()))
     metrics.add("audit_ports", tank_residual(log, way.tank.capacity if way.passive else np.inf))
     if "led_point" not in log:
         return metrics
@@ -72,6 +74,7 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     metrics.add("following_error", error)
     apart = log["led_point"].values[-1] - log["y_t"].values[-1]
     metrics.add("led_distance_end", float(np.linalg.norm(apart)))
+    metrics.add("largest_handle_speed", handle_speed(log))
     felt = np.linalg.norm(log["leader_force"].values, axis=1)
     metrics.add("largest_felt_force", float(felt.max()))
     if "led_orientation" in log:
@@ -83,6 +86,36 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     metrics.add("energy_margin", float(energy_above_bound(log, scale).min()))
     metrics.add("audit_channel", float(np.max(-stored_in_channel(log), initial=0.0)))
     return metrics
+
+
+def handle_speed(log: RunLog) -> float:
+    """Return the largest speed of the leader's handle from sample to sample [m/s].
+
+    Args:
+        log: With ``leader_position``, of two samples at least.
+    """
+    steps = np.linalg.norm(np.diff(log["leader_position"].values, axis=0), axis=1)
+    return float(np.max(steps / np.diff(log.time)))
+
+
+def handle_warnings(log: RunLog, settings: Scenario) -> list[str]:
+    """Return a sentence if the handle was faster than its side may count on.
+
+    Args:
+        log: Log of a run.
+        settings: Its scenario.
+    """
+    way = settings.teleoperation
+    if way is None or "leader_position" not in log or log.time.size < 2:
+        return []
+    speed, largest = handle_speed(log), way.leader.largest_speed
+    if speed <= largest:
+        return []
+    return [
+        f"the handle moved at up to {speed:.3g} m/s, faster than teleoperation.leader.largest_speed"
+        f" = {largest:g} m/s: a force may take more energy in a sample than the leader's reserve "
+        "holds, and its tank may fall below zero until that is paid back"
+    ]
 
 
 def _following(log: RunLog) -> tuple[float, float]:

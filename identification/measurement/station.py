@@ -159,7 +159,8 @@ def _add_encoders(
     """Return positions and velocities as the servo measures them, shape (2N,)."""
     n = subject.dimension
     size = 2 * n
-    same = PlantCoordinates(size, np.eye(size), np.eye(size), np.arange(n))
+    names = tuple(subject.robot.names)
+    same = PlantCoordinates(size, np.eye(size), np.eye(size), names, tuple(range(n)))
     increments = faults.encoder_increments.tolist()
     options = EncoderOptions(increments, increments, difference_quotient=True)
     block = JointEncoders(subject.robot, options, servo.period)

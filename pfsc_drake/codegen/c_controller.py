@@ -13,12 +13,21 @@ import numpy as np
 
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
+from pfsc_drake.codegen.c_faults import CFault, fault_sentences
+from pfsc_drake.codegen.manifest import MANIFEST, refuse_foreign, write_own
 from pfsc_drake.compiled.c_source import c_source, parameters
 from pfsc_drake.compiled.operations import Untranslatable
 from pfsc_drake.errors import InputError
 
 _FUNCTIONS = "controller_functions"
 _DOUBLE = 8  # bytes
+# what may be NaN before it is first measured, and stops the motion until then
+_UNKNOWN_AT_START = "obstacles"
+# of joints that turn, and that slide; the longer ones first
+_UNITS_OF_JOINTS = (
+    *(("rad, rad/s", "m, m/s"), ("rad/s", "m/s"), ("rad", "m")),
+    *(("Nm s/rad", "N s/m"), ("Nm", "N")),
+)
 _HEADER = """\
 /* {title}
 
@@ -38,6 +47,7 @@ extern "C" {{
 typedef struct {{
     double tick; /* number of the next tick */
     double x[{size}];
+    double phase; /* initialized, or a fault that stays until it is again */
 }} controller_state;
 
 typedef struct {{
@@ -48,10 +58,11 @@ typedef struct {{
 {outputs}
 }} controller_outputs;
 
-/* Begin where the inputs say. */
+/* Begin where the inputs say; if they are no start, every step is a fault. */
 void controller_initialize(controller_state *state, const controller_inputs *inputs);
 
-/* Evaluate one tick; returns the fault, 0 for none. */
+/* Evaluate one tick; returns the fault, 0 for none. From {first} on there is no state to
+   stop from: all outputs but the fault are 0. */
 int controller_step(
     controller_state *state, const controller_inputs *inputs, controller_outputs *outputs);
 
@@ -68,20 +79,57 @@ _SOURCE = """\
 
 #include "{functions}.h"
 
+#define INITIALIZED 4503601774854145.0 /* which memory does not hold by chance */
+#define LARGEST_START 1e9
+
+static int is_valid(const double *values, size_t size)
+{{
+    size_t i;
+    for (i = 0; i < size; ++i) {{
+        if (!(values[i] >= -LARGEST_START && values[i] <= LARGEST_START)) {{
+            return 0;
+        }}
+    }}
+    return 1;
+}}
+
+static int refuse(controller_state *state, controller_outputs *outputs, int fault)
+{{
+    memset(outputs, 0, sizeof *outputs);
+    outputs->{fault}[0] = fault;{status}
+    state->phase = fault;
+    return fault;
+}}
+
 void controller_initialize(controller_state *state, const controller_inputs *inputs)
 {{
-    {unused}state->tick = 0.0;
-    {functions}_initial({initial});
+    {unused}memset(state, 0, sizeof *state);
+    state->phase = {start_invalid};
+    if ({is_valid}) {{
+        {functions}_initial({initial});
+        state->phase = INITIALIZED;
+    }}
 }}
 
 int controller_step(
     controller_state *state, const controller_inputs *inputs, controller_outputs *outputs)
 {{
     double x_next[{size}];
+    double fault;
+    if (state->phase == {start_invalid} || state->phase == {fault_invalid}) {{
+        return refuse(state, outputs, (int)state->phase);
+    }}
+    if (state->phase != INITIALIZED) {{
+        return refuse(state, outputs, {not_initialized});
+    }}
     {functions}_step({step});
     memcpy(state->x, x_next, sizeof x_next);
     state->tick += 1.0;
-    return {fault};
+    fault = outputs->{fault}[0];
+    if (!(fault >= 0.0 && fault < {not_initialized})) {{
+        return refuse(state, outputs, {fault_invalid});
+    }}
+    return (int)fault;
 }}
 """
 
@@ -97,6 +145,8 @@ class CController:
         presets: States that it begins with, by name; the others are what the inputs say.
         scenario: Name of what it was made from.
         hash: SHA-256 of that.
+        turning: Whether each joint turns, else it slides; ports name both units if it is empty, or
+            where some do.
     """
 
     program: Program
@@ -105,6 +155,7 @@ class CController:
     presets: Mapping[str, np.ndarray] = field(default_factory=dict)
     scenario: str = ""
     hash: str = ""
+    turning: tuple[bool, ...] = ()
 
     @classmethod
     def of(cls, network: Network, period: float, **about: Any) -> "CController":
@@ -135,12 +186,19 @@ class CController:
         step, initial = self._step, self._initial
         size = max(self.program.size, 1)
         given = {"x": "state->x", "t": "&state->tick", "x_next": "x_next"}
-        fault = f"(int) outputs->{_identifier('fault')}[0]"
+        network = self.program.network
+        checked = [
+            f"is_valid(inputs->{_identifier(name)}, {network.inputs[name].size})"
+            for name in self.program.initial_inputs
+            if not name.startswith(_UNKNOWN_AT_START)
+        ]
+        status = "status" in network.outputs
         return self._functions | {
             "controller.h": _HEADER.format(
                 title=self.title,
                 period=self.period,
                 drives=self.interface()["outputs"][0]["size"],
+                first=int(CFault.NOT_INITIALIZED),
                 size=size,
                 inputs=_members(self.interface()["inputs"]),
                 outputs=_members(self.interface()["outputs"]),
@@ -148,10 +206,15 @@ class CController:
             "controller.c": _SOURCE.format(
                 functions=_FUNCTIONS,
                 size=size,
-                unused="" if initial.n_in() > 1 else "(void)inputs;\n    ",
+                unused="" if checked else "(void)inputs;\n    ",
+                is_valid=" && ".join(checked) or "is_valid(&state->tick, 1)",
                 initial=", ".join(self._arguments(initial, given | {"x_start": "state->x"})),
                 step=", ".join(self._arguments(step, given)),
-                fault=fault,
+                fault=_identifier("fault"),
+                status=f"\n    outputs->{_identifier('status')}[0] = fault;" if status else "",
+                not_initialized=int(CFault.NOT_INITIALIZED),
+                start_invalid=int(CFault.START_INVALID),
+                fault_invalid=int(CFault.FAULT_INVALID),
             ),
             "interface.json": json.dumps(self.interface(), indent=2) + "\n",
         }
@@ -161,34 +224,43 @@ class CController:
 
         Args:
             folder: Made if it does not exist.
+
+        Raises:
+            InputError: If the folder holds other files of these names, or cannot be written.
         """
-        folder.mkdir(parents=True, exist_ok=True)
-        written = []
-        for name, text in self.files().items():
-            (folder / name).write_text(text, encoding="utf-8")
-            written.append(folder / name)
-        return written
+        files = {name: text.encode("utf-8") for name, text in self.files().items()}
+        refuse_foreign(folder, (*files, MANIFEST))
+        return write_own(folder, files)
 
     def interface(self) -> dict[str, Any]:
         """Return what ``interface.json`` says."""
         network = self.program.network
         inputs = [
-            {"name": name, "size": port.size, "unit": port.unit}
+            {"name": name, "size": port.size, "unit": self._unit(port.unit)}
             for name, port in network.inputs.items()
         ]
         outputs = [
-            {"name": name, "size": network.wires[wire], "unit": network.units[name]}
+            {"name": name, "size": network.wires[wire], "unit": self._unit(network.units[name])}
             for name, wire in network.outputs.items()
         ]
         return {
             "inputs": inputs,
             "outputs": outputs,
-            "state_bytes": _DOUBLE * (1 + max(self.program.size, 1)),
+            "faults": {str(number): text for number, text in fault_sentences().items()},
+            "state_bytes": _DOUBLE * (2 + max(self.program.size, 1)),
             "sampling_time": self.period,
             "table_bytes": self.table_bytes,
             "scenario": self.scenario,
             "hash": self.hash,
         }
+
+    def _unit(self, unit: str) -> str:
+        """Return a port's unit as it is for joints that all turn, or all slide."""
+        if not self.turning or any(self.turning) != all(self.turning):
+            return unit
+        for turns, slides in _UNITS_OF_JOINTS:
+            unit = unit.replace(f"{turns} or {slides}", turns if all(self.turning) else slides)
+        return unit
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the states that are set before the start, and which: ``x`` and ``preset``."""

@@ -1,6 +1,5 @@
 """Any diagram of blocks that controls as a project in C99, in one call."""
 
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,6 +8,8 @@ from pydrake.systems.framework import Diagram
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.codegen.c_controller import CController
+from pfsc_drake.codegen.manifest import MANIFEST, refuse_foreign, write_own
+from pfsc_drake.errors import require
 from pfsc_drake.systems.fuse import fuse
 
 
@@ -26,6 +27,7 @@ def export(
         controller: Diagram of blocks with an output ``fault``, its first output what drives are
             told, as a :class:`~pfsc_drake.Follower` is.
         folder: Where the files go; made if it does not exist. What they are is in ``README.md``.
+            Files of earlier exports are replaced, others never: the folder is refused then.
         inputs: Values of all inputs at some ticks, each (ticks, size), which are recorded with
             what the controller makes of them, to be repeated in C; no record if omitted.
 
@@ -33,8 +35,11 @@ def export(
         The controller in C.
 
     Raises:
-        InputError: If a part is no block, there is no ``fault``, or inputs do not suit.
+        InputError: If a part is no block, there is no ``fault``, inputs do not suit, or the folder
+            holds files of these names that no export has written, or that were changed since.
     """
+    require(str(folder) != "", "folder", "''", "a folder")
+    check_project(Path(folder))
     whole = fuse(controller)
     title = controller.get_name() or "Controller"
     exported = CController.of(whole.network, whole.period, title=title)
@@ -56,6 +61,7 @@ def _recorded(controller: CController, inputs: Mapping[str, np.ndarray]) -> np.n
 
 
 LOG = "replay.bin"
+_README_NAME = "README.md"
 _HARNESS = Path(__file__).parent / "harness"
 _README = """\
 # {title}
@@ -68,6 +74,11 @@ Generated C99: no allocation, nothing but the mathematical library, no memory bu
     fault = controller_step(&state, &inputs, &outputs);   /* every {period:g} s */
 
 A fault other than 0 holds until the next `controller_initialize`; the outputs then stop the robot.
+With faults above 100 there is no state to stop it from: drives get 0, and brakes have to hold it.
+
+| fault | cause |
+|---|---|
+{faults}
 
 | input | size | unit |
 |---|---|---|
@@ -105,31 +116,46 @@ def write_project(
             shape (ticks, inputs and outputs), for ``replay.bin``.
 
     Raises:
-        InputError: If something has no translation to C.
+        InputError: If something has no translation to C, or the folder is refused.
     """
-    written = controller.write(folder)
-    for file in sorted(file for file in _HARNESS.iterdir() if file.is_file()):
-        written.append(Path(shutil.copyfile(file, folder / file.name)))
+    files = {name: text.encode("utf-8") for name, text in controller.files().items()}
+    files |= {file.name: file.read_bytes() for file in _harness()}
     if recorded is not None:
-        written.append(folder / LOG)
-        np.ascontiguousarray(recorded, dtype=float).tofile(folder / LOG)
-    source = sum(file.stat().st_size for file in written if file.name.startswith("controller"))
-    readme = folder / "README.md"
+        files[LOG] = np.ascontiguousarray(recorded, dtype=float).tobytes()
+    source = sum(len(text) for name, text in files.items() if name.startswith("controller"))
     said = controller.interface()
-    readme.write_text(
-        _README.format(
-            title=controller.title,
-            period=controller.period,
-            inputs=_rows(said["inputs"]),
-            outputs=_rows(said["outputs"]),
-            state=said["state_bytes"],
-            tables=said["table_bytes"],
-            origin=f"`{said['scenario']}`, SHA-256 `{said['hash']}`" if said["hash"] else "blocks",
-            source=round(source / 1000),
-        ),
-        encoding="utf-8",
-    )
-    return [*written, readme]
+    files[_README_NAME] = _README.format(
+        title=controller.title,
+        period=controller.period,
+        inputs=_rows(said["inputs"]),
+        outputs=_rows(said["outputs"]),
+        faults="\n".join(f"| {n} | {cause} |" for n, cause in said["faults"].items()),
+        state=said["state_bytes"],
+        tables=said["table_bytes"],
+        origin=f"`{said['scenario']}`, SHA-256 `{said['hash']}`" if said["hash"] else "blocks",
+        source=round(source / 1000),
+    ).encode("utf-8")
+    refuse_foreign(folder, (*files, MANIFEST))
+    return write_own(folder, files)
+
+
+def check_project(folder: Path) -> None:
+    """Refuse a folder that :func:`write_project` would refuse, before there is a controller.
+
+    Args:
+        folder: The folder, which may be missing.
+
+    Raises:
+        InputError: If it holds other files of the names of an export, or some that were changed.
+    """
+    there = [file.name for file in folder.iterdir()] if folder.is_dir() else []
+    harness = [file.name for file in _harness()]
+    own = [name for name in there if name.startswith("controller") and name[-2:] in (".c", ".h")]
+    refuse_foreign(folder, (*own, *harness, "interface.json", LOG, _README_NAME, MANIFEST))
+
+
+def _harness() -> list[Path]:
+    return sorted(file for file in _HARNESS.iterdir() if file.is_file())
 
 
 def _rows(ports: list[dict[str, object]]) -> str:

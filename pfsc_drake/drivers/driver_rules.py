@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pfsc_drake.checks import require_not_negative, require_positive
+from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.driver import low_pass_share
@@ -30,10 +30,10 @@ class DriverOptions:
     damping: float = 10.0
 
     def __post_init__(self) -> None:
-        require_positive("--expire", self.expiry)
-        require_not_negative("--low-pass", self.low_pass)
-        require_positive("torque_rate", self.torque_rate)
-        require_not_negative("--damping", self.damping)
+        require_between("--expire", self.expiry, 1e-3, 60.0, "s")
+        require_between("--low-pass", self.low_pass, 0.0, 1e5, "Hz")
+        require_between("torque_rate", self.torque_rate, 1e-3, 1e9, "Nm/s")
+        require_between("--damping", self.damping, 0.0, 1e4, "1/s")
 
 
 def torque_rates(rate: float, effort: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from pfsc_drake.control.compliance.impedance_filter import (
     ManifoldForceTransform,
 )
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance
+from pfsc_drake.control.compliance.path_ends import PathEnds
 from pfsc_drake.control.compliance.pressing import Pressing
 from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner, TuningParameters
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
@@ -128,7 +129,8 @@ def add_compliance(
     )
     limits = _limits(compliance, linearization.manifold, robot, wanted.start, period)
     free = None if limits is None else limits.tangential
-    yielding = ImpedanceFilter(law, start="actual", free=free)
+    ends = _ends(law, manifold, compliance.limits.settling)
+    yielding = ImpedanceFilter(law, start="actual", free=free, ends=ends)
     impedance = builder.AddNamedSystem("impedance_filter", BlockSystem(yielding, period))
     along = ManifoldForceTransform(manifold, with_turning=compliance.with_turning)
     transform = builder.AddNamedSystem("manifold_force_transform", BlockSystem(along, period))
@@ -159,6 +161,14 @@ def add_compliance(
         "manifold_force": force,
         "compliance_status": impedance.GetOutputPort("status"),
     }
+
+
+def _ends(law: ImpedanceLaw, manifold: Manifold, settling: float) -> PathEnds | None:
+    """Return the ends that the reference stays between, of an open path."""
+    for k, coordinate in enumerate(manifold.coordinates):
+        if np.isfinite(coordinate.ends).all():
+            return PathEnds(law, k, coordinate.ends, settling)
+    return None
 
 
 def _limits(

@@ -43,7 +43,8 @@ def add_reference(
         compliance: How the tool yields.
         wanted: What is wanted of the tool.
         ports: ``desired_reference``, derivatives up to :func:`reference_order` by rows, and what
-            :func:`add_compliance` takes; of a force sensor ``sensor_fault`` and ``tared``.
+            :func:`add_compliance` takes; of a force sensor ``sensor_fault`` and ``tared``; of a
+            reference that waits ``own_time``, with which a transition waits.
 
     Returns:
         ``reference`` as the law is told, and what :func:`add_compliance` returns for the log.
@@ -59,6 +60,8 @@ def add_reference(
         start = builder.AddNamedSystem("smooth_start", BlockSystem(smooth, period))
         builder.Connect(desired, start.GetInputPort("desired_reference"))
         builder.Connect(state, start.GetInputPort("manifold_state"))
+        if "own_time" in ports:
+            builder.Connect(ports["own_time"], start.GetInputPort("own_time"))
         desired = start.GetOutputPort("reference")
     made = {"reference": desired}
     if has_impedance(compliance, linearization.manifold):

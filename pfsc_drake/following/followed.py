@@ -59,6 +59,7 @@ class Followed:
         guided: What a hand leads the tool through, where one leads.
         streamed: The path, where its way points come while the tool moves.
         projection: Finds the place on a path beforehand.
+        warnings: Doubts about the path, one sentence each.
     """
 
     manifold: Manifold
@@ -71,6 +72,7 @@ class Followed:
     guided: Guided | None = None
     streamed: StreamedPath | None = None
     projection: Projection | None = None
+    warnings: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

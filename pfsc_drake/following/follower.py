@@ -1,29 +1,36 @@
 """A whole controller as one diagram, with the ports that a robot has."""
 
 import copy
+import logging
 import math
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Linear
 from pfsc_drake.control.compliance.measured_wrench import MeasuredWrench
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.law.robust_gains import SampledRobot
 from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
-from pfsc_drake.control.manifolds.manifold import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import PlaceManifold, ToolKinematics
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
+from pfsc_drake.control.streams.messages import WaypointLayout
 from pfsc_drake.errors import InputError, require, require_one_of
 from pfsc_drake.following.carried import add_framed_point, add_seen_tool, carried
 from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller, add_reference
+from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe
 from pfsc_drake.following.fixtures import add_fixture_guidance
 from pfsc_drake.following.followed import Followed, Wanted
-from pfsc_drake.following.law import Believed, make_law
+from pfsc_drake.following.law import Believed, make_law, sampled_robot
+from pfsc_drake.following.law_warnings import law_warnings, observed_force_warnings
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
     ControllerParameters,
@@ -33,6 +40,7 @@ from pfsc_drake.following.options.controller import (
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.prediction import add_prediction
 from pfsc_drake.following.streamed_path import StreamedPath, add_stream
+from pfsc_drake.following.unused_options import refuse_unused
 from pfsc_drake.following.waiting import add_waiting_motion
 from pfsc_drake.geometry.rotation import check_rotation_matrix
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
@@ -42,7 +50,9 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse
 
 Ports = dict[str, OutputPort]
-_TOLD = ("reference", "manifold_force", "limit_force", "mode", "record", "stream", "watch")
+_logger = logging.getLogger("pfsc_drake")
+# what sentences on faults tell of besides
+_DESCRIBED = ("reference", "manifold_force", "press")
 
 
 class Follower(Diagram):
@@ -71,7 +81,8 @@ class Follower(Diagram):
         drive_torque (output): Drive torques within their limits, shape (N,) [Nm or N]; of velocity
             servos
         velocity_reference (output): Joint velocities, shape (N,) [rad/s or m/s].
-        actuation (output): The same in the order of the plant's actuators, held from tick to tick.
+        actuation (output): The same in the order of the plant's actuators, held from tick to tick;
+            absent with velocity servos if a joint has no actuator.
         reference (output): Derivatives 0..r of the virtual output's reference by rows.
         manifold_force (output): Where it yields: forces along the coordinates, shape (m,) [N, Nm].
         limit_force (output): Where a hand leads it along a manifold: by what forces the robot's
@@ -83,6 +94,8 @@ class Follower(Diagram):
         manifold_point (output): Where on the manifold the tool is.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).
+        stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`, shape
+            (1,): at 0 the robot's brakes are to be closed.
 
     Args:
         plant: The robot, finalized; as it is believed.
@@ -98,6 +111,8 @@ class Follower(Diagram):
         law: The law.
         period: Sampling time [s].
         start_posture: Joint coordinates at the start, shape (N,) [rad or m].
+        warnings: Doubts about law, gains, robot and path, one sentence each; logged once, by the
+            logger ``pfsc_drake``.
 
     Raises:
         InputError: If robot, law, manifold and options do not go together, or the start is out of
@@ -123,9 +138,10 @@ class Follower(Diagram):
         if not plant.HasFrameNamed(tool):
             raise InputError(f"tool = {tool}: the plant has no frame of this name")
         self.robot, self._coordinates = chain_from_plant(plant, plant.GetFrameByName(tool))
-        self._actuation = self._coordinates.actuation_rows(plant.num_actuators())
+        self._actuation = self._rows_of_actuation(plant, law)
         near = self._near(options.posture)
         followed = make(self.robot, near, RELATIVE_DEGREE[law])
+        refuse_unused(options, law, self.robot, followed)
         self._own, self._moves = followed.manifold, options.frame is not None
         if options.frame is not None:
             followed = carried(followed, _frame_of(options.frame, options.compliance))
@@ -139,11 +155,25 @@ class Follower(Diagram):
         self._wire(chosen, options)
         self._builder.BuildInto(self)
         self.set_name(f"{law}_follower")
+        self.warnings = self._warnings(chosen, options.compliance, rest)
+        for sentence in self.warnings:
+            _logger.warning(sentence)
 
     @property
     def start_state(self) -> np.ndarray:
         """State ``[q, v]`` of the plant at rest at the start; elastic joints carry the weight."""
         return state_at_rest(self.robot, self._coordinates, self.start_posture)
+
+    @property
+    def messages(self) -> WaypointLayout:
+        """Layout of messages with waypoints.
+
+        Raises:
+            InputError: If the path does not come as waypoints.
+        """
+        if self.followed.streamed is None:
+            raise InputError("messages: this path is known beforehand; see add_path_streaming")
+        return self.followed.streamed.messages
 
     def stepper(self, connected: tuple[str, ...] = ()) -> Stepper:
         """Return the controller as something to call at every tick, without Drake.
@@ -154,6 +184,61 @@ class Follower(Diagram):
             connected: Optional inputs that are given at every tick.
         """
         return Stepper(fuse(self).network, connected)
+
+    def describe(self, fault: float | np.ndarray, context: Context | None = None) -> str:
+        """Return one sentence on a fault.
+
+        Args:
+            fault: Value of the port ``fault``.
+            context: Own context at the sample at which the fault is new; with it the sentence names
+                joints, values and the position on the manifold, unless that moves.
+
+        Raises:
+            InputError: If there is no such fault.
+        """
+        number = float(np.asarray(fault).item())
+        require(number in list(Fault), "fault", number, f"0 to {max(Fault):d}")
+        kind = Fault(int(number))
+        if context is None or kind is Fault.NONE or self._moves:
+            return kind.explanation
+
+        def value(port: OutputPort) -> np.ndarray:
+            return np.array(port.Eval(self.GetSubsystemContext(port.get_system(), context)))
+
+        signals = {name: value(port) for name, port in self._signals.items()}
+        now = FaultInstant(context.get_time(), signals)
+        suspects = self._controller.suspects(self.GetSubsystemContext(self._controller, context))
+        place, on_motors = cast(PlaceManifold, self._own), self._on_motors
+        scene = FaultScene(self.law, self.robot, place, on_motors, now, None, suspects)
+        return describe(kind, scene)
+
+    def _warnings(
+        self,
+        chosen: ControllerParameters,
+        compliance: ComplianceParameters,
+        rest: RestPosture,
+    ) -> list[str]:
+        law, robot = self.law, self.robot
+        link_state = np.append(self.start_posture, np.zeros(robot.dimension))
+
+        def sampled() -> SampledRobot:
+            return sampled_robot(chosen, robot, law.linearization, rest, law.posture)
+
+        return [
+            *self.followed.warnings,
+            *law_warnings(chosen, robot, law, link_state, sampled),
+            *observed_force_warnings(compliance, robot, law, rest),
+        ]
+
+    def _rows_of_actuation(self, plant: MultibodyPlant, law: str) -> np.ndarray | None:
+        """Return the matrix from drives to the plant's actuation; None for servos without motors.
+
+        Raises:
+            InputError: If a law commands torques, and a joint has no actuator.
+        """
+        if RELATIVE_DEGREE[law] == 1 and self._coordinates.undriven:
+            return None
+        return self._coordinates.actuation_rows(plant.num_actuators())
 
     def _near(self, posture: np.ndarray | None) -> np.ndarray:
         """Return from where the posture at the start is looked for, shape (N,)."""
@@ -181,7 +266,7 @@ class Follower(Diagram):
     def _wire(self, chosen: ControllerParameters, options: FollowerOptions) -> None:
         builder, law = self._builder, self.law
         linearization = law.linearization
-        on_motors = chosen.law == "rigid" and not self.robot.is_rigid
+        self._on_motors = on_motors = chosen.law == "rigid" and not self.robot.is_rigid
         joint_state, believed, predictor = add_prediction(
             builder, Believed(self.robot, options.friction), chosen, self._measured(options)
         )
@@ -197,6 +282,11 @@ class Follower(Diagram):
             builder, law, believed, chosen, options.faults, ports, observed, predictor
         )
         followed, robot = self.followed, self.robot
+        self._controller = controller
+        self._signals = ports | {
+            "tool_pose": kinematics.GetOutputPort("tool_pose"),
+            "law": controller.GetOutputPort("law"),
+        }
         if followed.streamed is not None:
             desired, made = self._streamed(followed.streamed, options, projector)
         elif options.obstacles is not None:
@@ -208,13 +298,15 @@ class Follower(Diagram):
         wanted = Wanted(self.start_posture, options.transition, followed.lap, followed.length, end)
         told = signals | {"desired_reference": desired}
         made |= add_reference(builder, controller, linearization, robot, compliance, wanted, told)
+        self._signals |= {name: made[name] for name in _DESCRIBED if name in made}
         drive = controller.GetOutputPort(controller.drive_port)
-        hold = self._add("hold", Hold(self.robot.dimension))
-        builder.Connect(drive, hold.GetInputPort("value"))
-        actuation = self._add("actuation", Linear(self._actuation))
-        builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
         builder.ExportOutput(drive, controller.drive_port)
-        builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
+        if self._actuation is not None:
+            hold = self._add("hold", Hold(self.robot.dimension))
+            builder.Connect(drive, hold.GetInputPort("value"))
+            actuation = self._add("actuation", Linear(self._actuation))
+            builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
+            builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
         for name in (
             *("reference", "manifold_force", "limit_force"),
             *("mode", "record", "guides", "stream", "watch"),
@@ -222,7 +314,7 @@ class Follower(Diagram):
             if name in made:
                 builder.ExportOutput(made[name], name)
         builder.ExportOutput(ports["manifold_point"], "manifold_point")
-        for name in ("manifold_state", "status", "fault"):
+        for name in ("manifold_state", "status", "fault", "stop_category"):
             builder.ExportOutput(controller.GetOutputPort(name), name)
 
     def _place(self, tool_pose: OutputPort) -> tuple[BlockSystem, OutputPort]:

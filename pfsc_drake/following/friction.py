@@ -117,7 +117,8 @@ def _required(believed: Coefficients | None, choice: str) -> Coefficients:
     if believed is None:
         raise InputError(
             f"controller.friction.{choice}: nothing is believed of friction; write "
-            "controller.friction.believed: {f_c: [..], f_v: [..]} or {file: ..}"
+            "controller.friction.believed: {f_c: [..], f_v: [..]} or {file: ..}, in a diagram "
+            "FollowerOptions(friction=(f_c, f_v))"
         )
     return believed
 

@@ -146,7 +146,9 @@ def _told(options: GuidanceOptions, law: str) -> GuidanceOptions:
     degree, controller = RELATIVE_DEGREE.get(law, 1), options.controller
     if degree == 1 or not options.tells_law or controller.external_torque.source != "none":
         return options
-    bandwidth = _FORCE_BANDWIDTH if degree > 2 else 0.0  # for rigid joints no derivatives count
+    bandwidth = controller.external_torque.bandwidth
+    if degree > 2:  # for rigid joints no derivatives count
+        bandwidth = bandwidth or _FORCE_BANDWIDTH
     torque = ExternalTorqueParameters("measured", bandwidth)
     return dc.replace(options, controller=dc.replace(controller, external_torque=torque))
 

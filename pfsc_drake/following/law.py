@@ -250,7 +250,8 @@ def safe_state(
     """
     effort = robot.gather("effort_limit") * parameters.effort_scale
     damping = parameters.brake_damping * np.where(np.isfinite(effort), effort, 0.0)
-    return SafeState(damping, faults.hold_bandwidth, faults.effort_share)
+    delay = np.inf if faults.brakes is None else faults.brakes.delay
+    return SafeState(damping, faults.hold_bandwidth, faults.effort_share, delay)
 
 
 def supervision(law: str, faults: FaultParameters, believed: Believed) -> SupervisionParameters:
@@ -331,4 +332,5 @@ def make_law(
         safe_state(parameters, robot, faults or FaultParameters()),
         tells_reference_velocity=parameters.friction.needs_reference_velocity,
         posture=make_posture(parameters.posture, robot, gains.posture, rest),
+        max_beyond_end=parameters.max_beyond_end,
     )

@@ -10,7 +10,13 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, quaternion_to_matrix
+from pfsc_drake.geometry import (
+    Path,
+    PiecewisePolynomialCurve,
+    quaternion_to_matrix,
+    shape_report,
+)
+from pfsc_drake.geometry.paths.path_warnings import path_warnings
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -63,8 +69,12 @@ def add_path_following(
 
     def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         oriented = path.orientation is not None
-        manifold = PathManifold(relative_degree, oriented=oriented, turning=path.frame.turns)
-
+        manifold = PathManifold(
+            relative_degree,
+            oriented=oriented,
+            turning=path.frame.turns,
+            length=None if path.closed else path.length,
+        )
         evaluator = path.evaluator(relative_degree)
         eta = float(along.derivatives(np.array([along.domain[0]]), 0)[0, 0, 0])
         point = evaluator.evaluate_at(path.arc_length.parameter(eta))
@@ -82,6 +92,7 @@ def add_path_following(
             lap=lap,
             length=path.length,
             projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+            warnings=path_warnings(path, shape_report(path), "path_from_waypoints: "),
         )
 
     follower = Follower(plant, tool, law, followed, chosen)

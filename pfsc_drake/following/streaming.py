@@ -29,7 +29,7 @@ def add_path_streaming(
     ::
 
         follower = add_path_streaming(builder, plant, "tcp", [0.9, 0.0, 0.8], law="rigid")
-        sender = WaypointSender(follower.followed.streamed.messages)
+        sender = WaypointSender(follower.messages)
         sender.add([0.91, 0.01, 0.8])
         # at every tick, or whenever there is something new
         port.FixValue(context, sender.message)

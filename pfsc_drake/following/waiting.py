@@ -209,6 +209,8 @@ def add_waiting_motion(
     waits = waits and options.frame is None and not options.compliance.is_given
     require(waits, "obstacles", "given", allowed)
     assert motion is not None
+    planned = "0 with obstacles, which are avoided along the path alone; bring the tool there first"
+    require(options.transition == 0.0, "transition", options.transition, planned)
     chain, watch, period = law.robot, obstacles.watch, options.controller.sampling_time
     if not isinstance(chain, SerialChain):
         raise InputError("obstacles: given; must be None for a robot that is no chain of links")

@@ -77,6 +77,7 @@ class FollowingController(Diagram):
         manifold_state, virtual_input, reference_velocity (output): See :class:`SampledLaw`.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`Fault`, shape (1,).
+        stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`.
         law (output): All of these, laid out by the law's ``layout``.
         joint_jet (output): Of a robot that carries something, see :class:`JointJet`.
 
@@ -170,6 +171,7 @@ class FollowingController(Diagram):
                 builder.ExportOutput(sampled.GetOutputPort(name), name)
         builder.ExportOutput(report.GetOutputPort("status"), "status")
         builder.ExportOutput(fault, "fault")
+        builder.ExportOutput(stop.GetOutputPort("stop_category"), "stop_category")
         builder.ExportOutput(report.GetOutputPort("law"), "law")
         if carries:
             motion = add("joint_jet", JointJet(law.linearization, law.layout))
@@ -177,6 +179,19 @@ class FollowingController(Diagram):
             connect(sampled.GetOutputPort("evaluation"), motion.GetInputPort("evaluation"))
             builder.ExportOutput(motion.GetOutputPort("joint_jet"), "joint_jet")
         builder.BuildInto(self)
+
+    def suspects(self, context: Context) -> np.ndarray:
+        """Return which components of the joint state are implausible, nonzero if so, shape (4N,).
+
+        Args:
+            context: Own context.
+        """
+        found = [
+            self.GetSubsystemByName(name).GetOutputPort(port)
+            for name, port in (("supervision", "suspects"), ("safe_stop", "ignored"))
+        ]
+        values = [p.Eval(self.GetSubsystemContext(p.get_system(), context)) for p in found]
+        return np.maximum(*values)
 
 
 class ControllerAccess(FaultAccess):

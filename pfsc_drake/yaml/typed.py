@@ -7,15 +7,18 @@ after.
 """
 
 import dataclasses
+import re
 import types
 import typing
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from pfsc_drake.errors import InputError, gathered_refusals, in_one_line
+from pfsc_drake.yaml.bounds import out_of_bounds
 from pfsc_drake.yaml.broadcast import (
     AUTO_OR_MANY,
     NUMBERS_OR_END,
@@ -43,6 +46,8 @@ __all__ = [
 ]
 
 Schema = TypeVar("Schema")
+
+_CONSEQUENCES = (ArithmeticError, ValueError, MemoryError)
 
 
 def load_file(schema_class: type[Schema], path: str | Path) -> Schema:
@@ -152,14 +157,29 @@ def _refusals(value: Any, place: Place, spoiled: Sequence[Place]) -> list[str]:
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
             found += _refusals(getattr(value, field.name), (*place, field.name), spoiled)
-        post_init = getattr(value, "__post_init__", None)
         whole = not any(other[: len(place)] == place for other in spoiled)
-        if post_init is not None and whole and not found:
-            where = f"key '{spelled(place)}': " if place else ""
+        if whole and not found:
+            found = _own_refusals(value, place)
+    return found
+
+
+def _own_refusals(value: Any, place: Place) -> list[str]:
+    """Returns what is refused of a dataclass without those in it, one message each."""
+    beyond = {
+        name: f"key '{spelled((*place, name))}' is {number:g}: expected {bounds}"
+        for name, number, bounds in out_of_bounds(value)
+    }
+    found, post_init = list[str](), getattr(value, "__post_init__", None)
+    if post_init is not None:
+        where = f"key '{spelled(place)}': " if place else ""
+        # what comes of numbers out of bounds says nothing, unless it is about them
+        with suppress(*_CONSEQUENCES if beyond else ()), np.errstate(all="ignore"):
             with gathered_refusals() as refusals:
                 post_init()
             found = [f"{where}{' '.join(refusal.split())}" for refusal in refusals]
-    return found
+    said = " ".join(found)
+    named = all(re.search(rf"\b{re.escape(name.partition('[')[0])}\b", said) for name in beyond)
+    return found if named else list(beyond.values())
 
 
 def dump_typed(value: Any) -> str:

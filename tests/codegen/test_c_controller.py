@@ -13,6 +13,8 @@ from pfsc_drake.blocks.cases import all_finite, latched, where
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.codegen.c_controller import CController
+from pfsc_drake.codegen.c_faults import CFault
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from tests.compilers import needs_gcc
 
@@ -55,8 +57,25 @@ def test_the_interface_says_what_there_is(controller, tmp_path):
     ]
     assert [port["name"] for port in said["outputs"]] == ["drive_torque", "int", "fault"]
     assert said["sampling_time"] == 1e-3
-    assert said["state_bytes"] == 8 * (1 + 4)
+    assert said["state_bytes"] == 8 * (2 + 4)
     assert said["scenario"] == "damper"
+
+
+@pytest.mark.parametrize(
+    ("turning", "joints", "drives"),
+    [
+        ((True, True), "rad, rad/s", "Nm"),
+        ((False, False), "m, m/s", "N"),
+        ((True, False), "rad, rad/s or m, m/s", "Nm or N"),
+        ((), "rad, rad/s or m, m/s", "Nm or N"),
+    ],
+)
+def test_units_are_those_of_the_joints(turning, joints, drives):
+    block = Damper()
+    block.inputs = block.inputs | {"joint_state": Port(4, "rad, rad/s or m, m/s")}
+    block.outputs = block.outputs | {"drive_torque": Port(2, "Nm or N")}
+    said = CController.of(Network.of(block), 1e-3, turning=turning).interface()
+    assert (said["inputs"][0]["unit"], said["outputs"][0]["unit"]) == (joints, drives)
 
 
 @needs_gcc
@@ -66,7 +85,7 @@ def test_c_is_python_to_the_last_bit(controller, tmp_path):
     library = tmp_path / "controller.so"
     subprocess.run(["gcc", *FLAGS, "-o", str(library), *sources, "-lm"], check=True)
     c = ctypes.CDLL(str(library))
-    state = (ctypes.c_double * 5)()
+    state = (ctypes.c_double * 6)()
     stepper = Stepper(Network.of(Damper()))
     rng = np.random.default_rng(5)
     for k in range(30):
@@ -83,6 +102,112 @@ def test_c_is_python_to_the_last_bit(controller, tmp_path):
         np.testing.assert_array_equal(y, np.concatenate(list(expected.values())))
         assert fault == (3 if k >= 20 else 0)
         assert np.any(y[:2] != 0.0) == (k < 20)
+
+
+class Broken(Damper):
+    """The like with a status, and a fault that a NaN among its inputs makes one."""
+
+    def __init__(self):
+        super().__init__()
+        self.outputs["status"] = Port(3)
+
+    def output(self, x, u, t):
+        found = super().output(x, u, t)
+        return found | {"fault": u.joint_state[3], "status": ca.vertcat(u.joint_state[3], 7.0, t)}
+
+    def update(self, x, u, y, t):
+        return {"sum": x.sum + u.joint_state[:2]}
+
+
+@pytest.fixture(name="sanitized", scope="module")
+def fixture_sanitized(tmp_path_factory):
+    """A program that reads calls and prints what they give, where undefined behaviour aborts."""
+    folder = tmp_path_factory.mktemp("sanitized")
+    CController.of(Network.of(Broken()), 1e-3).write(folder)
+    (folder / "calls.c").write_text(CALLS, encoding="utf-8")
+    sources = [str(file) for file in folder.glob("*.c")]
+    flags = ["-std=c99", "-O1", *WARNINGS, "-fsanitize=undefined", "-fno-sanitize-recover=all"]
+    subprocess.run(["gcc", *flags, "-o", str(folder / "calls"), *sources, "-lm"], check=True)
+
+    def run(*calls):
+        """Return fault, drives, port fault and status of each step, shape (steps, 6)."""
+        words = [word for name, *values in calls for word in (name, *map(repr, values))]
+        done = subprocess.run(
+            [folder / "calls", *words], capture_output=True, text=True, check=True
+        )
+        return np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+
+    return run
+
+
+CALLS = r"""
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "controller.h"
+int main(int argc, char **argv)
+{
+    controller_state state;
+    controller_inputs inputs;
+    controller_outputs outputs;
+    int i, fault, k;
+    memset(&state, 0xa5, sizeof state);
+    memset(&inputs, 0, sizeof inputs);
+    inputs.gain[0] = 2.0;
+    for (i = 1; i + 2 < argc; i += 3) {
+        k = argv[i][1] == 'v' ? 3 : 1;
+        inputs.joint_state[k] = strtod(argv[i + 1], NULL);
+        inputs.joint_state[2] = strtod(argv[i + 2], NULL);
+        if (argv[i][0] == 'i') {
+            controller_initialize(&state, &inputs);
+        } else {
+            fault = controller_step(&state, &inputs, &outputs);
+            printf("%d %g %g %g %g %g\\n", fault, outputs.drive_torque[0], outputs.drive_torque[1],
+                   outputs.fault[0], outputs.status[0], outputs.status[1]);
+        }
+    }
+    return 0;
+}
+""".replace("\\\\n", "\\n")
+NAN, GOOD = float("nan"), ("s", 0.1, 0.5)
+
+
+@needs_gcc
+def test_good_calls_are_no_fault(sanitized):
+    np.testing.assert_array_equal(sanitized(("i", 0.1, 0.0), GOOD), [[0, -1.0, 0, 0, 0, 7]])
+
+
+@needs_gcc
+def test_a_step_before_the_start_is_a_fault(sanitized):
+    """Until there is one; memory holds anything."""
+    found = sanitized(GOOD, GOOD, ("i", 0.1, 0.0), GOOD)
+    np.testing.assert_array_equal(found[:2], [[101, 0, 0, 101, 101, 0]] * 2)
+    np.testing.assert_array_equal(found[2], [0, -1.0, 0, 0, 0, 7])
+
+
+@needs_gcc
+@pytest.mark.parametrize("bad", [NAN, float("inf"), -1e300, 1.1e9])
+def test_a_start_that_is_none_is_a_fault(sanitized, bad):
+    found = sanitized(("i", bad, 0.0), GOOD, GOOD, ("i", -0.9e9, 0.0), GOOD)
+    np.testing.assert_array_equal(found[:2], [[102, 0, 0, 102, 102, 0]] * 2)
+    assert found[2, 0] == 0.0
+
+
+@needs_gcc
+@pytest.mark.parametrize("bad", [NAN, float("inf"), -1.0, 101.0, 1e300])
+def test_a_fault_that_is_no_number_of_one_is_a_fault(sanitized, bad):
+    """And stays, though later ones are; (int) of NaN is whatever a processor makes of it."""
+    found = sanitized(("i", 0.1, 0.0), ("sv", bad, 0.5), ("sv", 0.0, 0.5))
+    np.testing.assert_array_equal(found, [[103, 0, 0, 103, 103, 0]] * 2)
+    assert sanitized(("i", 0.1, 0.0), ("sv", 16.0, 0.5))[0, 0] == 16.0
+
+
+def test_every_fault_has_a_sentence(controller, tmp_path):
+    controller.write(tmp_path)
+    said = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))["faults"]
+    assert said["0"] == "no fault" and "before controller_initialize" in said["101"]
+    assert {*map(int, said)} == {*Fault, *CFault}
+    assert max(Fault) < min(CFault)
 
 
 def test_what_has_no_fault_is_no_controller():

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,11 +10,20 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Adder
 
 from pfsc_drake import InputError, export
+from pfsc_drake.blocks.network import Network
+from pfsc_drake.codegen.c_controller import CController
+from pfsc_drake.codegen.export import check_project, write_project
+from pfsc_drake.codegen.manifest import manifest_text
 from pfsc_drake.systems.block_system import BlockSystem
 from tests.codegen.test_c_controller import Damper
 from tests.compilers import needs_gcc
 
 INPUTS = {"joint_state": np.random.default_rng(2).normal(size=(20, 4)), "gain": np.ones((20, 1))}
+
+
+@pytest.fixture(name="controller")
+def fixture_controller():
+    return CController.of(Network.of(Damper()), 1e-3)
 
 
 def diagram(*, more=None):
@@ -46,11 +56,13 @@ def test_c_repeats_the_record(tmp_path):
     export(diagram(), tmp_path, INPUTS)
     assert (tmp_path / "replay.bin").stat().st_size == 20 * 8 * (5 + 5)
     subprocess.run(["make", "--silent"], cwd=tmp_path, check=True)
+    repeated = []
     for command in (["replay", "replay.bin", "10"], ["replay_random", "replay.bin", "2000"]):
         done = subprocess.run(
             [f"./{command[0]}", *command[1:]], cwd=tmp_path, capture_output=True, text=True
         )
         assert done.returncode == 0, done.stdout
+        repeated.append(done.stdout)
     assert "faults" in done.stdout
     # one number that is another is found
     record = np.fromfile(tmp_path / "replay.bin").reshape(20, 10)
@@ -60,7 +72,8 @@ def test_c_repeats_the_record(tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1
     assert "first difference: tick 7, number 0 of the outputs" in done.stdout
-    assert "ticks 20 differing 1 " in done.stdout
+    assert "ticks 20 differing 1 largest 1e-09 " in done.stdout
+    assert "ticks 20 differing 0 largest 0 " in repeated[0]
 
 
 def test_a_record_has_the_order_of_the_interface(tmp_path):
@@ -108,3 +121,64 @@ def test_the_loop_with_deadlines(tmp_path):
 def test_what_is_no_block_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"^diagram damper: must consist of blocks"):
         export(diagram(more=Adder(2, 1)), tmp_path)
+
+
+FOREIGN = ["README.md", "Makefile", "CMakeLists.txt", "controller.c", "manifest.json", "main_rt.c"]
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_files_of_the_user_are_never_replaced(controller, tmp_path, name):
+    (tmp_path / name).write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=rf"holds {name}, which no export has written; allowed"):
+        write_project(controller, tmp_path)
+    with pytest.raises(InputError, match=rf"holds {name}, which no export has written; allowed"):
+        check_project(tmp_path)
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {name: "mine"}
+
+
+def test_an_export_replaces_an_earlier_one_and_nothing_else(controller, tmp_path):
+    write_project(controller, tmp_path, np.zeros((2, 3)))
+    (tmp_path / "commands.csv").write_text("mine", encoding="utf-8")
+    changed = replace(controller, title="Another")
+    check_project(tmp_path)
+    files = write_project(changed, tmp_path, np.ones((2, 3)))
+    assert "Another" in (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert np.fromfile(tmp_path / "replay.bin").tolist() == [1.0] * 6
+    assert {file.name for file in tmp_path.iterdir()} == {
+        "commands.csv",
+        *(file.name for file in files),
+    }
+
+
+def test_drivers_that_the_user_wrote_into_a_file_of_an_export_stay(controller, tmp_path):
+    """The README asks for that."""
+    write_project(controller, tmp_path)
+    file = tmp_path / "main_rt.c"
+    file.write_text(file.read_text() + "/* my drivers */", encoding="utf-8")
+    with pytest.raises(InputError, match=r"its main_rt.c has been changed since the export"):
+        write_project(controller, tmp_path)
+    assert file.read_text().endswith("/* my drivers */")
+    file.rename(tmp_path / "mine.c")
+    write_project(controller, tmp_path)
+    assert file.exists() and (tmp_path / "mine.c").exists()
+
+
+def test_results_links_and_files_are_no_folder_for_an_export(controller, tmp_path):
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"is no folder"):
+        write_project(controller, tmp_path / "file")
+    write_project(controller, tmp_path / "out")
+    (tmp_path / "out" / "README.md").rename(tmp_path / "moved.md")
+    (tmp_path / "out" / "README.md").symlink_to(tmp_path / "moved.md")
+    with pytest.raises(InputError, match=r"holds README.md, which no export has written"):
+        write_project(controller, tmp_path / "out")
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "manifest.json").write_text(manifest_text("run", ["log.h5"]), encoding="utf-8")
+    with pytest.raises(InputError, match=r"holds the results of a run; allowed: another folder"):
+        write_project(controller, run)
+
+
+def test_a_folder_without_a_name_is_refused():
+    with pytest.raises(InputError, match=r"^folder = ''; allowed: a folder"):
+        export(diagram(), "")

@@ -155,6 +155,17 @@ def test_all_pairs_of_special_numbers(name):
             assert_same_bits(*both(function, *values))
 
 
+@pytest.mark.parametrize(("name", "sign"), [("largest", -1.0), ("smallest", 1.0)])
+def test_zeros_that_are_not_stored_count(name, sign):
+    stored = sign * np.array([3.0, 0.5, 2.0, 7.0])
+    function = ca.Function("f", [HOLES], [EXPRESSIONS[f"{name} of sparse"]])
+    found, expected = both(function, stored)
+    assert found == expected == 0.0
+    function = ca.Function("f", [A], [EXPRESSIONS[name]])
+    found, expected = both(function, sign * np.arange(1.0, 13.0))
+    assert found == expected == sign
+
+
 def test_result_may_be_the_argument():
     function = ca.Function("f", [X], [ca.vertcat(X[3], X[:3])])
     block = np.array([1.0, 2.0, 3.0, 4.0])

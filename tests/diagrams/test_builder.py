@@ -17,6 +17,7 @@ WIRES = {
     ENCODERS: {
         ("tool_kinematics", "joint_state"),
         ("following_controller", "joint_state"),
+        ("holding_brakes", "velocity"),
         ("log_signals", "joint_state"),
     },
     ("tool_kinematics", "tool_pose"): {
@@ -32,6 +33,13 @@ WIRES = {
         ("log_signals", "reference"),
     },
     ("following_controller", "law"): {("log_signals", "law")},
+    ("following_controller", "stop_category"): {
+        ("all_stops", "u0"),
+        ("log_signals", "stop_category"),
+    },
+    ("all_stops", "y0"): {("holding_brakes", "request")},
+    ("holding_brakes", "resistance"): {("resistance", "u0")},
+    ("resistance", "y0"): {("plant", "applied_generalized_force")},
     ("following_controller", "drive_torque"): {("hold", "value")},
     ("hold", "held"): {("drives", "u0")},
     ("drives", "y0"): {("plant", "actuation")},
@@ -111,7 +119,9 @@ def test_the_rigid_law_sees_the_motors_only(settings):
 def test_a_failing_sensor_is_between_encoders_and_everything_else(settings):
     settings.simulation.sensor_failure.time = 0.1
     expected = dict(WIRES)
-    readers, log = expected[ENCODERS], {x for x in expected[ENCODERS] if x[0] == "log_signals"}
+    # brakes are a part of the robot
+    readers = expected[ENCODERS] - {("holding_brakes", "velocity")}
+    log = {("log_signals", "joint_state"), ("holding_brakes", "velocity")}
     found = wires(build_station(settings, Path()).diagram)
     # the log has the truth, and what was delivered beside it
     assert found[ENCODERS] == log | {("sensor_failure", "measured")}
@@ -201,6 +211,7 @@ def test_log_holds_every_signal(station):
         "manifold_point": (3, layout.size),
         "reference": (3, 9),
         "law": (3, station.law.layout.size),
+        "stop_category": (3, 1),
     }
     kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
     pose = kinematics.GetOutputPort("tool_pose").Eval(kinematics.GetMyContextFromRoot(root))

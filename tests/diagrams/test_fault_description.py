@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.fault_description import FaultInstant, FaultScene, describe, first_instant
+from diagrams.fault_instant import first_instant
 from diagrams.scenario import (
     Circle,
     ForcePulse,
@@ -20,6 +20,7 @@ from diagrams.scenario import (
 from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe
 from pfsc_drake.geometry import matrix_to_zyx, zyx_to_matrix
 from pfsc_drake.geometry.rotation import matrix_to_zyz, zyz_to_matrix
 
@@ -94,6 +95,25 @@ def test_coordinates_to_blame(six_axes):
     assert sentence.startswith(Fault.SINGULAR.explanation)
     assert "phi_y = 90.0 deg" in sentence
     assert "q_" not in sentence
+
+
+def test_beyond_an_end(six_axes):
+    """A push along the path, which the law alone resists, takes the tool over its start."""
+    six_axes.reference.points, six_axes.controller.max_beyond_end = [0.004, 0.1], 2e-3
+    six_axes.forces = [
+        ForcePulse(begin=0.0, end=1.0, ramp=0.01, frame="manifold", force=[-2e3, 0.0, 0.0])
+    ]
+    station, root = run(six_axes, 0.2)
+    assert station.controller.fault(station.blocks, root) is Fault.BEYOND_END
+    found = re.fullmatch(
+        r"the tool went beyond an end of the path at eta = (.*) m, t = 0\.\d+ s: "
+        r"(.*) mm beyond its start",
+        station.fault(root),
+    )
+    assert found is not None
+    eta, beyond = map(float, found.groups())
+    assert 2.0 < beyond < 3.0
+    assert -3e-3 < eta < 0.0
 
 
 def test_out_of_the_neighbourhood(load_scenario):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import BrakeParameters, ForcePulse, GainParameters, LawGains
+from diagrams.scenario import ForcePulse, GainParameters, LawGains
 from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
@@ -137,12 +137,47 @@ def test_lost_frames_of_a_light_arms_bus(seven):
     check_rest(station, result, times, log)
 
 
-def test_brakes_hold_a_joint_of_which_nothing_is_seen(six_axes):
+def test_brakes_hold_a_joint_of_which_nothing_is_measured(six_axes):
     failure = six_axes.simulation.sensor_failure
     failure.time, failure.component, failure.whole_joint = 0.35, 1, True
-    six_axes.faults.brakes = BrakeParameters(delay=0.1)
     six_axes.simulation.integrator, six_axes.forces = "runge_kutta3", []
     check_rest(*go_on(six_axes, 1.0))
+
+
+def test_brakes_hold_an_elastic_joint_of_which_nothing_is_measured(soft):
+    """By default, with friction in the drives; of a robot without brakes they are requested."""
+    failure = soft.simulation.sensor_failure
+    failure.time, failure.component, failure.whole_joint = 0.35, 1, True
+    soft.friction.f_c = [20.0, 30.0, 10.0]
+    station, result, times, log = go_on(soft, 1.0)
+    first = np.searchsorted(times, result.fault_time - 1e-9)
+
+    def moved(log):
+        """Return how far each joint is from where it was at the fault [deg]."""
+        q = log["joint_state"][first:, : station.robot.dimension]
+        return np.rad2deg(np.abs(q - q[0]))
+
+    # motors are clamped, and links swing on springs without damping
+    assert moved(log).max() < 8.0
+    requested = log["stop_category"][:, 0]
+    assert requested[first - 1] == -1.0 and requested[first] == 1.0
+    assert np.flatnonzero(requested == 0.0)[0] == first + 50
+    soft.faults.brakes = None
+    requested = go_on(soft, 1.0)[3]["stop_category"][:, 0]
+    assert requested[first] == 2.0 and requested[-1] == 0.0
+
+
+def test_brakes_stop_servos_that_have_lost_a_joint(seven):
+    settings = seven("pfc_panda_7r")
+    settings.controller.law = "velocity_servo"
+    settings.controller.gains = {
+        "velocity_servo": LawGains(*[GainParameters(poles=[-20.0]) for _ in range(4)])
+    }
+    failure = settings.simulation.sensor_failure
+    failure.time, failure.component, failure.whole_joint = 0.35, 2, True
+    station, result, times, log = go_on(settings, 0.6)
+    check_rest(station, result, times, log)
+    assert log["servo_stop_category"][-1] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,8 @@
 import numpy as np
 
 from diagrams.builder import build_station
-from diagrams.scenario.checks import coordinate_text, listed, posture_text
 from experiments.scenario_file import find_scenario
+from pfsc_drake.robot.coordinate_text import coordinate_text, listed, posture_text
 
 
 def test_coordinates_with_units():

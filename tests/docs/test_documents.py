@@ -141,8 +141,21 @@ def test_a_controller_in_a_diagram_of_ones_own(desk: Path, monkeypatch: pytest.M
     assert builder.Build().num_output_ports() == 0
 
 
+def test_actuators_of_a_plant_of_ones_own(desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(desk)
+    block = next(block for block in blocks("python") if block.place.startswith("own_diagram"))
+    names: dict[str, Any] = {}
+    exec(compile(block.text, block.place, "exec"), names)
+    plant = names["plant"]
+    limits = {
+        actuator.joint().name(): actuator.effort_limit()
+        for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices())
+    }
+    assert limits["pan"] == 330.0 and limits["wrist_3"] == 56.0 and len(limits) == 7
+
+
 @pytest.mark.parametrize(
-    ("number", "port"), [(0, "manifold_force"), (1, "mode")], ids=["compliance", "guidance"]
+    ("number", "port"), [(1, "manifold_force"), (2, "mode")], ids=["compliance", "guidance"]
 )
 def test_doors_of_the_library(
     number: int, port: str, desk: Path, monkeypatch: pytest.MonkeyPatch

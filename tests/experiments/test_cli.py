@@ -8,7 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+import typer
 
+import identification.cli
+from experiments import cli
 from experiments.cli import main
 from experiments.scenario_file import CatalogEntry
 from pfsc_drake import InputError
@@ -28,6 +31,7 @@ class Outcome:
     problem: str | None = None
     margins: str | None = None
     broken: list[str] = field(default_factory=list)
+    stop: str = ""
 
 
 class FakeRun:
@@ -114,7 +118,10 @@ def test_fault(fake_run, scenario, tmp_path, capsys):
     fake_run.outcome.fault = "left the feasible\nneighbourhood"
     assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 3
     line = error_line(capsys)
-    assert line.startswith("fault: left the feasible neighbourhood; stopped at t = 1.000 s,")
+    assert line.startswith("fault: left the feasible neighbourhood; ended at t = 1.000 s,")
+    fake_run.outcome.stop = "still moving at t = 1.000 s, joint 2 at 0.3 rad/s"
+    assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 3
+    assert "; still moving at t = 1.000 s, joint 2 at 0.3 rad/s, " in error_line(capsys)
     assert f"kept in {tmp_path / 'out'}" in line
 
 
@@ -205,6 +212,28 @@ def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, argume
     assert fake_run.calls == []
 
 
+def _with_out(group, words=()):
+    """Yield the words of all commands that have an option --out."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _with_out(command, (*words, name))
+        elif any("--out" in parameter.opts for parameter in command.params):
+            assert all(p.opts == ["--out"] for p in command.params if "--out" in p.opts)
+            yield (*words, name)
+
+
+@pytest.mark.parametrize("program", [main, identification.cli.main])
+def test_a_folder_without_a_name_is_refused_by_every_command(program, capsys):
+    app = {main: cli.app, identification.cli.main: identification.cli.app}[program]
+    commands = list(_with_out(typer.main.get_command(app)))
+    assert len(commands) > 4
+    for words in commands:
+        for out in (("--out", ""), ("--out=",)):
+            assert program([*words, *out]) == 2
+            error = "error: --out '': no name of a folder; allowed: a folder, '.' for this one\n"
+            assert capsys.readouterr().err == error
+
+
 def test_a_file_with_nearly_that_name(scenario, capsys):
     assert main(["run", str(scenario.with_name("my_rum.yaml"))]) == 2
     assert error_line(capsys).endswith("my_rum.yaml: no such file; did you mean 'my_run.yaml'?\n")
@@ -224,7 +253,7 @@ def test_quietly_errors_too(fake_run, scenario, capsys):
     assert main(["run", str(scenario), "--quiet"]) == 3
     captured = capsys.readouterr()
     assert captured.out == "Open the report: somewhere/report.html\n"
-    assert captured.err.startswith("fault: singular; stopped at t = ")
+    assert captured.err.startswith("fault: singular; ended at t = ")
     assert main(["run", "none.yaml", "--quiet"]) == 2
     assert error_line(capsys).startswith("error: scenario file none.yaml: no such file")
 

@@ -1,6 +1,7 @@
 """Logs that are fed to an exported controller: what it would have commanded."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def test_the_log_of_a_run(exported, tmp_path):
     commands = replay_log(folder, tmp_path / "log.h5", quiet)
     np.testing.assert_array_equal(commands.told, recorded[:, 4 * N : 5 * N])
     np.testing.assert_allclose(commands.difference, [0.0, 0.5, 2.0], atol=1e-12)
-    assert (commands.fault, commands.port, commands.unit) == (0, "drive_torque", "Nm or N")
+    assert (commands.fault, commands.port, commands.unit) == (0, "drive_torque", "Nm")
     table = np.genfromtxt(commands.file, delimiter=",", names=True)
     np.testing.assert_allclose(table["t"], log.time, atol=1e-12)
     np.testing.assert_allclose(table["drive_torque_3"], commands.told[:, 2], rtol=1e-11)
@@ -95,7 +96,7 @@ def test_what_the_command_says(exported, tmp_path, capfd):
     status = main(["replay", str(folder), links])
     said = capfd.readouterr()
     assert status == 3
-    assert "drive_torque [Nm or N], 40 ticks" in said.out
+    assert "drive_torque [Nm], 40 ticks" in said.out
     assert "motors are taken to be where q, v is" in said.out
     assert "largest change" in said.out
     assert said.err.startswith("fault: ")
@@ -107,7 +108,10 @@ def test_wrong_folders_and_logs(tmp_path):
         replay_log(tmp_path, tmp_path / "a.csv", quiet)
     said = {
         "inputs": [{"name": "joint_state", "size": 4, "unit": ""}],
-        "outputs": [{"name": "drive_torque", "size": 1, "unit": "Nm"}],
+        "outputs": [
+            {"name": "drive_torque", "size": 1, "unit": "Nm"},
+            {"name": "fault", "size": 1, "unit": ""},
+        ],
         "sampling_time": 1e-3,
     }
     (tmp_path / "interface.json").write_text(json.dumps(said))
@@ -122,3 +126,38 @@ def test_wrong_folders_and_logs(tmp_path):
     log.write(tmp_path / "log.h5")
     with pytest.raises(InputError, match="no signal v_J, which the controller needs"):
         replay_log(tmp_path, tmp_path / "log.h5", quiet)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ([1], "no mapping"),
+        ({"sampling_time": 1e-300}, "sampling_time = 1e-300, not from 1e-6 to 1 s"),
+        ({"sampling_time": "1"}, "sampling_time = '1'"),
+        ({"inputs": {}}, "no list of inputs"),
+        ({"inputs": [{"name": "x", "size": 10**9, "unit": ""}]}, r"inputs\[0\] = "),
+        ({"outputs": [{"name": "x", "size": 1}]}, r"outputs\[0\] = "),
+        ({"outputs": [{"name": "x", "size": 1, "unit": ""}]}, "no output fault"),
+    ],
+)
+def test_another_interface_is_refused(tmp_path, change, said):
+    port = {"name": "fault", "size": 1, "unit": ""}
+    good = {"inputs": [port], "outputs": [port], "sampling_time": 1e-3}
+    content = good | change if isinstance(change, dict) else change
+    (tmp_path / "interface.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=f"interface.json: {said}") as error:
+        replay_log(tmp_path, tmp_path / "a.csv", quiet)
+    assert str(error.value).endswith("allowed: what export has written")
+
+
+@needs_gcc
+def test_an_interface_of_another_controller_is_refused(exported, tmp_path):
+    folder, recorded = exported
+    other = tmp_path / "other"
+    shutil.copytree(folder, other)
+    said = json.loads((other / "interface.json").read_text())
+    said["outputs"][0]["size"] += 1
+    (other / "interface.json").write_text(json.dumps(said))
+    log = write_csv(tmp_path / "same.csv", 1e-3 * np.arange(TICKS), recorded[:, : 4 * N])
+    with pytest.raises(InputError, match="the controller beside it has another number of inputs"):
+        replay_log(other, tmp_path / log, quiet)

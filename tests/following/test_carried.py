@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
@@ -17,8 +18,10 @@ from pfsc_drake import (
     rest_to_rest,
 )
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.carried import placed
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.geometry import zyx_to_quaternion
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.models.files import models_directory
 
 CENTER = np.array([0.9, 0.0, 0.7])
@@ -121,3 +124,17 @@ def test_wrong_frames_are_refused(path):
     yielding = ComplianceParameters()
     yielding.tangential.stiffness.value = 0.0
     refused("frame: given; must be None where the tool yields", compliance=yielding)
+
+
+def test_a_target_in_a_tilted_frame_is_transformed_with_its_yaw_axis():
+    X_WC = RigidTransform(RollPitchYaw(0.4, -0.7, 1.1), CENTER)
+    R_Ce = RotationMatrix(RollPitchYaw(0.2, 0.5, -0.3))
+    yaw_axis = np.array([0.6, 0.0, 0.8])
+    target = ToolTarget(np.array([0.1, -0.2, 0.3]), R_Ce.matrix(), yaw_axis=yaw_axis)
+    frame = np.concatenate([CENTER, X_WC.rotation().matrix().ravel()])
+    found = placed(target, frame)
+    np.testing.assert_allclose(found.y_t, X_WC @ target.y_t, atol=1e-15)
+    np.testing.assert_allclose(found.R_e, (X_WC.rotation() @ R_Ce).matrix(), atol=1e-15)
+    np.testing.assert_allclose(found.yaw_axis, X_WC.rotation() @ target.yaw_axis, atol=1e-15)
+    bare = placed(ToolTarget(target.y_t), frame)
+    assert bare.R_e is None and bare.yaw_axis is None

@@ -73,6 +73,17 @@ def axes(tool):
     return tool.follower.followed.manifold.axes(point).full()
 
 
+def test_a_hand_stays_on_an_open_path():
+    """It pushes the tool from 0.1 m against the start, and no farther."""
+    table = WaypointTable(np.linspace(POINTS[0], POINTS[1], 9))
+    tool = on_path(path_from_waypoints(table, smoothness=6), tangential=FREE)
+    assert tool.follower.followed.manifold.coordinates[0].ends[0] == 0.0
+    tool.pull(-60.0 * axes(tool)[:, 0])
+    tool.run(0.6)
+    assert tool.fault() == Fault.NONE
+    assert -1e-3 < tool.read("manifold_state")[0] < 5e-3
+
+
 def test_a_tool_yields_across_a_path_like_its_spring(path):
     """By f / k across, and not along."""
     tool = on_path(path, transversal=SPRING)

@@ -1,5 +1,7 @@
 """Path following of a user's own plant: one call, a diagram, and what it refuses."""
 
+import logging
+import re
 import subprocess
 
 import numpy as np
@@ -11,9 +13,13 @@ from pydrake.systems.framework import DiagramBuilder
 
 import pfsc_drake
 from pfsc_drake import (
+    ControllerParameters,
     FollowerOptions,
+    GainParameters,
+    LawGains,
     StreamLimits,
     WaypointTable,
+    add_actuators,
     add_path_following,
     path_from_waypoints,
 )
@@ -122,6 +128,106 @@ def test_velocity_servos_are_told_velocities(path):
     told = read(simulator, follower, "velocity_reference")
     np.testing.assert_allclose(told, 0.0, atol=1e-9)
     assert not follower.HasOutputPort("drive_torque")
+
+
+@pytest.fixture(name="undriven")
+def fixture_undriven(tmp_path):
+    """The model whose third joint Drake gives no actuator."""
+    text = (models_directory() / "comau_racer_1_4" / "comau_racer_1_4.sdf").read_text("utf-8")
+    before, after = text.split('<joint name="joint_3"')
+    model = tmp_path / "undriven.sdf"
+    changed = re.sub("<effort>.*?</effort>", "<effort>0</effort>", after, count=1)
+    model.write_text(f'{before}<joint name="joint_3"{changed}', encoding="utf-8")
+    return model
+
+
+def test_a_joint_without_actuator_is_named_where_torques_are_commanded(path, undriven):
+    builder = DiagramBuilder()
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(undriven))
+    plant.Finalize()
+    with pytest.raises(InputError, match=r"joints without actuator: 'joint_3'; .*add_actuators"):
+        add_path_following(builder, plant, "tool_point", path, "rigid")
+    servos = add_path_following(builder, plant, "tool_point", path, "velocity_servo")
+    assert servos.HasOutputPort("velocity_reference") and not servos.HasOutputPort("actuation")
+
+
+def test_actuators_that_are_added_drive_their_joints(path, undriven):
+    """The third joint's actuator is the last of the plant then."""
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    Parser(plant).AddModels(str(undriven))
+    add_actuators(plant, undriven, effort_limits={"joint_3": 800.0})
+    plant.Finalize()
+    follower = add_path_following(builder, plant, "tool_point", path, "rigid")
+    builder.Connect(plant.get_state_output_port(), follower.GetInputPort("plant_state"))
+    builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
+    simulator = Simulator(builder.Build())
+    own = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositionsAndVelocities(own, follower.start_state)
+    simulator.AdvanceTo(0.1)
+    drive, actuation = (read(simulator, follower, name) for name in ("drive_torque", "actuation"))
+    # held since the last sample
+    np.testing.assert_allclose(actuation, drive[[0, 1, 3, 4, 5, 2]], rtol=0, atol=0.2)
+    assert np.abs(np.subtract.outer(drive, drive))[~np.eye(6, dtype=bool)].min() > 0.5
+    assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
+
+
+def test_doubts_that_a_scenario_has_are_told_and_logged_once(path, caplog):
+    """Of gains that are unstable on a perfect model, and of waypoints in nearly one place."""
+    close = np.array([*POINTS[:2], POINTS[1], *POINTS[2:]])
+    close[2] += [0.0, 0.24e-6, 0.0]
+    close = path_from_waypoints(WaypointTable(close), smoothness=6, closed=True)
+    gains = GainParameters(poles=[-300.0] * 4)
+    law = LawGains(eta=gains, xi=gains, posture=gains)
+    options = FollowerOptions(controller=ControllerParameters(gains={"elastic": law}))
+    with caplog.at_level(logging.WARNING, "pfsc_drake"):
+        _, follower = closed_loop(close, "comau_racer_1_4_elastic", "elastic", options)
+    points, loop = follower.warnings
+    assert "waypoints 2 and 3 are 0.24 um apart" in points
+    assert "path_from_waypoints: tolerance (m)" in points and "path.shape" not in points
+    assert "unstable at the start even on a perfect model" in loop
+    assert [record.message for record in caplog.records] == follower.warnings
+
+
+def test_a_law_that_does_not_suit_the_robot_is_named(path):
+    """The composite law with more damping than sampling at 1 ms allows, and with less."""
+    for damping, is_named in ((0.01, True), (0.001, False)):
+        chosen = ControllerParameters(boundary_layer_damping=[damping] * 6)
+        options = FollowerOptions(controller=chosen)
+        model = "comau_racer_1_4_elastic"
+        _, follower = closed_loop(path, model, "singular_perturbation", options)
+        assert any("damping of the joint torques" in w for w in follower.warnings) == is_named
+
+
+@pytest.mark.parametrize(
+    ("row", "value", "said"),
+    [
+        (7, np.nan, "a measured value is not a finite number: v_J_2 and v_M_2 at eta = "),
+        (2, 1.5, "measured values of a joint contradict each other: v_J_3 and v_M_3 at eta ="),
+    ],
+)
+def test_a_fault_is_described(path, row, value, said):
+    """By what is measured at the sample of the fault; a value jumps there."""
+    builder = DiagramBuilder()
+    plant = load(DiagramBuilder(), "comau_racer_1_4")
+    follower = add_path_following(builder, plant, "tool_point", path, "rigid")
+    builder.ExportInput(follower.GetInputPort("plant_state"), "state")
+    simulator = Simulator(builder.Build())
+    port, root = simulator.get_system().GetInputPort("state"), simulator.get_mutable_context()
+    port.FixValue(root, follower.start_state)
+    simulator.AdvanceTo(2.5e-3)
+    wrong = follower.start_state.copy()
+    wrong[row] = value
+    port.FixValue(root, wrong)
+    simulator.AdvanceTo(3e-3)
+    own = follower.GetMyContextFromRoot(root)
+    fault = follower.GetOutputPort("fault").Eval(own)
+    sentence = follower.describe(fault, own)
+    assert sentence.startswith(said) and sentence.endswith("t = 0.003 s")
+    assert follower.describe(fault) == Fault(int(fault[0])).explanation
+    with pytest.raises(InputError, match=rf"fault = 99.0; allowed: 0 to {max(Fault):d}"):
+        follower.describe(99)
 
 
 def test_an_override_slows_the_progress_and_not_the_tool(path):

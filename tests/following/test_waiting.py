@@ -21,6 +21,9 @@ from pfsc_drake import (
 )
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
+from pfsc_drake.following import waiting
+from pfsc_drake.following.waiting import joint_course
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from tests.following.test_path_following import load, read
 
 POINTS = np.array([[0.9, y, 0.8] for y in np.linspace(-0.4, 0.4, 9)])
@@ -92,6 +95,29 @@ def test_it_is_exported_as_c_with_its_obstacles(loop, tmp_path):
     assert {"name": "obstacles", "size": 6} in [
         {key: port[key] for key in ("name", "size")} for port in interface["inputs"]
     ]
+
+
+def test_friction_is_taken_off_what_drives_can_do(monkeypatch):
+    """``(1 - reserve) (effort - f_c)`` where the weight is small."""
+    builder = DiagramBuilder()
+    plant = load(builder, "comau_racer_1_4")
+    path = path_from_waypoints(WaypointTable(POINTS), smoothness=6)
+    motion = rest_to_rest([0.0, 0.1], velocity=0.5, acceleration=3.0)
+    made = []
+
+    def spy(*arguments):
+        made.append(joint_course(*arguments))
+        return made[-1]
+
+    monkeypatch.setattr(waiting, "joint_course", spy)
+    f_c = np.array([40.0, 0.0, 30.0, 10.0, 8.0, 3.0])
+    options = dc.replace(OPTIONS, friction=(f_c, np.zeros(6)))
+    add_path_following(builder, plant, "tool_point", path, "rigid", motion=motion, options=options)
+    chain, _ = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
+    expected = (1.0 - WATCH.reserve) * (chain.gather("effort_limit") - f_c)
+    allowed = made[0].allowed[:, :6]
+    # axes 1, 4, 5 and 6 have next to no weight
+    np.testing.assert_allclose(allowed[:, [0, 3, 4, 5]] / expected[[0, 3, 4, 5]], 1.0, rtol=1e-9)
 
 
 def test_what_cannot_wait_is_refused():

@@ -116,6 +116,8 @@ def test_an_excitation_is_found_and_written(tmp_path, capsys):
         (["consistent", ROBOT, "missing.h5"], ["missing.h5"]),
         (["excite", ROBOT], ["acceleration"]),
         (["excite", ROBOT, "--limit", "speed=3"], ["speed"]),
+        (["excite", ROBOT, "--seed", "-1"], ["--seed", "greater than or equal to 0"]),
+        (["simulate", ROBOT, "--seed", "-1"], ["--seed", "greater than or equal to 0"]),
         (["excite", ROBOT, "--harmonics", "1,x", "--limit", "acceleration=30"], ["--harmonics"]),
     ],
 )

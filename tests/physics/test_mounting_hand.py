@@ -316,3 +316,14 @@ def test_what_it_does_stands_still_while_it_does_not_see_the_tool():
     for name in ("phase", "since", "clock", "force", "torque", "deepest", "when"):
         assert np.array_equal(stepper.states[name], states[name])
     assert not stepper.states["wrench"].any()
+
+
+@pytest.mark.parametrize(("share", "phase"), [(0.4, "INSERT"), (0.6, "ALIGN")])
+def test_half_the_gap_that_it_sees_is_close_enough(share, phase):
+    """An eye that makes no errors takes a plate within half of its gap for aligned."""
+    operator = hand(**SURE, eye_gap=2e-3)
+    hover = operator.block._mounting.hover
+    state = operator.start(phase=float(MountingPhase.ALIGN))
+    where = pose(-PINS - hover, beside=(share * 2e-3, 0.0))
+    state, _ = go(operator, state, END, 0.05, where)
+    assert operator.phase(state).name == phase

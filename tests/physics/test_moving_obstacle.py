@@ -56,6 +56,22 @@ def test_its_largest_acceleration_is_that_of_its_velocity():
     assert ObstacleParameters(way=[*soft[:-1]]).largest_acceleration == np.inf
 
 
+def test_accelerations_before_the_start_of_time_do_not_count():
+    """It runs at 3 m/s before, in part within a piece that goes on after 0."""
+    way = [
+        Stride(-2.0, [-3.0, 0.0, 0.0]), Stride(-1.0, [0.0, 0.0, 0.0]),
+        Stride(-0.5, [0.8, 0.1, 0.0]), Stride(0.5, [1.0, 0.2, 0.0]),
+        Stride(3.5, [1.4, 0.5, 0.0]), Stride(5.5, [1.4, 0.5, 0.0]),
+    ]  # fmt: skip
+    obstacle = ObstacleParameters(way=way)
+    times = np.linspace(0.0, 5.5, 50001)
+    change = np.linalg.norm(np.gradient(obstacle.curve(times, 1), times, axis=0), axis=1)
+    before = np.linspace(-2.0, 0.0, 5001)
+    earlier = np.linalg.norm(np.gradient(obstacle.curve(before, 1), before, axis=0), axis=1)
+    assert earlier.max() > 2.0 * change.max()
+    assert obstacle.largest_acceleration == pytest.approx(change.max(), rel=2e-3)
+
+
 def test_its_largest_speed_is_known_beforehand():
     largest = np.linalg.norm(_run()[:, 3:], axis=1).max()
     assert ObstacleParameters(way=WAY).largest_speed == pytest.approx(largest, rel=1e-3)

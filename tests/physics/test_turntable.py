@@ -19,7 +19,7 @@ def test_angles_come_late_and_the_truth_does_not(ticks):
 
 def test_angles_are_whole_increments():
     drive = Stepper(TurntableDrive(1, 360.0, 0))
-    degrees = np.rad2deg(drive.step(followed=np.deg2rad([12.4, 5.0]))["measured"])
-    assert degrees == pytest.approx([12.0], abs=1e-12)
-    degrees = np.rad2deg(drive.step(followed=np.deg2rad([-12.6, 5.0]))["measured"])
-    assert degrees == pytest.approx([-13.0], abs=1e-12)
+    degrees = np.rad2deg(drive.step(followed=np.deg2rad([12.6, 5.0]))["measured"])
+    assert degrees == pytest.approx([13.0], abs=1e-12)
+    degrees = np.rad2deg(drive.step(followed=np.deg2rad([-12.4, 5.0]))["measured"])
+    assert degrees == pytest.approx([-12.0], abs=1e-12)

@@ -7,11 +7,13 @@ import resource
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from pfsc_drake import InputError
+from reporting.exchange import end_exchange
 from reporting.folder import check_folder, open_results
 from reporting.provenance import MANIFEST, PROJECT_ROOT, RESULTS, read_outcome
 
@@ -32,6 +34,12 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+def visible(folder: Path) -> dict[str, bytes]:
+    """The same without what is being written."""
+    hidden = (".next", ".ready", ".unfinished")
+    return {name: text for name, text in content(folder).items() if not name.startswith(hidden)}
+
+
 def assert_refused(folder, reason, kind="run", inputs=()):
     """Refused with one line by check and by opening, and nothing has changed."""
     before = content(folder)
@@ -48,16 +56,17 @@ def test_results_of_an_earlier_run_are_replaced_and_all_else_stays(out):
     (out / "notes.txt").write_text("mine")
     (out / "mine").mkdir()
     (out / "mine" / "log.h5").write_text("mine")
+    before = content(out)
     with open_results(out, "run") as results:
-        assert set(content(out)) == {"notes.txt", "mine/log.h5", MANIFEST}
-        assert not (out / "figures").exists()
         assert results.write("log.h5", b"second") == out / "log.h5"
+        assert visible(out) == before
         assert results.explain_problems() is None
+        assert not (out / "figures").exists()
     assert set(content(out)) == {"notes.txt", "mine/log.h5", MANIFEST, "log.h5"}
     assert (out / "log.h5").read_bytes() == b"second"
 
 
-@pytest.mark.parametrize("name", [*RESULTS, MANIFEST, ".unfinished", "figures"])
+@pytest.mark.parametrize("name", [*RESULTS, MANIFEST, ".unfinished", ".next", ".ready", "figures"])
 @pytest.mark.parametrize("kind_of_file", ["file", "link", "dead link", "folder"])
 def test_what_no_run_has_written_is_in_the_way(tmp_path, name, kind_of_file):
     folder, target = tmp_path / "out", tmp_path / "target"
@@ -156,6 +165,7 @@ def test_no_folder(tmp_path):
 
 
 def test_one_process_at_a_time(out):
+    first = content(out)
     code = (
         "import sys; from pathlib import Path;"
         "from reporting.folder import open_results\n"
@@ -174,16 +184,111 @@ def test_one_process_at_a_time(out):
         ):
             pass
         assert content(out) == before
-        process.kill()  # a crash leaves no lock
+        process.kill()  # a crash leaves no lock, and the earlier results
         process.communicate()
+    assert visible(out) == first and (out / ".next" / "log.h5").exists()
     with open_results(out, "run"):
-        assert set(content(out)) == {MANIFEST}
+        pass
+    assert set(content(out)) == {MANIFEST}
 
 
 def test_a_process_that_ends_while_it_writes_leaves_no_trap(out):
     (out / ".unfinished").write_text("half a log")
     with open_results(out, "run"):
-        assert set(content(out)) == {MANIFEST}
+        pass
+    assert set(content(out)) == {MANIFEST}
+
+
+class Killed(BaseException):
+    """The end of a process."""
+
+
+@pytest.mark.parametrize("step", range(14))
+def test_a_process_that_ends_amid_the_exchange_leaves_one_of_both_whole(out, monkeypatch, step):
+    """After what the next one does first."""
+    (out / "notes.txt").write_text("mine")
+    old = content(out) | {MANIFEST: b""}
+    new = {name: f"second {name}".encode() for name in ("log.h5", "sweep.csv", "figures/a.png")}
+    wanted = new | {"notes.txt": b"mine", MANIFEST: b""}
+    steps = {
+        name: getattr(Path, name) for name in ("rename", "replace", "unlink", "rmdir", "mkdir")
+    }
+    left = [step]
+
+    def counted(name):
+        def call(self, *arguments, **options):
+            if left[0] == 0:
+                raise Killed
+            left[0] -= 1
+            return steps[name](self, *arguments, **options)
+
+        return call
+
+    with suppress(Killed), open_results(out, "run") as results:
+        for name, text in new.items():
+            results.write(name, text)
+        for name in steps:
+            monkeypatch.setattr(Path, name, counted(name))
+        results.exchange()
+    monkeypatch.undo()
+    check_folder(out, "run")
+    end_exchange(out)
+    found = visible(out) | {MANIFEST: b""}
+    assert found in (old, wanted)
+    assert (found == wanted) == (step >= 2)  # behind the one change of a name that decides
+    with open_results(out, "run"):
+        pass
+    assert set(content(out)) == {MANIFEST, "notes.txt"}
+
+
+def test_a_failure_before_there_is_a_result_leaves_the_earlier_ones(out):
+    before = content(out)
+    with pytest.raises(KeyboardInterrupt), open_results(out, "run") as results:
+        results.write("scenario.yaml", "second")
+        raise KeyboardInterrupt
+    assert content(out) == before
+    with pytest.raises(KeyboardInterrupt), open_results(out, "run") as results:
+        results.write("scenario.yaml", "second")
+        results.write("log.h5", "second")
+        raise KeyboardInterrupt
+    assert set(content(out)) == {MANIFEST, "scenario.yaml", "log.h5"}
+    assert (out / "log.h5").read_text() == "second"
+
+
+def test_what_cannot_be_exchanged_is_kept_elsewhere(out, temporary):
+    """Of a folder that is removed, or replaced, when all has been written."""
+    with open_results(out, "run") as results:
+        results.write("log.h5", b"the log")
+        moved = out.rename(out.with_name("moved"))
+        out.mkdir()
+        reason = results.explain_problems()
+    (kept,) = temporary.iterdir()
+    assert reason == (
+        f"cannot write log.h5 into {out}: another folder has taken its place; kept in {kept}"
+    )
+    assert (kept / "log.h5").read_text() == "the log"
+    assert content(out) == {} and (moved / "log.h5").read_text() == "first log.h5"
+
+
+def test_what_is_removed_before_the_exchange_is_said_to_be_lost(out, temporary):
+    with open_results(out, "run") as results:
+        results.write("log.h5", b"the log")
+        shutil.rmtree(out)
+        reason = results.explain_problems()
+    assert reason.endswith(": No such file or directory; lost: log.h5")
+
+
+def test_a_result_that_the_user_changes_meanwhile_stays(out, temporary):
+    with open_results(out, "run") as results:
+        results.write("metrics.json", b"second")
+        results.write("log.h5", b"second")
+        (out / "log.h5").write_text("my own, of another length")
+        (out / "report.html").write_text("with my notes")
+        assert "somebody else has made log.h5 meanwhile; kept in" in results.explain_problems()
+    assert (out / "log.h5").read_text() == "my own, of another length"
+    assert (out / "report.html").read_text() == "with my notes"
+    assert set(content(out)) == {MANIFEST, "metrics.json", "log.h5", "report.html"}
+    assert json.loads((out / MANIFEST).read_text())["files"] == ["metrics.json"]
 
 
 @pytest.fixture(name="temporary")
@@ -205,8 +310,10 @@ def test_a_removed_folder(out, temporary):
     assert picture == kept.parent / "figures" / "path.png"
     assert kept.is_relative_to(temporary)
     assert results.explain_problems() == (
-        f"cannot write log.h5, figures into {out}: No such file or directory; kept in {kept.parent}"
+        f"cannot write log.h5, figures, scenario.yaml into {out}: No such file or directory; kept "
+        f"in {kept.parent}"
     )
+    assert (kept.parent / "scenario.yaml").read_text() == "x"
     assert not out.exists()
 
 

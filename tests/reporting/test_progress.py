@@ -57,6 +57,23 @@ def test_where_work_is_has_no_pace():
     assert "x: linearizing, masses +5 %, t = 2.00 of 4.00 s" in lines
 
 
+def test_a_phase_that_goes_back_has_its_own_pace(monkeypatch):
+    """A run of 4 s is repeated in 2 s: at twice its pace, and from its begin on."""
+    clock = iter([*[0.0] * 3, *[4.0] * 2, *[5.0] * 2, *[6.0] * 2])
+    monkeypatch.setattr("reporting.progress.time.monotonic", lambda: next(clock))
+    stream = io.StringIO()
+    with ProgressDisplay(Console(file=stream, width=200), "x", 4.0) as progress:
+        progress(0.0, "driving")
+        progress(4.0, "driving")
+        for time in (0.0, 2.0, 4.0):
+            progress(time, "repeating the run")
+        assert progress.simulated_time == 4.0
+    last = stream.getvalue().splitlines()[-2:]
+    assert last == [
+        f"x: repeating the run {time:.2f} of 4.00 s, 2.0 x real time" for time in (2.0, 4.0)
+    ]
+
+
 def lines(steps):
     stream = io.StringIO()
     with fraction_display(Console(file=stream, width=100), "search") as tell:

@@ -16,6 +16,7 @@ from diagrams.scenario.model_error import ModelErrorParameters
 from pfsc_drake.errors import InputError
 
 _FACTORS = {"mass": "masses", "stiffness": "stiffnesses", "rotor_inertia": "rotor inertias"}
+_HEAVIEST = 1e4  # kg
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,8 @@ class ErrorBox:
             if not 0.0 <= value < 1.0:
                 option = {"rotor_inertia": "rotor"}.get(key, key)
                 raise InputError(f"--{option} {value:g}: allowed: 0 or a fraction below 1")
-        if not 0.0 <= self.tool_mass < float("inf"):
-            raise InputError(f"--tool {self.tool_mass:g}: allowed: 0 or a positive number of kg")
+        if not 0.0 <= self.tool_mass <= _HEAVIEST:
+            raise InputError(f"--tool {self.tool_mass:g}: allowed: 0 to {_HEAVIEST:g} kg")
 
 
 @dataclass(frozen=True)

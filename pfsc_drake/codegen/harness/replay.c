@@ -68,16 +68,19 @@ static tick_record *read_log(const char *name, size_t *ticks)
     return records;
 }
 
-/* Return how many ticks differ, and print the first. */
-static size_t compare(const tick_record *log, size_t ticks)
+/* Return how many ticks differ, and by how much at most, infinite where one is no number; print
+   the first. */
+static size_t compare(const tick_record *log, size_t ticks, double *largest)
 {
     controller_state state;
     controller_outputs outputs;
     double found[OUTPUTS], expected[OUTPUTS];
     size_t k, i, differing = 0;
+    *largest = 0.0;
     controller_initialize(&state, &log[0].inputs);
     for (k = 0; k < ticks; ++k) {
         int same = 1;
+        double difference;
         controller_step(&state, &log[k].inputs, &outputs);
         memcpy(found, &outputs, sizeof found);
         memcpy(expected, &log[k].outputs, sizeof expected);
@@ -91,6 +94,10 @@ static size_t compare(const tick_record *log, size_t ticks)
                        (unsigned long)k, (unsigned long)i, found[i], expected[i]);
             }
             same = 0;
+            difference = fabs(found[i] - expected[i]);
+            if (!(difference <= *largest)) {
+                *largest = isnan(difference) ? INFINITY : difference;
+            }
         }
         differing += same ? 0u : 1u;
     }
@@ -147,7 +154,7 @@ int main(int argc, char **argv)
     const size_t measured = given > 0 ? given : 1;
     size_t ticks, differing;
     tick_record *log;
-    double *times;
+    double *times, largest;
     if (argc == 4 && strcmp(argv[1], "-w") == 0) {
         return write_outputs(argv[2], argv[3]);
     }
@@ -159,10 +166,10 @@ int main(int argc, char **argv)
         free(times);
         return 2;
     }
-    differing = compare(log, ticks);
+    differing = compare(log, ticks, &largest);
     measure(log, ticks, times, measured);
-    printf("ticks %lu differing %lu median_us %.2f p99_us %.2f worst_us %.2f\n",
-           (unsigned long)ticks, (unsigned long)differing, times[measured / 2],
+    printf("ticks %lu differing %lu largest %.3g median_us %.2f p99_us %.2f worst_us %.2f\n",
+           (unsigned long)ticks, (unsigned long)differing, largest, times[measured / 2],
            times[measured - 1 - measured / 100], times[measured - 1]);
     free(log);
     free(times);

@@ -182,9 +182,7 @@ class ImpedanceLaw:
         (a, b, c, d, p), rates = transition_of(impedance, T)
         e, e_1 = state.position - y_d[0], state.velocity - y_d[1]
         f = tau / ca.vertsplit(impedance, self.num_outputs)[MASS]
-        weights = [T**k / math.factorial(k) for k in range(self.desired_order + 1)]
-        position = sum(w * row for w, row in zip(weights, y_d, strict=True))
-        velocity = sum(w * row for w, row in zip(weights, y_d[1:], strict=False))
+        position, velocity = self.foreseen(desired)
         position += where(rates.yields, a * e + b * e_1 + p * f, 0.0)
         velocity += where(rates.yields, c * e + d * e_1 + b * f, 0.0)
         later = ImpedanceState(
@@ -199,6 +197,17 @@ class ImpedanceLaw:
             + ImpedanceStatus.REFERENCE_NOT_FINITE * ca.logic_not(desired_known)
         )
         return later, status
+
+    def foreseen(self, desired: Any) -> tuple[Any, Any]:
+        """Return y_d and y_d' one period later, shapes (m,), by the derivatives that are given.
+
+        Args:
+            desired: Derivatives 0..desired_order of y_d by rows, shape (.. m,).
+        """
+        y_d = ca.vertsplit(desired, self.num_outputs)
+        weights = [self.period**k / math.factorial(k) for k in range(self.desired_order + 1)]
+        position = sum(w * row for w, row in zip(weights, y_d, strict=True))
+        return position, sum(w * row for w, row in zip(weights, y_d[1:], strict=False))
 
     def push_to(self, state: ImpedanceState, speed: Any, force: Any, free: slice) -> Any:
         """Return the force after which some coordinates have other speeds, shape (m,).

@@ -13,6 +13,7 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceState,
     ImpedanceStatus,
 )
+from pfsc_drake.control.compliance.path_ends import PathEnds
 from pfsc_drake.control.fixtures.program import SLOTS, program_function
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits, limit_kinds, tightest_function
 from pfsc_drake.control.manifolds.coordinate import Kind
@@ -65,6 +66,7 @@ class ImpedanceFilter(Block):
             then from y_p itself; ``actual`` from the measured yhat (and yhat' if r > 1, else y_d'),
             so that the loop, not active before, has no error. What is not finite then is awaited.
         free: Coordinates whose speed may be limited; none if omitted.
+        ends: Ends of an open path, between which y_p stays, if there are any.
 
     Raises:
         InputError: If ``start`` is neither.
@@ -76,10 +78,12 @@ class ImpedanceFilter(Block):
         *,
         start: Literal["reference", "actual"] = "reference",
         free: slice | None = None,
+        ends: PathEnds | None = None,
     ) -> None:
         if start not in ("reference", "actual"):
             raise InputError(f"start of an impedance filter: {start!r}; reference or actual")
         self._law, self._at_actual, self._free = law, start == "actual", free
+        self._ends = ends
         m, r = law.num_outputs, law.relative_degree
         self.inputs = {
             "desired_reference": Port((law.desired_order + 1) * m, "m, rad, per s, .."),
@@ -188,7 +192,10 @@ class ImpedanceFilter(Block):
         impedance = u.impedance
         if impedance is None and not self._law.is_constant:
             impedance = self._law.impedance(u.manifold_state[: self._law.num_outputs])
-        return self._law.update(now, u.desired_reference, force, impedance)
+        later, status = self._law.update(now, u.desired_reference, force, impedance)
+        if self._ends is not None:
+            later = self._ends.hold(now, later, u.desired_reference, impedance)
+        return later, status
 
 
 def _state(x: Values) -> ImpedanceState:

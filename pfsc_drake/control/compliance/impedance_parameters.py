@@ -12,10 +12,15 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from pfsc_drake.blocks.cases import first_of, where
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.errors import InputError, require
+from pfsc_drake.yaml.bounds import bounded
 from pfsc_drake.yaml.schema_check import REQUIRED
 
 # relative; what misses the length of a lap by less is a lap
 _ROUNDING = 1e-6
+
+
+# of masses, dampings and stiffnesses; who has the profile knows which
+_PARAMETER = bounded(0.0, 1e10, "kg, N s/m or N/m", infinite=True)
 
 
 @dataclass
@@ -33,10 +38,10 @@ class Profile:
         values: Values there.
     """
 
-    value: float = 0.0
+    value: float = field(default=0.0, metadata=_PARAMETER)
     over: str = "eta"
     at: list[float] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
+    values: list[float] = field(default_factory=list, metadata=_PARAMETER)
 
     def __post_init__(self) -> None:
         if not self.value >= 0.0:

@@ -30,6 +30,7 @@ class Fault(enum.IntEnum):
     DRIVE_CHATTERS = 14
     PRESS_FORCE_LOST = 15
     STOP_REQUESTED = 16
+    BEYOND_END = 17
     FORCE_SENSOR_JUMPED = 18
 
     @property
@@ -56,6 +57,7 @@ _EXPLANATIONS = {
     Fault.DRIVE_CHATTERS: "a drive jumps between its limits",
     Fault.PRESS_FORCE_LOST: "the force on the workpiece is far from its reference",
     Fault.STOP_REQUESTED: "a stop was asked for",
+    Fault.BEYOND_END: "the tool went beyond an end of the path",
     Fault.FORCE_SENSOR_JUMPED: "the force/torque sensor has jumped as no force does",
 }
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Values
 from pfsc_drake.blocks.cases import all_finite
+from pfsc_drake.checks import require_between
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare
@@ -26,6 +27,9 @@ from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel
+
+# m; what a tool is beyond an end of an open path before it is a fault, and what may be chosen
+MAX_BEYOND_END, BEYOND_END_RANGE = 0.02, (1e-4, 0.5)
 
 
 class LawLayout:
@@ -85,6 +89,7 @@ class FollowingLaw:
             reference asks for, ``q' - A^-1 (yhat' - yhat_p')``; for r > 1. With more joints than
             outputs it is the one next to the posture reference's.
         posture: What joints beyond the number of outputs do; for a robot that has some.
+        max_beyond_end: How far the tool may be beyond an end of an open path [m].
 
     Attributes:
         layout: Layout of the results.
@@ -110,12 +115,14 @@ class FollowingLaw:
         *,
         tells_reference_velocity: bool = False,
         posture: Posture | None = None,
+        max_beyond_end: float = MAX_BEYOND_END,
     ) -> None:
         n = linearization.num_joints
         if np.shape(limits) != (n,) or not np.all(np.asarray(limits) > 0.0):
             raise InputError(f"drive limits: {limits}; must be {n} positive numbers")
         if not 0.0 < max_alpha < 1.0:
             raise InputError(f"max_alpha: {max_alpha}; must lie between 0 and 1")
+        require_between("max_beyond_end", max_beyond_end, *BEYOND_END_RANGE, "m")
         if stabilization.relative_degree != linearization.relative_degree:
             raise InputError(
                 f"gains of relative degree {stabilization.relative_degree} for a law of "
@@ -146,10 +153,10 @@ class FollowingLaw:
             n if tells_reference_velocity else 0,
             linearization.num_outputs if inverse.damped_below else 0,
         )
-        self.function = self._compose(max_alpha)
+        self.function = self._compose(max_alpha, max_beyond_end)
 
     @once_per_content()
-    def _compose(self, max_alpha: float) -> ca.Function:
+    def _compose(self, max_alpha: float, max_beyond_end: float) -> ca.Function:
         """Return the law as one function: inputs by :class:`LawInputs`, results by the layout."""
         linearization, inverse = self.linearization, self.inverse
         u = LawInputs.symbols(linearization, has_posture=self.posture is not None)
@@ -169,7 +176,14 @@ class FollowingLaw:
         # limits turn NaN into numbers
         finite = all_finite(wanted, told, solution.rcond, u.state, u.tau_ext)
         usable = ca.logic_and(solution.usable, finite)
-        fault = judged(u, linearization, max_alpha, aim.angle, usable)
+        fault = judged(
+            u,
+            linearization,
+            aim,
+            usable,
+            max_alpha=max_alpha,
+            max_beyond_end=max_beyond_end,
+        )
         result = [drive, told, fault, solution.rcond, saturated, drives.held(x)]
         if self._tells_velocity:
             result.append(self._reference_velocity(u, aim, spare))

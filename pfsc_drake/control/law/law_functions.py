@@ -215,31 +215,54 @@ def left_to_outputs(
 
 
 def judged(
-    u: LawInputs, linearization: Linearization, max_alpha: float, angle: ca.SX, usable: ca.SX
+    u: LawInputs,
+    linearization: Linearization,
+    aim: Aim,
+    usable: ca.SX,
+    *,
+    max_alpha: float,
+    max_beyond_end: float,
 ) -> ca.SX:
     """Return the :class:`Fault` that forbids the use of a result, the root cause first.
 
     Args:
         u: What the law is told.
         linearization: The relation between drives and virtual output.
-        max_alpha: Where the feasible neighbourhood (3.9) ends for the controller.
-        angle: Largest error angle [rad].
+        aim: What the law wants of the virtual output.
         usable: Whether the decoupling matrix could be inverted, and all results are finite.
+        max_alpha: Where the feasible neighbourhood (3.9) ends for the controller.
+        max_beyond_end: How far the tool may be beyond an end of an open path [m].
     """
     layout = linearization.manifold.layout
     alpha, status = u.manifold_point[layout.alpha], u.manifold_point[layout.status]
     not_converged = status == float(ProjectionStatus.NOT_CONVERGED)
     # written so that NaN is a fault
-    inside = alpha < max_alpha
+    inside, beyond = alpha < max_alpha, _beyond_ends(linearization, aim, max_beyond_end)
+    aligned = aim.angle < _LARGEST_ANGLE
     told = all_finite(u.state, u.reference, u.integral, u.tau_ext, u.friction, u.posture)
     return first_of(
-        (all_of(usable, inside, ca.logic_not(not_converged), angle < _LARGEST_ANGLE), Fault.NONE),
+        (
+            all_of(usable, inside, ca.logic_not(not_converged), aligned, ca.logic_not(beyond)),
+            Fault.NONE,
+        ),
         (ca.logic_not(told), Fault.INPUT_NOT_FINITE),
         (not_converged, Fault.PROJECTION_FAILED),
-        (angle >= _LARGEST_ANGLE, Fault.ORIENTATION_ERROR),
+        (aim.angle >= _LARGEST_ANGLE, Fault.ORIENTATION_ERROR),
+        (beyond, Fault.BEYOND_END),
         (inside, Fault.SINGULAR),
         otherwise=Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD,
     )
+
+
+def _beyond_ends(linearization: Linearization, aim: Aim, allowed: float) -> ca.SX:
+    """Return whether a coordinate is farther beyond an end than is allowed [m]."""
+    ends = [coordinate.ends for coordinate in linearization.manifold.coordinates]
+    outside = [
+        ca.logic_or(aim.Y[k, 0] < first - allowed, aim.Y[k, 0] > last + allowed)
+        for k, (first, last) in enumerate(ends)
+        if math.isfinite(last - first)
+    ]
+    return any_of(*outside) if outside else ca.SX(0.0)
 
 
 def _whole_turns(angle: ca.SX) -> ca.SX:

@@ -11,6 +11,7 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.jets import Jet, compose
 
 # velocity on a ramp of unit length and height: C^3 at both ends, so that the
 # position is C^4, which the elastic law needs (3.67)
@@ -239,11 +240,14 @@ class SmoothStart(Block):
             shape ((order + 1) m,).
         manifold_state (input): Derivatives 0.. of the virtual output y by rows, m each, which is
             read at the start only.
+        own_time (input, optional): Time of the reference and its derivatives, shape (order + 1,)
+            [s, 1, 1/s, ..]: where the reference waits, the transition waits, too. That of the
+            clock if not connected.
         reference (output): Derivatives 0..order of ``y_p`` by rows, shape ((order + 1) m,).
 
     State:
         distance: ``y(0) - y_d(0)``, shape (m,); a tool that is nowhere has none. begin: Tick at
-        the start.
+        the start, or own time then [s].
 
     Args:
         duration: How long the transition takes [s].
@@ -261,18 +265,30 @@ class SmoothStart(Block):
     ) -> None:
         self._transition, self._m, self._period = Transition(duration, order), num_outputs, period
         size = (order + 1) * num_outputs
-        self.inputs = {"desired_reference": Port(size), "manifold_state": Port(state_size)}
+        self.inputs = {
+            "desired_reference": Port(size),
+            "manifold_state": Port(state_size),
+            "own_time": Port(order + 1, "s, 1, 1/s, ..", optional=True),
+        }
         self.outputs = {"reference": Port(size)}
         self.states = {"distance": num_outputs, "begin": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero."""
         distance = u.manifold_state[: self._m] - u.desired_reference[: self._m]
-        return {"distance": where(is_finite(distance), distance, 0.0), "begin": t}
+        begin = t if u.own_time is None else u.own_time[0]
+        return {"distance": where(is_finite(distance), distance, 0.0), "begin": begin}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        elapsed = (t - x.begin) * self._period
-        left = ca.vec(x.distance @ self._transition.at(elapsed).T)
+        if u.own_time is None:
+            elapsed = (t - x.begin) * self._period
+            share = self._transition.at(elapsed)
+        else:
+            elapsed, *rates = ca.vertsplit(u.own_time - ca.vertcat(x.begin, 0.0 * u.own_time[1:]))
+            derivatives = ca.vertsplit(self._transition.at(elapsed))
+            moved = compose(derivatives, Jet.from_derivatives([elapsed, *rates]))
+            share = ca.vertcat(*moved.derivatives())
+        left = ca.vec(x.distance @ share.T)
         rest = where(elapsed < self._transition.duration, left, 0.0)
         return {"reference": u.desired_reference + rest}

@@ -1,5 +1,6 @@
-"""What drives do after a fault: stop, and hold the robot where it has come to rest."""
+"""Safe state of the drives: stop, and hold the robot where it has come to rest."""
 
+import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -8,12 +9,13 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import is_finite, where
+from pfsc_drake.blocks.cases import all_of, is_finite, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.stopping_step import (
     Joints,
     StopMemory,
     inverse_dynamics,
+    requests_brakes,
     stopping_step,
 )
 from pfsc_drake.errors import InputError
@@ -27,6 +29,28 @@ _PEAK = 1.5
 _LEAST_SHARE = 0.1
 
 
+class StopCategory(enum.IntEnum):
+    """Stop category of IEC 60204-1 that a controller requests."""
+
+    NONE = -1
+    BRAKES = 0
+    CONTROLLED = 1
+    HOLD = 2
+
+    @property
+    def explanation(self) -> str:
+        """One phrase for people."""
+        return _CATEGORIES[self]
+
+
+_CATEGORIES = {
+    StopCategory.NONE: "no stop",
+    StopCategory.BRAKES: "close the brakes now, and take the power off once they hold",
+    StopCategory.CONTROLLED: "controlled stop, then brakes",
+    StopCategory.HOLD: "controlled stop, held by the drives",
+}
+
+
 @dataclass(frozen=True)
 class SafeState:
     """How a robot is stopped and held, see :class:`SafeStop`.
@@ -35,11 +59,14 @@ class SafeState:
         damping: Damping of every drive at least [Nm s/rad], shape (N,).
         bandwidth: ``omega`` of the position hold [rad/s].
         effort_share: Part of the drives' limits that braking is planned with, up to 1.
+        brake_delay: From the request of the robot's holding brakes until they hold [s]; infinite
+            for a robot without.
     """
 
     damping: np.ndarray
     bandwidth: float = 60.0
     effort_share: float = 0.7
+    brake_delay: float = np.inf
 
     def check(self, num_joints: int) -> None:
         """Refuse what is out of range.
@@ -58,6 +85,10 @@ class SafeState:
             )
         if not 0.0 < self.bandwidth < np.inf:
             raise InputError(f"safe state bandwidth: {self.bandwidth}; must be positive and finite")
+        if not self.brake_delay >= 0.0:
+            raise InputError(
+                f"safe state brake delay: {self.brake_delay}; must be zero or a positive number"
+            )
         if not 0.0 < self.effort_share <= 1.0:
             raise InputError(
                 f"safe state effort share: {self.effort_share}; must be above 0, at most 1"
@@ -84,17 +115,22 @@ class SafeStop(Block):
     velocity is integrated and drawn to what the link's position says; where its velocity is, the
     position is differentiated; of a rigid joint either side does. Of an elastic joint
     of which only the link is seen the motor is simulated, on its spring and with some damping,
-    and half the gains act on that. A joint of which nothing is seen gets
-    ``tau_J`` alone: its weight is borne, but only a brake holds it. A value that is not finite
-    is used again when it is back; one that was found implausible is not.
+    and half the gains act on that. A joint of which nothing is measured gets
+    ``tau_J`` alone: its weight is compensated, but only a brake holds it. A value that is not
+    finite is used again when it is back; one that was found implausible is not.
+
+    ``stop_category`` is that of IEC 60204-1: 1 during a stop of a robot with brakes, 2 of one
+    without, which the drives hold; 0 requests the brakes at once: 0.2 s after the planned end of
+    the stop where there are brakes, and in any case once nothing has held a joint for 50 ms. Until
+    the brakes hold, the drives go on; then ``tau_J`` is left of their torques.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         fault (input): Nonzero from the fault on, shape (1,).
         suspects (input): What of the state is found implausible now, nonzero if so, shape (4N,).
         torque (output): Torques of the drives, within their limits, shape (N,) [Nm or N]; zero
-        without a
-            fault.
+            without a fault.
+        stop_category (output): A :class:`StopCategory`, shape (1,), -1 without a fault.
         ignored (output): What of the state is not used any more, nonzero if so, shape (4N,). It
             depends on the state alone.
 
@@ -122,7 +158,8 @@ class SafeStop(Block):
         n, robot = robot.dimension, robot.numeric
         joints = Joints.of(robot, np.asarray(limits), settings.damping)
         self._start = starting_function(robot, joints, settings.effort_share, period)
-        self._step = stopping_step(robot, joints, settings.bandwidth, period)
+        self._step = stopping_step(robot, joints, settings.bandwidth, settings.brake_delay, period)
+        self._brake_delay = settings.brake_delay
         self._sizes = StopMemory.sizes(n)
         self.inputs = {
             "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
@@ -131,6 +168,7 @@ class SafeStop(Block):
         }
         self.outputs = {
             "torque": Port(n, "Nm or N"),
+            "stop_category": Port(1),
             "ignored": Port(4 * n),
         }
         self.inner = {"later": sum(self._sizes.values())}
@@ -150,11 +188,24 @@ class SafeStop(Block):
         n = self.outputs["torque"].size
         idle = ca.vertcat(ca.DM(n, 1), *before._replace(last=u.joint_state))
         torque, later = ca.vertsplit(ca.if_else(u.fault, stop, idle, True), [0, n, stop.numel()])
-        return {"torque": torque, "ignored": x.ignored, "later": later}
+        return {
+            "torque": torque,
+            "stop_category": self._category(u.fault, x.stopping, before),
+            "ignored": x.ignored,
+            "later": later,
+        }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
         return {"stopping": u.fault != 0.0} | self._split(y.later)
+
+    def _category(self, fault: Any, stopping: Any, memory: StopMemory) -> Any:
+        """Return the stop category, of the memory of a stop that has begun before."""
+        has_brakes = np.isfinite(self._brake_delay)
+        controlled = StopCategory.CONTROLLED if has_brakes else StopCategory.HOLD
+        brakes = all_of(stopping, requests_brakes(memory, self._brake_delay))
+        category = where(brakes, float(StopCategory.BRAKES), float(controlled))
+        return where(fault, category, float(StopCategory.NONE))
 
     def _split(self, memory: Any) -> dict[str, Any]:
         """Return the parts of a memory by name."""
@@ -198,6 +249,8 @@ def starting_function(
         inertia=ca.diag(D),
         position=q_M,
         rate=v_M,
+        unheld=ca.SX(1, 1),
+        braked=ca.SX(1, 1),
         ignored=suspects,
         last=state,
     )

@@ -22,6 +22,7 @@ class WaitingReference(TimedReference):
         clock (output): Own time s, the pace ``z_1``, where s comes to rest if nothing more is
             asked for, and the lags ``z_2`` to ``z_r`` of the pace, see :class:`WaitingPace`, shape
             (r + 2,) [s, 1, s, 1, ..].
+        own_time (output): Own time and its derivatives 1..r, shape (r + 1,) [s, 1, 1/s, ..].
 
     Args:
         eta_p: As there.
@@ -36,7 +37,11 @@ class WaitingReference(TimedReference):
         super().__init__(eta_p, pace.order, num_outputs, period, pace.bandwidth)
         self._waiting = pace
         self.inputs = {"override": Port(1)}
-        self.outputs = {**self.outputs, "clock": Port(pace.order + 2, "s, 1, s, 1, ..")}
+        self.outputs = {
+            **self.outputs,
+            "clock": Port(pace.order + 2, "s, 1, s, 1, .."),
+            "own_time": Port(pace.order + 1, "s, 1, 1/s, .."),
+        }
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero; at rest."""
@@ -47,4 +52,4 @@ class WaitingReference(TimedReference):
         s, *rates = ca.vertsplit(x.pace)
         lags = self._waiting.lags(rates)
         clock = ca.vertcat(s, lags[0], self._waiting.rest(s, lags), *lags[1:])
-        return {**super().output(x, u, t), "clock": clock}
+        return {**super().output(x, u, t), "clock": clock, "own_time": x.pace}

@@ -1,6 +1,7 @@
 """What a coordinate of a manifold is."""
 
 import enum
+import math
 from dataclasses import dataclass
 
 
@@ -25,8 +26,10 @@ class Coordinate:
         name: Its name.
         kind: Its kind, which decides gains, compliance and unit.
         force: Name of the generalized force along it.
+        ends: Where what is followed ends [m], an open path; infinite where nothing ends.
     """
 
     name: str
     kind: Kind
     force: str
+    ends: tuple[float, float] = (-math.inf, math.inf)

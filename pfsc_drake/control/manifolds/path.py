@@ -1,7 +1,7 @@
 """The path manifold on jets: tool motion to tangential, transversal, rotational coordinates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -142,6 +142,7 @@ class PathManifold:
         euler: ``zyx`` or ``zyz`` for differences of Euler angles, see :class:`ToolOrientation`.
         turning: Whether ``e_perp`` is given with the path, such as the normal of a surface that
             the path lies on, rather than transported in parallel.
+        length: Length of an open path [m], at whose ends a tool stays; None of one that has none.
 
     Attributes:
         tool: What of the tool's orientation matters.
@@ -163,12 +164,17 @@ class PathManifold:
         yaw_axis: np.ndarray | None = None,
         euler: str | None = None,
         turning: bool = False,
+        length: float | None = None,
     ) -> None:
         self.tool = ToolOrientation(
             oriented, tool_axis=tool_axis, yaw_axis=yaw_axis, euler=euler, manifold=self.name
         )
         self.layout = PathPointLayout(order, oriented, turning)
-        self.coordinates = (*_TRANSLATIONAL, *self.tool.coordinates)
+        eta, *across = _TRANSLATIONAL
+        # those of a point that moves with time are errors, which have no ends
+        if length is not None and not self.follows_time:
+            eta = replace(eta, ends=(0.0, length))
+        self.coordinates = (eta, *across, *self.tool.coordinates)
 
     @property
     def is_oriented(self) -> bool:

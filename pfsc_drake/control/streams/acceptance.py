@@ -31,6 +31,8 @@ class Counts(NamedTuple):
     silence: Any
     heard: Any
     reason: Any
+    most: Any
+    behind: Any
 
     @classmethod
     def of(cls, counts: Any) -> "Counts":

@@ -29,6 +29,8 @@ from pfsc_drake.geometry.point import PathPointLayout
 _BEHIND = 4.0
 # m, m/s, m/s^2: below which the reference rests
 _AT_REST = (1e-6, 1e-5, 1e-3)
+# s, for which a message that was overtaken may come instead of newer ones
+_OVERTAKEN = 0.05
 
 
 class WaypointIntake(Block):
@@ -65,7 +67,8 @@ class WaypointIntake(Block):
         course: As told. older, newest: The last two way points taken, shape (d,); the newest one
         is no control point yet. fresh: Way points of a piece to begin. counts: ``[phase, in fresh,
         real ones in fresh, number of the last real control point, taken, number of the way point
-        that last began a path, ticks without way points, how many there were, reason]``.
+        that last began a path, ticks without way points, how many there were, reason, the most that
+        there were, ticks since there were fewer]``.
         rest: Where the last piece ended, ``[goal, pose]``.
 
     Args:
@@ -96,6 +99,7 @@ class WaypointIntake(Block):
         self._course, self._parameters, self._layout = course, parameters, layout
         self._growth, self._highest = Growth(course, parameters), highest
         self._patience = round(parameters.patience / period)
+        self._overtaken = max(1, round(_OVERTAKEN / period))
         self._begin, along = np.asarray(at_rest, dtype=float), np.asarray(direction, dtype=float)
         d, r = course.dimension, course.order
         require(layout.dimension == d, "dimension of messages", layout.dimension, f"{d}")
@@ -160,9 +164,20 @@ class WaypointIntake(Block):
         """Return what is remembered at the next tick; what is left out stays."""
         counts, total = Counts.of(x.counts), u.waypoints[0]
         total = where(is_finite(total), total, counts.heard)
-        now = counts._replace(heard=total)
+        behind = where(total < counts.most, counts.behind + 1.0, 0.0)
+        anew = behind > self._overtaken
+        # the way points of a sender that counts anew are others
+        now = counts._replace(
+            heard=total,
+            taken=where(anew, 0.0, counts.taken),
+            begun=where(anew, 0.0, counts.begun),
+            reason=where(anew, float(StreamStatus.BEGUN_ANEW), counts.reason),
+            most=where(anew, total, ca.fmax(total, counts.most)),
+            behind=where(anew, 0.0, behind),
+            silence=where(total != counts.heard, 0.0, counts.silence + 1.0),
+        )
+        counts, silence = now, now.silence
         waiting = total - counts.taken
-        silence = where(total != counts.heard, 0.0, counts.silence + 1.0)
         runs_dry = ca.logic_or(silence > self._patience, u.waypoints[1] == 1.0)
         room = u.manifold_point[0] - x.course[0] >= _BEHIND + 1.0
         ready = ca.logic_and(waiting > 0.0, ca.logic_or(room, self._is_urgent(now, u)))
@@ -171,8 +186,8 @@ class WaypointIntake(Block):
         some = ca.logic_or(waiting > 0.0, counts.fresh > 0.0)
         begins = ca.logic_and(counts.phase == RESTING, some)
         acts = ca.logic_or(ca.logic_or(grows, begins), counts.phase >= ENDING)
-        told = ca.vertcat(x.counts[:6], silence, total, counts.reason)
-        remembered = [x.course, x.older, x.newest, x.fresh, told, x.rest]
+        acts = ca.logic_or(acts, anew)
+        remembered = [x.course, x.older, x.newest, x.fresh, ca.vertcat(*now), x.rest]
         given = [u.waypoints, u.motion[: self._watched], u.stop, room, runs_dry]
         after = self._whether(acts, *remembered, *given)
         return dict(zip(self.states, after, strict=True))
@@ -270,7 +285,9 @@ class WaypointIntake(Block):
         reason = where(over, 0.0, reason)
         none = ca.logic_or(ca.logic_or(starts, is_still), offer.new)
         count, real = where(none, 0.0, count), where(none, 0.0, real)
-        told = phase, count, real, last, taken, begun, counts.silence, counts.heard, reason
+        told = counts._replace(
+            phase=phase, fresh=count, real=real, last=last, taken=taken, begun=begun, reason=reason
+        )
         return {
             "course": ca.vertcat(*course.values()),
             "older": older,

@@ -18,6 +18,7 @@ class StreamStatus(IntEnum):
     TURNING = 3
     MISSED = 4
     REFUSED = 5
+    BEGUN_ANEW = 6
 
     @property
     def words(self) -> str:
@@ -32,6 +33,7 @@ _WORDS = {
     StreamStatus.TURNING: "rests where the path turns too sharply, and goes on from there",
     StreamStatus.MISSED: "stops at the last way point that came: later ones were missed",
     StreamStatus.REFUSED: "stops before a way point that is no finite number, or out of bounds",
+    StreamStatus.BEGUN_ANEW: "stops at the last way point: its sender began to count anew",
 }
 
 

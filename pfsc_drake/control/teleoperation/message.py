@@ -2,12 +2,13 @@
 
 import numpy as np
 
-# number of the message, from 1 on; what is followed; what is felt; energy that was given away.
+# number of the message, from 1 on; what is followed; what is felt; energy that was given away; what
+# the tank lacks.
 # With three axes the last three of what is followed and felt are zero.
-_SIZES = {"count": 1, "signal": 6, "felt": 6, "energy": 1}
+_SIZES = {"count": 1, "signal": 6, "felt": 6, "energy": 1, "lack": 1}
 _ENDS = np.cumsum(list(_SIZES.values())).tolist()
 FIELDS = {
     name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)
 }
 MESSAGE = _ENDS[-1]
-UNITS = "1, J^(1/2) s^(1/2) or m and rad, N and Nm, J"
+UNITS = "1, J^(1/2) s^(1/2) or m and rad, N and Nm, J, J"

@@ -18,8 +18,8 @@ class PortTankParameters:
         capacity: Most that the tank holds [J].
         initial: What it holds at the start [J]; where it holds less, the side damps what it moves.
         refill: That damping, where the tank is empty [N s/m].
-        share: Share of what is above ``initial`` that a side without waves sends on in a second
-            [1/s].
+        share: Share of what is above ``initial`` that a side sends on in a second [1/s]; with waves
+            only while the other side lacks energy.
     """
 
     capacity: float = 4.0

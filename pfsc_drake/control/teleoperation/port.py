@@ -17,7 +17,7 @@ SIDES = ("leader", "follower")
 # s: within which a wave that could not be paid is sent later, and for which a tank lasts for that
 _REPAID, _LASTS = 0.1, 0.5
 _NOTHING = 1e-30  # J s
-_RECORD = {"force": 3, "position": 3, "tank": 1, "sent": 1, "received": 1, "share": 1}
+_RECORD = {"force": 3, "position": 3, "tank": 1, "sent": 1, "received": 1, "owed": 1, "share": 1}
 _TURNING = {"moment": 3, "turn": 3}
 _ENDS = np.cumsum([*_RECORD.values(), *_TURNING.values()]).tolist()
 _ROWS = {
@@ -53,8 +53,10 @@ class TeleoperationPort(Block):
         E = min(capacity, E- - F_k . (x_k+1 - x_k) + arrived) - sent
 
     A wave takes ``T |o|^2 / 2`` with it; as ``a^2/2 - F v = o^2/2``, that is what is left, and the
-    tank stays as it is but for what arrives unevenly. What cannot be paid is sent later. Others
-    send a share of what is above the tank's initial content. What is sent leaves a reserve, and a
+    tank stays as it is but for what arrives unevenly. What cannot be paid is sent later, and the
+    other side is told of the ``lack``, what is missing to the initial content, or to the reserve
+    where that is more: a side that has more sends a share of it, so that both come to meet.
+    Couplings without waves always send such a share. What is sent leaves a reserve, and a
     force is given that could not empty what is left at the largest speed. So E never falls below
     zero, and both sides together give no more than their tanks held at the start, whatever the
     channel delays or loses.
@@ -67,14 +69,15 @@ class TeleoperationPort(Block):
     Ports:
         position (input): Of what is moved, in the world of the follower [m], shape (3,).
         orientation (input, six axes): R by rows, shape (9,).
-        message (input): What arrived last from the other side, shape (14,), see :data:`FIELDS`;
+        message (input): What arrived last from the other side, shape (15,), see :data:`FIELDS`;
             zero if nothing did.
         felt (input, optional): Force that the side feels, for the other one [N, Nm], shape (axes,).
         grip (input, optional): Share of the force that is given, shape (1,); 1 if not connected.
         force (output): F, world axes [N, Nm], shape (axes,); it acts ``ticks_late`` ticks later.
-        message (output): For the other side, shape (14,).
+        message (output): For the other side, shape (15,).
         record (output): See :data:`RECORD`: the force that acts from this tick on, x since the
-            start, what is left in the tank, all that was sent and received, and the share of the
+            start, what is left in the tank, all that was sent and received, how far x is from what
+        the other side could be told for want of energy [m] (``owed``), and the share of the
             force and of the wave that could be paid; with six axes :data:`TURNING_RECORD`, too.
 
     State:
@@ -92,6 +95,8 @@ class TeleoperationPort(Block):
     def __init__(self, side: str, coupling: CouplingParameters, limits: PortLimits) -> None:
         self._side, self._coupling, self._limits = side, coupling, limits
         self._waves = coupling.coupling == "waves"
+        # J; of what is above, a share is sent on
+        self._content = max(coupling.tank.initial, limits.reserve)
         self._takeover = _takeover(coupling.smoothing, limits.period)
         self._of = MovedPoint() if coupling.rotation is None else MovedBody()
         axes = self._of.axes
@@ -104,7 +109,9 @@ class TeleoperationPort(Block):
         self.outputs = {
             "force": Port(axes, "N, Nm"),
             "message": Port(MESSAGE, UNITS),
-            "record": Port(_ENDS[-1] if axes > 3 else RECORD["share"].stop, "N, m, J, 1, Nm, rad"),
+            "record": Port(
+                _ENDS[-1] if axes > 3 else RECORD["share"].stop, "N, m, J, m, 1, Nm, rad"
+            ),
         }
         sizes = {"heard": axes, "rate": axes, "given": axes, "aim": axes, "velocity": axes}
         self.states = {"tank": 1, "sent": 1, "received": 1} | sizes | self._of.states
@@ -127,7 +134,7 @@ class TeleoperationPort(Block):
         tank = x.tank - ca.dot(x.forces[-axes:], moved.way) + energy - x.received
         tank = ca.fmin(tank, way.tank.capacity) if way.passive else tank
         aim = way.per_axis("wave") * moved.there - x.taken[-axes:]
-        given, sent, paid = self._send(x, aim, tank)
+        given, sent, paid = self._send(x, aim, tank, ca.fmax(0.0, u.message[FIELDS["lack"]]))
         left = tank - sent
         force = self._force(heard - moved.there, velocity, rate, tank)
         force = self._of.wrench(moved.there, force) + self._told_force(u)
@@ -136,10 +143,13 @@ class TeleoperationPort(Block):
         felt = force if way.coupling == "position_force" else felt
         told = given if self._waves else moved.there
         forces, none = ca.vertcat(force, x.forces), ca.DM.zeros(6 - axes)
-        message = ca.vertcat(t + 1.0, told, none, felt, none, x.sent + sent)
+        lack = ca.fmax(0.0, self._content - left) if self._waves and way.passive else 0.0
+        message = ca.vertcat(t + 1.0, told, none, felt, none, x.sent + sent, lack)
         acting, sent = forces[-2 * axes : -axes], x.sent + sent
         record = ca.vertcat(
-            acting[LINEAR], moved.there[LINEAR], left, sent, energy, ca.fmin(share, paid),
+            acting[LINEAR], moved.there[LINEAR], left, sent, energy,
+            ca.norm_2((aim - given)[LINEAR] / way.per_axis("wave")[LINEAR]) if self._waves else 0.0,
+            ca.fmin(share, paid),
             acting[TURNING], moved.there[TURNING],
         )  # fmt: skip
         after = {
@@ -173,15 +183,16 @@ class TeleoperationPort(Block):
             return way.force_share * felt
         return -felt if way.coupling == "position_force" and self._side == "leader" else 0.0
 
-    def _send(self, x: Values, aim: Any, tank: Any) -> tuple[Any, Any, Any]:
+    def _send(self, x: Values, aim: Any, tank: Any, lack: Any) -> tuple[Any, Any, Any]:
         """Return what was sent of O by now, energy that goes with it [J], and the share of it.
 
         The wave of the last tick comes first, with what is above the reserve; then what has not
         been sent before, by a part of the rest that lasts: the slower, the less energy it takes.
+        What is above the tank's initial content goes to a side that lacks energy.
         """
         way, T, reserve = self._coupling, self._limits.period, self._limits.reserve
         if not self._waves:
-            above = ca.fmax(0.0, tank - max(way.tank.initial, reserve))
+            above = ca.fmax(0.0, tank - self._content)
             return x.given, T * way.tank.share * above if way.passive else ca.DM(0.0), ca.DM(1.0)
         wave = aim - x.aim
         if not way.passive:
@@ -195,7 +206,10 @@ class TeleoperationPort(Block):
         root = ca.sqrt(along**2 + length * 2.0 * T * T / _LASTS * rest)
         most = (root - along) / ca.fmax(length, _NOTHING)
         wave += ca.fmin(most, 1.0) * owed
-        return x.given + wave, ca.sumsqr(wave) / (2.0 * T), share
+        energy = ca.sumsqr(wave) / (2.0 * T)
+        above = ca.fmax(0.0, tank - energy - self._content)
+        shared = way.tank.share * ca.fmin(1.0, lack / self._content) * above
+        return x.given + wave, energy + T * shared, share
 
     def _affordable(self, x: Values, u: Values, force: Any, left: Any) -> tuple[Any, Any]:
         """Return the force that is given [N, Nm], and its share of what is wanted."""

@@ -7,11 +7,13 @@ import numpy as np
 from pfsc_drake.checks import (
     LARGEST_ANGLE,
     require,
+    require_between,
     require_not_negative,
     require_one_of,
     require_positive,
 )
 from pfsc_drake.control.estimation.link_deviation import StateUncertainty
+from pfsc_drake.control.law.following_law import BEYOND_END_RANGE, MAX_BEYOND_END
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.yaml.reading import NAME_OR_FILE
@@ -232,6 +234,8 @@ class ControllerParameters:
             that a robot goes through singular postures off its path rather than stops; 0 for
             never, else above ``min_rcond``.
         max_alpha: End of the feasible neighbourhood for the controller, below 1.
+        max_beyond_end: Largest distance of the tool beyond an end of an open path [m]; a fault
+            farther out.
         brake_damping: Damping of the safe state on every drive, as a fraction of its
             effort limit per rad/s.
         effort_scale: Fraction of the model's effort limits that the law may use.
@@ -261,6 +265,7 @@ class ControllerParameters:
     min_rcond: float = 1e-3
     damped_below: float = 0.0
     max_alpha: float = 0.95
+    max_beyond_end: float = MAX_BEYOND_END
     brake_damping: float = 0.1
     effort_scale: float = 1.0
     manifold: str = "path"
@@ -293,5 +298,6 @@ class ControllerParameters:
         good = self.damped_below == 0.0 or self.min_rcond < self.damped_below < 1.0
         allowed = f"0, or above min_rcond = {self.min_rcond:g} and below 1"
         require(good, "damped_below", self.damped_below, allowed)
+        require_between("max_beyond_end", self.max_beyond_end, *BEYOND_END_RANGE, "m")
         require_positive("effort_scale", self.effort_scale)
         require_not_negative("brake_damping", self.brake_damping)

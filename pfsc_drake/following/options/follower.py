@@ -16,12 +16,12 @@ from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 @dc.dataclass
 class BrakeParameters:
-    """Holding brakes on the motors, which close after a fault.
+    """Holding brakes on the motors, which close at stop category 0.
 
     Attributes:
         torque: Holding torque [Nm, joint side; or N], one for all or of every joint; empty for
             the drive's limit.
-        delay: From the fault until they hold [s].
+        delay: From the request until they hold [s].
     """
 
     torque: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
@@ -51,7 +51,9 @@ class FaultParameters:
             forgotten with 0.2 s; 0 for any number.
         hold_bandwidth: Hold bandwidth of the position hold after a fault [rad/s].
         effort_share: Part of the drives' limits that braking is planned with, up to 1.
-        brakes: Holding brakes; none without the block or with ``brakes: null``.
+        brakes: Holding brakes, which are requested after a stop, and earlier where nothing is
+            measured of a joint (``stop_category``); ``null`` for a robot without, whose drives
+            hold it.
     """
 
     plausibility: float = 2e-3
@@ -61,7 +63,7 @@ class FaultParameters:
     chatter_turns: float = 6.0
     hold_bandwidth: float = 60.0
     effort_share: float = 0.7
-    brakes: BrakeParameters | None = None
+    brakes: BrakeParameters | None = dc.field(default_factory=BrakeParameters)
 
     def __post_init__(self) -> None:
         require_not_negative("plausibility", self.plausibility)
@@ -74,6 +76,10 @@ class FaultParameters:
         require(good, "effort_share", self.effort_share, "above 0, at most 1")
 
 
+# at a sample, so that a region that comes near is found beside those that are
+_FEWEST_LOOKS = 2
+
+
 @dc.dataclass
 class FixtureOptions:
     """What limits a tool that is led through space.
@@ -84,7 +90,7 @@ class FixtureOptions:
         smoothing: Time constant [s] of each of the r - 1 lags that make the reference smooth
             enough for laws that give torques.
         looks: Most distances that are computed at a tick beside those of regions that are near;
-            0 for as many as are due.
+            0 for as many as are due, else 2 or more.
     """
 
     guidance: GuidanceParameters = dc.field(default_factory=GuidanceParameters)
@@ -94,7 +100,8 @@ class FixtureOptions:
 
     def __post_init__(self) -> None:
         require_between("smoothing", self.smoothing, 1e-3, 0.1, "s")
-        require_not_negative("looks", self.looks)
+        good = self.looks == 0 or self.looks >= _FEWEST_LOOKS
+        require(good, "looks", self.looks, f"0, or {_FEWEST_LOOKS} and more")
 
 
 @dc.dataclass

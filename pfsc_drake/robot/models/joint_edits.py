@@ -93,6 +93,19 @@ def sprung_joints(plant: MultibodyPlant) -> list[Joint]:
     return [joint for joint in joints_of(plant) if joint.index() in sprung]
 
 
+def drivable_joints(plant: MultibodyPlant) -> list[Joint]:
+    """Return the joints that actuators can move: revolute or prismatic, no spring, base first.
+
+    Joints with a spring are driven by the motor joint in front of them.
+    """
+    sprung = {joint.index() for joint in sprung_joints(plant)}
+    return [
+        joint
+        for joint in moving_joints(plant)
+        if isinstance(joint, RevoluteJoint | PrismaticJoint) and joint.index() not in sprung
+    ]
+
+
 def actuator_of(plant: MultibodyPlant, joint: Joint) -> JointActuator | None:
     """Return the actuator of a joint, if it has one."""
     for index in plant.GetJointActuatorIndices():

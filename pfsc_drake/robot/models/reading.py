@@ -1,6 +1,6 @@
 """From a robot's model file to a finalized plant, with what there is to say about the model."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,9 +11,9 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     ForceElementIndex,
-    PrismaticJoint,
+    Joint,
+    JointActuator,
     PrismaticSpring,
-    RevoluteJoint,
     RevoluteSpring,
     RigidBody,
     UniformGravityFieldElement,
@@ -31,6 +31,7 @@ from pfsc_drake.robot.models.files import packages_for, read_with_inclusions
 from pfsc_drake.robot.models.inspection import ModelFacts, inspect_model
 from pfsc_drake.robot.models.joint_edits import (
     actuator_of,
+    drivable_joints,
     inboard_joints,
     joints_of,
     moving_joints,
@@ -134,7 +135,7 @@ def read_model(
                 springs = facts.springs.items()
                 add_springs(plant, [(plant.GetJointByName(j), K_s) for j, K_s in springs])
             _require_inertia(plant, model, facts)
-            _drive(plant, file, facts)
+            drive_joints(plant, drivable_joints(plant), file, facts.effort_limits)
             unlimited = _release_velocities(plant)
             make_elastic(plant, options.elastic)
             set_joint_damping(plant, options.joint_damping)
@@ -252,23 +253,34 @@ def _moving_groups(plant: MultibodyPlant) -> list[list[RigidBody]]:
     return list(groups.values())
 
 
-def _drive(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> None:
-    """Add actuators to joints without."""
-    sprung = {joint.index() for joint in sprung_joints(plant)}
-    for joint in moving_joints(plant):
-        if not isinstance(joint, RevoluteJoint | PrismaticJoint) or joint.index() in sprung:
-            continue
+def drive_joints(
+    plant: MultibodyPlant, joints: Iterable[Joint], file: Path, effort_limits: Mapping[str, float]
+) -> list[JointActuator]:
+    """Add actuators to joints without, and return them.
+
+    Args:
+        plant: The plant, not finalized.
+        joints: Joints of the plant, revolute or prismatic.
+        file: The model that they are from.
+        effort_limits: Effort limits by joint [Nm or N].
+
+    Raises:
+        InputError: If the effort limit of a joint is zero.
+    """
+    added = []
+    for joint in joints:
         if actuator_of(plant, joint) is not None:
             continue
         # Drake drives every joint of an SDF model but those with an effort limit of 0
         is_sdf = file.suffix.lower() == ".sdf"
-        effort_limit = facts.effort_limits.get(joint.name(), 0.0 if is_sdf else np.inf)
+        effort_limit = effort_limits.get(joint.name(), 0.0 if is_sdf else np.inf)
         if effort_limit == 0.0:
             raise InputError(
                 f"{file}: joint '{joint.name()}': has neither spring nor actuator (effort = 0); "
                 "allowed: a positive effort limit"
             )
-        plant.AddJointActuator(joint.name(), joint, effort_limit)
+        added.append(plant.AddJointActuator(joint.name(), joint, effort_limit))
+    return added
 
 
 def _require_rotors(plant: MultibodyPlant, file: Path) -> None:

@@ -42,21 +42,50 @@ class PlantCoordinates:
         link_rows: Matrix with ``[q_J, v_J] = link_rows x``, shape (2N, num_states).
         motor_rows: Matrix with ``[q_M, v_M] = motor_rows x``, shape (2N, num_states);
             equal to ``link_rows`` for rigid joints.
-        actuators: Index of each joint's drive in the plant's actuation, shape (N,).
+        joints: Names of the joints that drives move, base first.
+        inputs: Index of each joint's actuator in the plant's actuation; None without an actuator.
+        others: State of everything else in the plant by default, zero at the chain's own
+            coordinates, shape (num_states,); 0 for nothing else.
     """
 
     num_states: int
     link_rows: np.ndarray
     motor_rows: np.ndarray
-    actuators: np.ndarray
+    joints: tuple[str, ...]
+    inputs: tuple[int | None, ...]
+    others: np.ndarray | float = 0.0
+
+    @property
+    def undriven(self) -> list[str]:
+        """Names of the joints without an actuator, base first."""
+        return [joint for joint, i in zip(self.joints, self.inputs, strict=True) if i is None]
+
+    @property
+    def actuators(self) -> np.ndarray:
+        """Index of each joint's actuator in the plant's actuation, shape (N,).
+
+        Raises:
+            InputError: If a joint has none.
+        """
+        if self.undriven:
+            names = ", ".join(f"'{joint}'" for joint in self.undriven)
+            raise InputError(
+                f"plant: joints without actuator: {names}; add actuators "
+                "before Finalize(): pfsc_drake.add_actuators(plant, model), or for each "
+                "plant.AddJointActuator(name, joint, effort_limit)"
+            )
+        return np.array(self.inputs)
 
     def plant_state(self, joint_state: np.ndarray) -> np.ndarray:
-        """Return the plant's state ``[q, v]``, shape (num_states,).
+        """Return the plant's state ``[q, v]``, all but the chain as by default.
 
         Args:
             joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+
+        Returns:
+            The state, shape (num_states,).
         """
-        return self._inverse @ joint_state
+        return self._inverse @ joint_state + self.others
 
     @cached_property
     def rows(self) -> np.ndarray:
@@ -68,9 +97,12 @@ class PlantCoordinates:
 
         Args:
             num_actuators: Number of actuators of the plant, which may have others besides.
+
+        Raises:
+            InputError: If a joint has no actuator.
         """
-        rows = np.zeros((num_actuators, len(self.actuators)))
-        rows[self.actuators, np.arange(len(self.actuators))] = 1.0
+        rows = np.zeros((num_actuators, len(self.joints)))
+        rows[self.actuators, np.arange(len(self.joints))] = 1.0
         return rows
 
     @cached_property
@@ -315,10 +347,13 @@ def _link(
 
 
 def _actuator(plant: MultibodyPlant, joint: Joint) -> JointActuatorIndex | None:
-    for index in plant.GetJointActuatorIndices():
-        if plant.get_joint_actuator(index).joint().index() == joint.index():
-            return index
-    return None
+    """Return the actuator of a joint, if it has one."""
+    actuators = (plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices())
+    found = [actuator for actuator in actuators if actuator.joint().index() == joint.index()]
+    if len(found) > 1:
+        names = ", ".join(f"'{actuator.name()}'" for actuator in found)
+        raise InputError(f"joint '{joint.name()}': actuators {names}; allowed: one")
+    return found[0].index() if found else None
 
 
 def _coordinates(
@@ -334,11 +369,20 @@ def _coordinates(
         if flex is not None:
             flex_rows[i, flex.position_start()] = 1.0
             flex_rows[n + i, nq + flex.velocity_start()] = 1.0
-    actuators = []
-    for motor in motors:
-        index = _actuator(plant, motor)
-        actuators.append(-1 if index is None else plant.get_joint_actuator(index).input_start())
-    return PlantCoordinates(num_states, motor_rows + flex_rows, motor_rows, np.array(actuators))
+    others = plant.GetPositionsAndVelocities(plant.CreateDefaultContext())
+    others[(motor_rows + flex_rows).any(axis=0)] = 0.0
+    actuators = [_actuator(plant, motor) for motor in motors]
+    return PlantCoordinates(
+        num_states,
+        motor_rows + flex_rows,
+        motor_rows,
+        tuple(motor.name() for motor in motors),
+        tuple(
+            None if index is None else plant.get_joint_actuator(index).input_start()
+            for index in actuators
+        ),
+        others,
+    )
 
 
 def _clean(array: np.ndarray) -> np.ndarray:

@@ -39,7 +39,7 @@ def link_frames(plant: MultibodyPlant, coordinates: PlantCoordinates) -> list[Fr
     """
     joints = [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
     moving = {joint.velocity_start(): joint for joint in joints if joint.num_velocities() > 0}
-    velocities = np.s_[len(coordinates.actuators) :, plant.num_positions() :]
+    velocities = np.s_[len(coordinates.joints) :, plant.num_positions() :]
     frames = []
     for motor, link in zip(
         coordinates.motor_rows[velocities], coordinates.link_rows[velocities], strict=True

@@ -36,6 +36,7 @@ class VelocityServo(Diagram):
         joint_state, velocity_reference, silence (optional) (input): See :class:`SampledServo`.
         drive_torque (output): ``tau_d`` within its limits [Nm or N], shape (N,).
         fault (output): A ``Fault``, shape (1,).
+        stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`.
 
     Args:
         robot: The robot as it is believed, N joints.
@@ -100,6 +101,7 @@ class VelocityServo(Diagram):
             builder.ExportInput(servo.GetInputPort(name), name)
         builder.ExportOutput(switch.GetOutputPort("command"), "drive_torque")
         builder.ExportOutput(latch.GetOutputPort("fault"), "fault")
+        builder.ExportOutput(stop.GetOutputPort("stop_category"), "stop_category")
         builder.BuildInto(self)
 
 

@@ -282,3 +282,23 @@ def test_a_reading_that_jumps_is_a_fault_once_it_is_tared(arm, component, size, 
 def test_parameters_out_of_range(key, value):
     with pytest.raises(InputError, match=f"^{key} = .*: must be "):
         ToolCompensationParameters(**{key: value})
+
+
+def test_accelerations_in_steps_are_the_filtered_differences_of_velocities(arm):
+    """As if the held acceleration itself were given, through the same low-pass."""
+    rng, low_pass = np.random.default_rng(4), LowPass(200.0, PERIOD)
+    differentiated, given = (
+        compensation_function(*arm, low_pass, inertia) for inertia in ("differentiated", "given")
+    )
+    states = [np.zeros(differentiated.nnz_in(1)), np.zeros(given.nnz_in(1))]
+    q, v, known, largest = REST.copy(), np.zeros(6), 0.0, 0.0
+    for k in range(40):
+        a = rng.uniform(-8.0, 8.0, 6) if k else np.zeros(6)
+        q, v = q + PERIOD * v, v + PERIOD * a
+        motions, residuals = (np.concatenate([q, v]), np.concatenate([q, v, a])), []
+        for i, function in enumerate((differentiated, given)):
+            _, residual, states[i] = function(motions[i], states[i], known, np.zeros(6), 0.0)
+            residuals.append(np.array(residual).ravel())
+        np.testing.assert_allclose(*residuals, rtol=0, atol=1e-9)
+        largest, known = max(largest, np.ptp(residuals[0][:3])), 1.0
+    assert largest > 1.0

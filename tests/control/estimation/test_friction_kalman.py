@@ -22,11 +22,11 @@ def noise(size, scale=1.0):
     )
 
 
-def masses(delay=0.0):
-    """Return two masses on rails; nothing acts but their drives and friction."""
+def masses(delay=0.0, stiffness=0.0):
+    """Return two masses on rails; nothing acts but drives, friction and springs [N/m]."""
     state = ca.SX.sym("state", 8)
-    still = ca.SX(2, 1)
-    model = MomentumModel(state, MASS * state[6:], still, np.ones(2), np.zeros(2), -1.0)
+    springs = -stiffness * state[:2] if stiffness else ca.SX(2, 1)
+    model = MomentumModel(state, MASS * state[6:], springs, np.ones(2), np.zeros(2), -1.0)
     return model.with_delay(delay)
 
 
@@ -111,6 +111,18 @@ def test_means_find_what_beginnings_miss():
     off = {k: np.abs(x / np.concatenate([F_C, F_V]) - 1.0) for k, x in ends.items()}
     assert off["mean"].max() < 1e-3
     assert off["begin"].max() > 10.0 * off["mean"].max()
+
+
+def test_forces_of_both_ends_of_an_interval_count():
+    """Springs of 200 N/m, over the mean deflection of an interval from its closed form."""
+    states, drives = swing()
+    angle = RATE * PERIOD * np.arange(len(states))[:, None] + PHASE
+    deflection = np.diff(-SPEED / RATE**2 * np.sin(angle), axis=0) / PERIOD
+    kalman = FrictionKalmanFilter(
+        masses(stiffness=200.0), 0.7 * np.array([F_C, F_V]), noise(2), PERIOD, intervals="mean"
+    )
+    found = estimate(kalman, states, drives + 200.0 * deflection)[-1, 2:]
+    np.testing.assert_allclose(found, np.concatenate([F_C, F_V]), rtol=2e-3)
 
 
 def test_velocities_that_are_half_an_interval_old():

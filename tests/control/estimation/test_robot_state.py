@@ -252,6 +252,26 @@ def test_velocities_of_difference_quotients_are_brought_up_to_positions(drake_ar
     np.testing.assert_allclose(found[:, 6:9], late[:-1, 6:9], rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize(("ticks", "age"), [(0, 1e-3), (2, 0.8e-3)])
+def test_inertia_is_that_of_the_middle_between_old_velocities_and_the_end(drake_arm, ticks, age):
+    """Of a rigid arm whose weight is held: ``v + (age + ticks T) D^-1 (tau - n)``, by Drake."""
+    arm = drake_arm("rigid")
+    state, v = arm.state(), 5.0 * arm.state()[3:6]
+    state[3:6] = state[9:] = v
+    tau = gravity_function(arm.chain)(state[:3]).full().ravel()
+
+    def reached(shift):
+        q = state[:3] + shift * v
+        at = np.concatenate([q, v, q, v])
+        return v + (age + ticks * PERIOD) * arm.rates(at, tau, NOTHING, NOTHING)[3:6]
+
+    found = told(StatePredictor(arm.chain, ticks, PERIOD, age), [state], [tau])[0][3:6]
+    middle = 0.5 * (ticks * PERIOD - age)
+    scale = np.abs(reached(middle) - reached(0.5 * ticks * PERIOD)).max()
+    assert scale > 1e-5
+    np.testing.assert_allclose(found, reached(middle), rtol=0, atol=0.1 * scale)
+
+
 def test_friction_that_is_told_is_taken_off(drake_arm):
     arm, sent, f = drake_arm("elastic"), drives(), np.array([30.0, -40.0, 20.0])
     states = np.array(arm.move(sent, lambda _: f, lambda _: NOTHING, PERIOD))[:PREDICTED]

@@ -68,3 +68,13 @@ def test_what_stops_a_robot_does_not_count():
         assert watch.step(drive=sign * LIMITS, stopping=2.0)["fault"] == Fault.NONE
     for name, value in before.items():
         assert np.array_equal(watch.states[name], value)
+
+
+def test_time_within_the_limits_is_no_credit():
+    """A thousand samples at half the limit, then 20 at the limit: the twenty-first is a fault."""
+    watch = Stepper(DriveWatch(LIMITS, SupervisionParameters(saturation_time=0.02), PERIOD))
+    faults = [
+        watch.step(drive=share * LIMITS, stopping=0.0)["fault"][0]
+        for share in np.repeat([0.5, 1.0], [1000, 30])
+    ]
+    assert faults.index(Fault.DRIVE_SATURATED) == 1020

@@ -7,6 +7,7 @@ from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import ProjectionStatus
 
@@ -106,6 +107,19 @@ def test_the_projections_faults(tick):
     # a projection of a tool that is nowhere: the state is the root cause
     nowhere = not_converged | tick.changed("state", 0, np.nan)
     assert tick.fault(**nowhere) == Fault.INPUT_NOT_FINITE
+
+
+@pytest.mark.parametrize("beyond", [-0.031, -0.029, 0.029, 0.031])
+def test_an_end_of_an_open_path(rigid_3r, position_path, make_law, tick, beyond):
+    """Beyond it by more than a bound is a fault, before and behind; of a closed path nothing."""
+    manifold = PathManifold(2, oriented=False, length=0.7)
+    law = make_law(rigid_3r.chain, "rigid", False, manifold=manifold, max_beyond_end=0.03)
+    here = Tick(rigid_3r, position_path, law, tick.state[:3])
+    place = {"point": here.point.copy()}
+    place["point"][manifold.layout.eta] = beyond if beyond < 0.0 else 0.7 + beyond
+    far = abs(beyond) > 0.03
+    assert here.fault(**place) == (Fault.BEYOND_END if far else Fault.NONE)
+    assert tick.fault(**place) == Fault.NONE
 
 
 def test_a_stretched_arm_is_singular(rigid_3r, position_path, make_law, tick):

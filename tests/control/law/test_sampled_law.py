@@ -79,6 +79,24 @@ def test_after_a_fault_nothing_is_remembered(loop):
         np.testing.assert_array_equal(loop.sampled.states[name], value, err_msg=name)
 
 
+@pytest.mark.parametrize("model", ["comau_racer_1_4_3r", "comau_racer_1_4_elastic_3r"])
+def test_friction_is_added_to_what_drives_give(model, load_robot, position_path, make_law):
+    """In the sample it comes in, and in full: nothing of it is extrapolated over the hold."""
+    robot, friction = load_robot(model), np.array([12.0, -30.0, 7.0])
+    law = make_law(robot.chain, "elastic" if robot.chain.is_elastic else "rigid", False)
+    sigma = position_path.position.derivatives(THETA, 0)[0]
+    q = load_robot("comau_racer_1_4_3r").reach(sigma)
+    state, r = np.tile(np.append(q, [0.0] * 3), 2), law.linearization.relative_degree
+    point = position_path.evaluator(r)(sigma.tolist(), THETA)
+    reference = np.zeros((r + 1) * 3)
+    reference[0] = point[1]
+    told, drive = (state, point, reference, np.zeros(3)), law.layout.drive
+    for held in (None, law.evaluate(*told)[law.layout.held]):
+        without = law.evaluate(*told, held)[drive]
+        found = law.evaluate(*told, held, friction=friction)[drive]
+        np.testing.assert_allclose(found - without, friction, rtol=1e-9)
+
+
 def test_what_a_drive_cannot_do_is_not_integrated(loop):
     far = loop.reference + 1e7
     assert loop.tick(reference=far)["evaluation"][loop.law.layout.status][2] == 3.0

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from diagrams.warnings.law_warnings import _transversal_gains
 from pfsc_drake.control.law.linearization import (
     RELATIVE_DEGREE,
     ActuationOptions,
@@ -13,6 +12,7 @@ from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
+from pfsc_drake.following.law_warnings import _transversal_gains
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from tests.control.manifolds.surfaces import SITUATIONS, frame, surface

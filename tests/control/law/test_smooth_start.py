@@ -46,6 +46,22 @@ def test_follows_the_transition_from_tick_to_tick(begin):
         np.testing.assert_allclose(reference(time), expected, atol=1e-10)
 
 
+def test_it_waits_with_the_time_of_its_reference():
+    """Own time ``s = t - sin(8 t) / 8``, which rests at first; derivatives by the chain rule."""
+    stepper = Stepper(SmoothStart(0.2, 2, 2, 4, PERIOD), ("own_time",))
+    distance, transition = ACTUAL[:2] - WANTED[:2], Transition(0.2, 2)
+    for tick in range(800):
+        t = tick * PERIOD
+        s, rate, change = t - np.sin(8.0 * t) / 8.0, 1.0 - np.cos(8.0 * t), 8.0 * np.sin(8.0 * t)
+        found = stepper.step(
+            desired_reference=WANTED, manifold_state=ACTUAL, own_time=[3.0 + s, rate, change]
+        )["reference"]
+        value, slope, bend = transition.at(s).full().ravel()
+        shares = [value, slope * rate, bend * rate**2 + slope * change]
+        expected = WANTED + np.outer(shares, distance).ravel() * (s < 0.2)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
 def test_a_tool_that_is_nowhere_has_no_distance():
     reference = _start(np.array([np.nan, -0.01, 0.0, 0.0]))
     np.testing.assert_allclose(reference(0.0)[:2], [0.5, -0.01], atol=1e-12)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.reference import rest_to_rest, together
@@ -134,3 +135,19 @@ def test_slow_samples_are_filtered_exactly(motion):
         np.testing.assert_allclose(
             coarse.step(override=override)["reference"], rows[0], rtol=1e-8, atol=1e-8
         )
+
+
+def test_own_time_waits_at_the_end(motion):
+    """A second beyond the end the override turns from 1 to -1, and z_1 by the filter of order 2.
+
+    ``z_1 = -1 + 2 (1 + b t) exp(-b t)`` is zero at ``b t = x``; from there on own time goes back,
+    which it does later than at once by ``(x + 2 (2 + x) exp(-x)) / b`` in the end.
+    """
+    end, b = motion.domain[1], 20.0
+    times, rows = paced(motion, 2, lambda t: 1.0 if t < end + 1.0 else -1.0, end + 2.5)
+    x = brentq(lambda x: (1.0 + x) * np.exp(-x) - 0.5, 1.0, 3.0)
+    own = 2.0 * end + 1.0 + (x + 2.0 * (2.0 + x) * np.exp(-x)) / b - times
+    settled = times > end + 1.8
+    expected = motion.derivatives(own[settled], 0)[:, 0, 0]
+    assert expected.max() > 1.2 and expected.min() < 0.9
+    np.testing.assert_allclose(rows[settled][:, 0, 0], expected, rtol=0, atol=2 * PERIOD * 0.5)

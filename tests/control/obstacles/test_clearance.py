@@ -85,10 +85,10 @@ def test_an_obstacle_that_moves_is_not_near_before_its_time(kind):
 def test_the_time_counts_what_is_spent_and_how_it_moves():
     arm = np.array([0.0, 0, -1, 0, 0, 1])
     nearness = nearness_function([SHAPES["sphere"]], REACH, SPENT, 2, RADIUS)
-    for v in (-1.0, 0.0, 1.0):
-        near, until = nearness(arm, np.array([1.0, 0, 0, v, 0.7, 0.7]))
-        assert float(near) == pytest.approx(0.7)
-        assert float(until) == pytest.approx(float(REACH.time(0.7 - SPENT, v)))
+    for v, x in itertools.product((-1.0, 0.0, 1.0), (0.7, 2.5)):
+        near, until = nearness(arm, np.array([x, 0, 0, v, 0.7, 0.7]))
+        assert float(near) == pytest.approx(x - 0.3)
+        assert float(until) == pytest.approx(float(REACH.time(x - 0.3 - SPENT, v)))
 
 
 def test_what_is_expected_spreads_with_time_and_ends_at_the_horizon():

@@ -96,14 +96,15 @@ def test_joints_beyond_the_outputs_move_next_to_their_posture(load_robot, make_l
 
 
 @pytest.mark.parametrize("weight", [np.array([1.0, 2.0, 1.0, 0.5, 1.0, 3.0]), None])
-def test_from_where_on_a_posture_is_held_back(weight, load_robot, make_law, position_path):
+@pytest.mark.parametrize("name", ["rigid", "velocity_servo"])
+def test_from_where_on_a_posture_is_held_back(name, weight, load_robot, make_law, position_path):
     """The law's drives are those of a law that holds nothing back, up to the share of 1."""
-    robot, order = load_robot("comau_racer_1_4"), 2
+    robot, order = load_robot("comau_racer_1_4"), RELATIVE_DEGREE[name]
     speeds = np.array([1.0, 2.0, 3.0, 2.0, 1.5, 1.0])
-    free = make_law(robot.chain, "rigid", False, weight=weight)
+    free = make_law(robot.chain, name, False, weight=weight)
 
     def held_from(speeds):
-        return make_law(robot.chain, "rigid", False, posture=replace(free.posture, speeds=speeds))
+        return make_law(robot.chain, name, False, posture=replace(free.posture, speeds=speeds))
 
     law, evaluator = held_from(speeds), position_path.evaluator(order)
     theta = position_path.arc_length.parameter(0.3)
@@ -128,7 +129,7 @@ def test_from_where_on_a_posture_is_held_back(weight, load_robot, make_law, posi
         point = evaluator(y_t.tolist(), position_path.nearest(y_t))
         state = np.tile(course[i, :2].ravel(), 2)
         given = reference[i].ravel(), np.zeros(3)
-        posture = np.concatenate([q_0, np.zeros(12)])
+        posture = np.concatenate([q_0, np.zeros(6 * order)])
         drives = []
         for share in (np.inf, 1.001, 0.99):
             tried = held_from(share * shares[i].max() * speeds)

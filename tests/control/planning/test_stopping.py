@@ -19,13 +19,13 @@ def _course(count=400):
     return course
 
 
-def _bandwidth(force, order):
+def _bandwidth(force, order, axis=(1.0, 0.0, 0.0)):
     slide = ChainLink(
-        "x",
+        "slide",
         "prismatic",
         np.eye(3),
         np.zeros(3),
-        np.array([1.0, 0, 0]),
+        np.array(axis),
         MASS,
         np.zeros(3),
         np.eye(3),
@@ -50,3 +50,12 @@ def test_a_mass_brakes_with_the_force_that_it_has(order, steepest):
 def test_it_stays_within_what_is_looked_for():
     assert _bandwidth(1e6, 4) == 60.0
     assert _bandwidth(1e-3, 4) == 2.0
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_setting_off_upwards_takes_more_than_stopping(up):
+    """Weight acts besides: upwards it brakes, and downwards it sets off."""
+    weight = 9.81 * MASS
+    force = weight + 10.0
+    expected = 10.0 / (MASS * SPEED * np.exp(-1.0))
+    assert _bandwidth(force, 2, (0.0, 0.0, up)) == pytest.approx(expected, rel=0.04)

@@ -241,6 +241,37 @@ def test_way_points_that_were_missed_end_the_path():
     assert run.overrun.max() <= 1e-12
 
 
+@pytest.mark.parametrize("new", [(), (5,)])
+def test_a_sender_that_counts_anew_is_noticed(new):
+    """What it tells is left out until a new path begins; overtaken messages are no new sender."""
+    w = bend(61)
+    stream = make_stream(BEND, w[0])
+    first = sent_at(stream.layout, w[1:], even(60), end=False)
+    second = sent_at(stream.layout, w[16:40], 1.0 + even(24), new=new)
+    held = []
+
+    def message(k, stream):
+        held.append(first(k, stream))
+        if k >= 1000:
+            return second(k, stream)
+        # now and then one of 0.2 s before
+        return held[max(0, k - 200)] if k % 50 == 0 else held[-1]
+
+    run = stream.run(message, 3500)
+    status = run.stream[:, 0]
+    noticed = int(np.argmax(status == StreamStatus.BEGUN_ANEW))
+    assert 1040 < noticed < 1060
+    assert run.overrun.max() <= 1e-12
+    if new:
+        np.testing.assert_allclose(run.sigma[-1], w[39], rtol=0, atol=1e-7)
+        assert status[-1] == StreamStatus.WAITING
+    else:
+        assert status[-1] == StreamStatus.BEGUN_ANEW
+        off = np.linalg.norm(w - run.sigma[-1], axis=1)
+        assert off.min() < 1e-6
+        assert 15 <= off.argmin() <= 20
+
+
 @pytest.mark.parametrize("bad", [[np.nan, 0.3, 1.0], [0.8, 9.0, 1.0]])
 def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
     w = bend(61)
@@ -256,6 +287,19 @@ def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
     assert off.min() < 1e-6
     np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
     assert run.overrun.max() <= 1e-12
+
+
+def test_what_was_refused_is_remembered_at_rest():
+    """Further way points of the same path come after it has stopped, and change nothing."""
+    w = bend(41)
+    rows, times = w[1:].copy(), even(40)
+    rows[25], times[30:] = [np.nan, 0.3, 1.0], times[30:] + 2.5
+    stream = make_stream(BEND, w[0])
+    run = stream.run(sent_at(stream.layout, rows, times), 5500)
+    at_rest = round(times[30] / PERIOD) - 50
+    np.testing.assert_allclose(run.sigma[at_rest], w[25], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(run.stream[at_rest:, 0], StreamStatus.REFUSED)
+    np.testing.assert_allclose(run.sigma[-1], w[25], rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))

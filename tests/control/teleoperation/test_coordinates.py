@@ -34,7 +34,7 @@ def make(side="leader", late=0, force=1e3, moment=1e2, connected=(), **coupling)
 
 def message(count=0.0, signal=(0.0,) * 6, felt=(0.0,) * 6, energy=0.0):
     told = np.zeros(MESSAGE)
-    for name, value in zip(FIELDS, (count, signal, felt, energy), strict=True):
+    for name, value in zip(FIELDS, (count, signal, felt, energy, 0.0), strict=True):
         told[FIELDS[name]] = value
     return told
 

@@ -210,6 +210,35 @@ def test_a_wave_that_cannot_be_paid_is_sent_later():
     assert (np.diff(sent) >= 0.0).all()
 
 
+@pytest.mark.parametrize("lack", [0.0, 0.05, 0.4])
+def test_a_side_with_more_than_its_own_helps_one_that_lacks(lack):
+    """By a share of what it has more, as large as the lack is of the initial content."""
+    port = make(tank=PortTankParameters(initial=0.1, share=30.0), force=30.0)
+    port.start(position=START, message=np.zeros(MESSAGE))
+    port.set_state("tank", 0.7)
+    heard = message(1)
+    heard[FIELDS["lack"]] = lack
+    row = port.step(position=START, message=heard)
+    expected = 30.0 * T * min(1.0, lack / 0.1) * 0.6
+    assert told(row, "sent")[0] == pytest.approx(expected, abs=1e-15)
+    assert told(row, "tank")[0] == pytest.approx(0.7 - expected, rel=1e-12)
+    port.set_state("tank", 0.1)
+    assert told(port.step(position=START, message=heard), "sent")[0] == told(row, "sent")[0]
+
+
+def test_a_side_tells_its_lack_and_what_it_owes():
+    tank = PortTankParameters(initial=0.1)
+    port, step = make(tank=tank, force=30.0), np.array([2e-3, 0.0, 0.0])
+    port.start(position=START, message=np.zeros(MESSAGE))
+    port.set_state("tank", 0.03)
+    row = port.step(position=START, message=np.zeros(MESSAGE))
+    assert row["message"][FIELDS["lack"]][0] == pytest.approx(0.07)
+    row = port.step(position=START + step, message=np.zeros(MESSAGE))
+    sent = row["message"][FIELDS["signal"]][0] / math.sqrt(2 * B)
+    assert told(row, "owed")[0] == pytest.approx(step[0] - sent, rel=1e-9)
+    assert told(row, "owed")[0] > 1.9e-3
+
+
 def test_an_open_grip_neither_pushes_nor_counts():
     port = make(connected=("grip",), passive=True)
     for k in range(4):

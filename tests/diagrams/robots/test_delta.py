@@ -47,7 +47,9 @@ def sources(diagram):
 def test_friction_is_beside_the_drives():
     behind = sources(build_analytic("simulation.fused=false").diagram)
     assert behind["plant", "actuation"] == ("hold", "held")
-    assert behind["plant", "resistance"] == ("joint_friction", "resistance")
+    assert behind["plant", "resistance"] == ("all_resistances", "sum")
+    assert behind["all_resistances", "u0"] == ("joint_friction", "resistance")
+    assert behind["all_resistances", "u1"] == ("holding_brakes", "resistance")
     # the true velocity, whatever the encoders say
     assert behind["joint_friction", "velocity"] == ("joint_encoders", "y0")
 

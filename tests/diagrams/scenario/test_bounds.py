@@ -1,75 +1,95 @@
-"""Numbers far from all that a person would set are refused, with the unit."""
+"""Every number of every block has bounds: a walk along the schema."""
+
+import dataclasses as dc
+import math
+import types
+import typing
+import warnings
 
 import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from experiments.scenario_file import read_scenario
+from docs.making.scenario_keys import blocks
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.typed import load_typed
+from pfsc_drake.yaml.bounds import bounds_of
+from pfsc_drake.yaml.typed import load_typed, typed_data
 
-SPHERE = "surface.shape=!Sphere"
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "parts"),
-    [
-        ("sfc_polish", "model_error.random.joint_offset_deg=1e300", ["0 to 30 deg"]),
-        ("sfc_polish", "model_error.random.joint_offset_deg=1e6", ["0 to 30 deg"]),
-        ("sfc_polish", "model_error.random.center=2", ["0 to 1 m"]),
-        ("sfc_polish", "model_error.random.mass=5.6", ["0 to 1 as a fraction"]),
-        ("sfc_polish", "model_error.tool_mass=1e6", ["at most 1000 kg"]),
-        ("vf_moving_region", "fixtures.regions.3.shape.radius=1e300", ["radius = 1e+300", "m"]),
-        ("vf_moving_region", "fixtures.regions.1.shape.origin.0=1e300", ["origin", "10000 m"]),
-        ("vf_forbidden_region", "fixtures.regions.3.shape.coefficient=1e300", ["10000 1/m"]),
-        ("plate_mounting", "plate.mass=1e300", ["mass = 1e+300", "0.001 to 100 kg"]),
-        ("plate_mounting", "plate.mass=500", ["mass = 500", "0.001 to 100 kg"]),
-        ("plate_mounting", "plate.believed_mass=500", ["0 to 100 kg"]),
-        ("vf_soft_circle", "compliance.tangential.mass.value=1e-300", ["0.001 to 10000 kg"]),
-        ("vf_soft_circle", "compliance.transversal.mass.value=1e300", ["transversal.mass", "kg"]),
-        ("vf_soft_circle", "compliance.rotational.mass.value=1e300", ["kg m^2"]),
-        ("vf_soft_circle", "compliance.transversal.damping.value=1e300", ["N s/m"]),
-        (
-            "vf_soft_circle",
-            "compliance.transversal.stiffness={over: xi, at: [0, 0.01], values: [2e3, 1e300]}",
-            ["transversal.stiffness = 1e+300", "N/m, or .inf"],
-        ),
-        ("plate_mounting", "compliance.tangential.damping=!SlowEnds {most: 1e300}", ["N s/m"]),
-        ("sfc_polish", "workpiece.ball.modulus=4", ["modulus = 4", "Pa; 4 MPa are 4e+06"]),
-        ("sfc_polish", "controller.external_torque.bandwidth=1e300", ["0.01 to 100000 rad/s"]),
-        # what was said in radians, or of another name
-        (
-            "sfc_polish",
-            f"{SPHERE} {{latitudes_deg: [-30, 90]}}",
-            ["latitudes_deg = [-30.0, 90.0]", "between -90 and 90 deg", "turn axis"],
-        ),
-        ("sfc_polish", "surface.shape=!Cone {opening_deg: 90}", ["opening_deg", "below 90 deg"]),
-        ("sfc_polish", "surface.shape=!Cone {distances: [0, 1]}", ["apex"]),
-        ("sfc_polish", "surface.shape=!Torus {ring_radius: 0.1}", ["more than tube_radius = 0.1"]),
-    ],
+OWNERS = [Scenario, *blocks()]
+HOW = (
+    "write its unit into the docstring, as in `margin: Least distance [m]`, whose bounds are those "
+    "of pfsc_drake/yaml/bounds.py, or declare bounds of its own: field(default=.., "
+    'metadata=bounded(least, most, "unit"))'
 )
-def test_one_line_names_the_bound_and_its_unit(name, change, parts):
-    with pytest.raises(InputError) as refused:
-        load_typed(Scenario, read_scenario(name, [change]).data, name)
-    said = str(refused.value)
-    assert "\n" not in said
-    assert all(part in said for part in parts), said
-    assert "rad;" not in said
 
 
-@pytest.mark.parametrize("axis", [[1, 0, 0], [-3, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, 0]])
-def test_a_plane_stands_however_its_normal_points(axis):
-    change = f"surface.shape=!Plane {{axis: {axis}}}"
-    settings = load_typed(Scenario, read_scenario("sfc_polish", [change]).data, "x")
-    rotation = settings.surface.shape.rotation
-    np.testing.assert_allclose(rotation[:, 2], axis / np.linalg.norm(axis), atol=1e-15)
-    np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-15)
-    # the first axis leans to x_0 where it can, else to y_0
-    assert rotation[1 if axis[1] == axis[2] == 0 else 0, 0] > 0.5
+def filled(kind, default, number):
+    """Return a value of a type with a number in it, None if there is no place for one."""
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        found = (filled(member, default, number) for member in arguments)
+        return next((value for value in found if value is not None), None)
+    if origin is list:
+        first, *rest = default or [None]
+        inner = filled(arguments[0], first, number)
+        return None if inner is None else [inner, *rest]
+    if origin is dict:
+        inner = filled(arguments[1], None, number)
+        return None if inner is None else {"a": inner}
+    if kind is np.ndarray:
+        return [number, 0.0, 0.0]
+    return number if kind in (float, int) else None
 
 
-def test_a_start_along_the_axis_is_still_refused():
-    change = "surface.shape=!Plane {axis: [1, 0, 0], start: [1, 0, 0]}"
-    settings = load_typed(Scenario, read_scenario("sfc_polish", [change]).data, "x")
-    with pytest.raises(InputError, match="not along"):
-        _ = settings.surface.shape.rotation
+def refusal(owner, name, number):
+    """Return what is said of a number in a block of its own, None if it is accepted."""
+    data, hint = typed_data(owner()), typing.get_type_hints(owner)[name]
+    data[name] = filled(hint, data[name], number)
+    try:
+        load_typed(owner, data, "file.yaml")
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def numbers_of(owner):
+    hints = typing.get_type_hints(owner)
+    return [f.name for f in dc.fields(owner) if filled(hints[f.name], None, 1.0) is not None]
+
+
+@pytest.mark.parametrize("owner", OWNERS, ids=lambda owner: owner.__name__)
+def test_every_number_is_bounded(owner):
+    """On both sides, in one line that names the key; not infinite unless that means no limit."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for name in numbers_of(owner):
+            bounds = bounds_of(owner, name)
+            for number in (1e300, -1e300, math.nan, math.inf, -math.inf):
+                said = refusal(owner, name, number)
+                place = f"{owner.__module__}.{owner.__name__}.{name} = {number}"
+                if said is None:
+                    assert number == math.inf and bounds.infinite, f"{place} is accepted: {HOW}"
+                else:
+                    assert name in said and "\n" not in said, f"{place}: {said}"
+
+
+def test_many_numbers_are_found():
+    """The walk sees what there is, in lists, unions and blocks in blocks."""
+    found = {(owner.__name__, name) for owner in OWNERS for name in numbers_of(owner)}
+    assert len(found) > 450
+    assert {("Profile", "values"), ("WatchParameters", "margin"), ("Scenario", "duration")} <= found
+
+
+def test_a_refusal_says_what_is_allowed():
+    said = load_error({"obstacles": {"watch": {"margin": 1e300}}})
+    assert "key 'obstacles.watch.margin' is 1e+300: expected a number from " in said
+    assert said.endswith(" m")
+    # what a block says itself is better
+    said = load_error({"compliance": {"limits": {"settling": 1e300}}})
+    assert said.endswith("settling = 1e+300; allowed: 0.02 to 1 s")
+
+
+def load_error(data):
+    with pytest.raises(InputError) as error:
+        load_typed(Scenario, data, "file.yaml")
+    return str(error.value)

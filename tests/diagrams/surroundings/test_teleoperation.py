@@ -11,11 +11,13 @@ from diagrams.scenario import HandParameters, HandWaypoint
 from diagrams.scenario.schema import driven
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.station_parts import make_task
+from diagrams.surroundings import leader
 from experiments.results.run_signals import collect_log
 from experiments.results.teleoperation import teleoperation_metrics
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.teleoperation.parameters import RotationParameters
+from pfsc_drake.control.teleoperation.port import TeleoperationPort
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.channel import ChannelParameters
 from pfsc_drake.physics.leader_clutch import ClutchParameters
@@ -115,6 +117,22 @@ def test_the_tool_turns_as_the_hand_does():
     felt, given = log["leader_moment"].values, log["port_moment"].values[:, :3]
     np.testing.assert_allclose(felt, 0.5 * given, atol=1e-12)
     assert np.abs(felt).max() > 0.05
+
+
+def test_a_leader_is_limited_by_its_own_motors(monkeypatch):
+    """Its port's force times the scale is the motors', its port's speed the handle's times one."""
+    made = {}
+
+    def spy(side, parameters, limits):
+        made[side] = limits
+        return TeleoperationPort(side, parameters, limits)
+
+    monkeypatch.setattr(leader, "TeleoperationPort", spy)
+    settings = region(motion_scale=0.4, force_scale=2.5)
+    build_station(settings, SCENARIOS)
+    device = settings.teleoperation.leader
+    assert made["leader"].force * 2.5 == pytest.approx(device.force_limit)
+    assert made["leader"].speed == pytest.approx(0.4 * device.largest_speed)
 
 
 def test_turns_need_a_tool_that_yields_and_a_hand_that_turns_a_wrist():

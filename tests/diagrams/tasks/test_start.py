@@ -12,9 +12,9 @@ from diagrams.robots.arm_model import ArmModel
 from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
-from diagrams.scenario.checks import posture_text
 from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import pose_function

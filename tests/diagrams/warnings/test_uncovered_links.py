@@ -33,6 +33,7 @@ def _joint(number, parent, child, x):
     )
 
 
+HAND = _link("hand", "<cylinder radius='.08' length='.3'/>", "xyz='.2 0 0' rpy='0 1.57079632679 0'")
 # along x, joints and tip 0.4 m apart
 ARM = "".join(
     [
@@ -40,9 +41,7 @@ ARM = "".join(
         _link("base", "<box size='2 2 2'/>"),
         _link("upper", "<box size='1 1 1'/>"),
         _link("fore", "<box size='.2 .1 .1'/>", "xyz='.2 .15 0'"),
-        _link(
-            "hand", "<cylinder radius='.08' length='.3'/>", "xyz='.2 0 0' rpy='0 1.57079632679 0'"
-        ),
+        HAND,
         _link("tip", "<sphere radius='.12'/>"),
         _joint(1, "base", "upper", 0.0),
         _joint(2, "upper", "fore", 0.4),
@@ -53,11 +52,20 @@ ARM = "".join(
 )
 
 
+@pytest.fixture(name="look_at")
+def fixture_look_at(tmp_path, load_scenario):
+    """Return ``model -> radius -> sentences``."""
+    return lambda model: _looking(model, tmp_path, load_scenario)
+
+
 @pytest.fixture(name="look")
-def fixture_look(tmp_path, load_scenario):
-    """Return ``radius -> sentences``."""
+def fixture_look(look_at):
+    return look_at(ARM)
+
+
+def _looking(model, tmp_path, load_scenario):
     file = tmp_path / "boxed.urdf"
-    file.write_text(ARM, encoding="utf-8")
+    file.write_text(model, encoding="utf-8")
     settings = load_scenario("pfc_panda_7r")
     settings.robot = type(settings.robot)(str(file), tool_frame="tip")
     settings.model_error = type(settings.model_error)()
@@ -80,6 +88,15 @@ def test_who_reaches_out_is_named_with_how_far(look):
     for name in ("base", "upper", "hand"):
         assert name not in told
     assert "hand 0.08 m" in look(0.05)[0]
+
+
+def test_both_caps_of_a_capsule_count(look_at):
+    """Across the arm it reaches half its length and its radius from the axis."""
+    capsule = "<capsule radius='.08' length='.3'/>"
+    lies = _link("hand", capsule, "xyz='.2 0 0' rpy='1.57079632679 0 0'")
+    look = look_at(ARM.replace(HAND, lies))
+    assert "hand 0.23 m" in look(0.15)[0]
+    assert look(0.231) == []
 
 
 def test_nothing_is_said_where_all_are_inside(look):

@@ -16,13 +16,16 @@ from experiments.scenario_file import read_scenario
 from pfsc_drake.errors import InputError
 from tests.experiments.hardware.test_two_processes import ROOT, is_allowed
 
+# a leader that moves before its follower is there has done so when it comes
 _ALONE = """
 ip link set lo up; ip route add 224.0.0.0/4 dev lo
-{python} -m experiments run teleop_region --out {out}/follower --duration 4 --no-recording \\
+{python} -m experiments run teleop_region --out {out}/follower --duration 8 --no-recording \\
     --set teleoperation.lcm=udpm:// > {out}/follower.txt 2>&1 &
-{python} -m experiments lead teleop_region --lcm udpm:// --duration 60 > {out}/lead.txt 2>&1 &
+FOLLOWS=$!
+until grep -q "simulating " {out}/follower.txt || ! kill -0 $FOLLOWS; do sleep 0.1; done
+{python} -m experiments lead teleop_region --lcm udpm:// --duration 120 > {out}/lead.txt 2>&1 &
 LEADS=$!
-wait %1; STATUS=$?; kill $LEADS; wait $LEADS; exit $STATUS
+wait $FOLLOWS; STATUS=$?; kill $LEADS; wait $LEADS; exit $STATUS
 """
 
 

@@ -20,7 +20,7 @@ from experiments.cli import main
 from reporting.provenance import PROJECT_ROOT
 from tests.experiments.live.browser import NAMES, Browser, find_browser
 
-PATIENCE = 60.0  # s, on a machine that does much else
+PATIENCE = 240.0  # s, on a machine that does much else
 SMALL = (320, 240)  # pixels, which take long without a graphics card
 
 
@@ -154,7 +154,7 @@ def test_a_person_pushes_the_tool_along_and_ctrl_c_keeps_what_was_done(start):
     # nobody is heard any more: the hand lets go, which takes its muscles some tenths of a second
     since = moved["time"]
     session.until(lambda status: max(map(abs, status["force"])) < 0.1)
-    assert session.status()["time"] < since + PATIENCE / 4
+    assert session.status()["time"] < since + 15.0
     assert session.say(b'{"client": "test", "hand": {"pull y [N]": ' + b"9" * 400 + b"}}") == 400
     session.process.send_signal(signal.SIGINT)
     status, errors = session.end()

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from diagrams.scenario import ReferenceParameters
 from diagrams.tasks.task import DrivePlan
 from experiments.figures.fastest import draw_fastest
 from experiments.results.drives import plan_metrics
-from experiments.results.fastest import add_limits, given_metrics
+from experiments.results.fastest import add_limits, given_metrics, rate_warnings
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.planning.limiting import Limiting
 from pfsc_drake.geometry import PiecewisePolynomialCurve
@@ -50,12 +51,33 @@ def test_signals_at_the_ticks_of_a_run(plan):
 def test_what_was_given(plan):
     log = RunLog(plan.times)
     add_limits(log, plan)
-    assert not given_metrics(log)
+    assert not given_metrics(log, plan)
     torque = np.zeros((101, 2))
     torque[40] = [-8.0, 1.0]
     log.add("tau_d", torque, limits=LIMITS[:2])
-    share = given_metrics(log)["given_torque_share"]
+    metrics = given_metrics(log, plan)
+    share = metrics["given_torque_share"]
     assert share.value == pytest.approx(0.8) and share.source == "at t = 0.400 s"
+    # 8 Nm within a sample; 18 Nm are planned in one
+    rate = metrics["given_torque_rate"]
+    assert (rate.value, rate.unit) == (pytest.approx(800.0), "Nm/s")
+    assert rate.source.startswith("axis 1 at t = 0.")
+    assert metrics["planned_torque_rate"].value == pytest.approx(1800.0)
+
+
+def test_torques_that_change_faster_than_allowed_are_reported(plan):
+    log, reference = RunLog(plan.times), ReferenceParameters([0.0, 1.0], torque_rate=500.0)
+    torque = np.zeros((101, 2))
+    torque[40, 1] = -4.0
+    log.add("tau_d", torque, limits=LIMITS[:2])
+    assert rate_warnings(log, plan, reference) == []
+    torque[60, 0] = 6.0
+    log.add("tau_d", torque, limits=LIMITS[:2])
+    (said,) = rate_warnings(log, plan, reference)
+    assert said.startswith(
+        "the commanded torque of axis 1 changes by up to 600 Nm/s, planned 0, allowed 500 "
+    )
+    assert rate_warnings(log, None, reference) == []
 
 
 def test_figure(plan):

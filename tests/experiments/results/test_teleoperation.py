@@ -1,15 +1,19 @@
 """Signals, metrics and audit of a tool that is led from afar, from a made-up log."""
 
+import dataclasses as dc
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from experiments.figures.all import draw_figures
+from experiments.results.promises import broken_promises, set_promises
 from experiments.results.run_log import RunLog
 from experiments.results.teleoperation import (
     add_teleoperation,
     energy_above_bound,
+    handle_warnings,
     stored_in_channel,
     tank_residual,
     teleoperation_metrics,
@@ -23,10 +27,11 @@ LATE = 120  # ticks
 FORCE, START = np.array([3.0, 0.0, 0.0]), np.array([0.5, 0.0, 1.0])
 
 
-def records(position, force, tank, sent, received):
+def records(position, force, tank, sent, received, owed):
     parts = {
         "force": force, "position": position, "tank": tank, "sent": sent,
         "received": received, "share": np.ones(len(TIME)),
+        "owed": np.full(len(TIME), owed),
     }  # fmt: skip
     return np.column_stack([parts[name] for name in RECORD])
 
@@ -43,8 +48,8 @@ def fixture_log():
     arrived = np.concatenate([np.zeros(LATE), taken[:-LATE]])
     tank = np.full(len(TIME), 0.5)
     raw = {
-        "leader_record": records(way, -force, tank, taken, np.zeros(len(TIME))),
-        "follower_record": records(late, 0 * force, tank + arrived, 0 * taken, arrived),
+        "leader_record": records(way, -force, tank, taken, np.zeros(len(TIME)), 0.0),
+        "follower_record": records(late, 0 * force, tank + arrived, 0 * taken, arrived, 4e-3),
         "leader_state": np.hstack([way, way]),
         "leader_hand": np.hstack([force, force]),
         "leader_motor": -force,
@@ -54,6 +59,27 @@ def fixture_log():
     add_teleoperation(log, raw)
     log.add("y_t", late + START)
     return log
+
+
+def test_a_handle_that_is_too_fast_is_reported(log, settings):
+    """It moves at up to 0.07 m/s."""
+    speed = teleoperation_metrics(log, settings)["largest_handle_speed"].value
+    assert speed == pytest.approx(0.07, rel=1e-3)
+    leader = settings.teleoperation.leader
+    faster, slower = dc.replace(leader, largest_speed=0.06), dc.replace(leader, largest_speed=0.08)
+    for device, said in ((slower, 0), (faster, 1)):
+        way = dc.replace(settings.teleoperation, leader=device)
+        found = handle_warnings(log, dc.replace(settings, teleoperation=way))
+        assert len(found) == said
+    assert "up to 0.07 m/s, faster than teleoperation.leader.largest_speed = 0.06 m/s" in found[0]
+
+
+def test_what_a_side_owes_is_a_requirement(log, settings):
+    metrics = teleoperation_metrics(log, settings)
+    assert metrics["owed_distance_end"].value == 4e-3
+    set_promises(metrics, settings)
+    missed = broken_promises(metrics, whole=True)
+    assert any(phrase.startswith("owed_distance_end = 4\u202fmm") for phrase in missed)
 
 
 @pytest.fixture(name="settings")
@@ -167,6 +193,16 @@ def test_the_bound_counts_the_true_work_on_both_ends(log):
     back["y_t"].values[:, 2] = 1.0 + 0.05 * TIME
     expected = 1.0 - 3.0 * way + 2.0 * 0.05 * TIME
     np.testing.assert_allclose(energy_above_bound(back, 1.0), expected, atol=1e-12)
+
+
+def test_energy_is_counted_at_the_follower(log, settings):
+    """A hand that is pushed back with 3 N at half the motion and a quarter of the force."""
+    log["leader_hand"].values[:] *= -1.0
+    settings.teleoperation.motion_scale, settings.teleoperation.force_scale = 2.0, 0.25
+    farthest = log["leader_position"].values[:, 0].max()
+    expected = 1.0 - 2.0 / 0.25 * 3.0 * farthest
+    found = teleoperation_metrics(log, settings)["energy_margin"].value
+    assert found == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_channel_stores_what_is_under_way(log):

@@ -38,7 +38,7 @@ def fault(tmp_path, capfd, mine):
         assert stderr.startswith("fault: ")
         assert stderr.count("\n") == 1
         assert explanation in stderr
-        assert "stopped at t = " in stderr
+        assert "; still moving at t = " in stderr or "; stopped at t = " in stderr
         assert str(out) in stderr
         report = (out / "report.html").read_text(encoding="utf-8")
         assert explanation in report

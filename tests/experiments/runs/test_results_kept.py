@@ -83,6 +83,28 @@ def test_interrupted_before_the_simulation_nothing_is_left(tmp_path):
 
 
 @pytest.mark.usefixtures("coarse")
+def test_a_run_that_fails_leaves_the_earlier_results_whole(tmp_path):
+    """Until there is a log of its own."""
+    out = tmp_path / "out"
+    run(out, Happening(None, ""))
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def fail():
+        found = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
+        assert found == before
+        raise MemoryError
+
+    for phase in ("simulating", "measuring the tick"):
+        with pytest.raises(MemoryError):
+            run(out, Happening(fail, phase))
+        if phase == "simulating":
+            assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    # of the second there was a log
+    names = {path.name for path in out.iterdir()}
+    assert names == {"manifest.json", "scenario.yaml", "log.h5"} < before.keys()
+
+
+@pytest.mark.usefixtures("coarse")
 def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     out, temporary = tmp_path / "out", tmp_path / "temporary"
     temporary.mkdir()
@@ -91,9 +113,10 @@ def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     assert not out.exists()
     (kept,) = temporary.iterdir()
     assert outcome.problem == (
-        f"cannot write log.h5, metrics.json, figures, report.html into {out}: "
-        f"No such file or directory; kept in {kept}"
+        "cannot write log.h5, metrics.json, figures, report.html, scenario.yaml into "
+        f"{out}: No such file or directory; kept in {kept}"
     )
+    assert (kept / "scenario.yaml").is_file()
     assert samples(kept / "log.h5") == 301
     assert outcome.report == kept / "report.html"
     assert {path.name for path in (kept / "figures").iterdir()} >= {"path.png", "progress.png"}

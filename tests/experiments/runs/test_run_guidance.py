@@ -38,6 +38,22 @@ def test_the_hand_cannot_push_the_tool_off_a_hard_path(tmp_path):
     assert np.abs(log["manifold_force"][:, 1:3]).max() > 10.0
 
 
+@pytest.mark.parametrize(
+    ("scenario", "place", "push"), [("vf_hard_spline", 0.01, -45), ("operator_hand_6r", 1.01, 45)]
+)
+def test_the_hand_cannot_push_the_tool_past_an_end(tmp_path, scenario, place, push):
+    """Behind servos and with torques that give way, at the start and at the end."""
+    force = f"forces=[{{begin: 0.32, end: 9, ramp: 0.02, frame: manifold, force: [{push}, 0, 0]}}]"
+    given = [f"reference.points=[{place}, {place}]", "hand=null", force]
+    log = run(tmp_path, scenario, 0.8, *given)
+    first, last = (0.0, 1.02001)
+    end = first if push < 0 else last
+    assert np.abs(log["manifold_force"][:, 0]).max() > 40.0
+    assert abs(log["eta"][-1, 0] - end) < 1e-3
+    assert first - 5e-4 < log["eta"].min()
+    assert log["eta"].max() < last + 5e-4
+
+
 def test_the_hand_pulls_the_tool_off_a_soft_path_and_turns_it(tmp_path):
     """At rest the stiffnesses of Tab. 4.3 bear the hand."""
     still = (

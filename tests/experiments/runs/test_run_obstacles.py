@@ -1,5 +1,7 @@
 """A person who crosses the path: kept, and broken, promises of a run on the truth."""
 
+import h5py
+import numpy as np
 import pytest
 
 from experiments.scenario_file import read_scenario
@@ -30,6 +32,39 @@ def test_the_tool_waits_and_its_promise_is_kept(tmp_path):
     assert metrics["waited_time"].value > 0.5
     assert metrics["max_path_deviation"].value < 0.5e-3
     assert not [warning for warning in outcome.warnings if "obstacles" in warning]
+
+
+# a person who stands beside the start until 0.8 s, and then leaves
+_STANDS = "{kind: column, radius: 0.25, way: [{time: 0.6, position: [%g, %g, 0.0]}, \
+{time: 0.8, position: [%g, %g, 0.0]}, {time: 2.0, position: [3.0, -1.0, 0.0]}, \
+{time: 2.2, position: [3.0, -1.0, 0.0]}]}"
+
+
+def test_the_approach_to_the_path_waits_too(tmp_path):
+    """The tool starts 50 mm beside its path, and goes there once the person has left."""
+    where = (1.4, -0.7) * 2
+    outcome = _run(
+        tmp_path,
+        f"obstacles.moving=[{_STANDS % where}]",
+        "start.offset=[0.05, 0.0]",
+        duration=2.8,
+    )
+    metrics = outcome.metrics
+    assert metrics["least_distance"].value < 0.15
+    assert metrics["least_distance_while_moving"].value > 0.15
+    assert metrics["waited_time"].value > 0.8
+    with h5py.File(tmp_path / "log.h5") as log:
+        t, y_t, speed = (log[name][:] for name in ("t", "y_t", "arm_speed"))
+        xi = np.linalg.norm(log["xi"][:], axis=1)
+    waits = (t > 0.05) & (t < 0.8)
+    assert np.linalg.norm(y_t[waits] - y_t[0], axis=1).max() < 1e-3
+    assert speed[waits].max() < 0.025
+    assert xi[waits] == pytest.approx(0.05, abs=2e-3) and xi[-1] < 1e-3
+
+
+def test_a_start_beside_the_path_needs_a_transition(tmp_path):
+    with pytest.raises(InputError, match=r"start.transition = 0.0.*beside its path \(by 0.05"):
+        _run(tmp_path, "start.offset=[0.05, 0.0]", "start.transition=0")
 
 
 def test_who_is_faster_than_was_said_breaks_the_promise_and_the_run_says_so(tmp_path):

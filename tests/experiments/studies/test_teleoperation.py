@@ -5,12 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from experiments.studies.teleoperation import point as point_module
 from experiments.studies.teleoperation.point import PERIOD, PointStation, PointTeleoperation, of
 from experiments.studies.teleoperation.sequences import draw_sequence, energy_of
 from experiments.studies.teleoperation.study import PLANES, write_teleoperation
 from experiments.studies.teleoperation.transparency import felt_at, press, wave_theory
 from pfsc_drake.control.teleoperation.parameters import CouplingParameters
-from pfsc_drake.physics.channel import ChannelParameters
+from pfsc_drake.physics.channel import ChannelParameters, message_ages
 
 
 def station(coupling="waves", passive=True, smoothing=0.015, planes=PLANES):
@@ -72,6 +73,46 @@ def test_both_sides_meet_again_where_they_rest(waves):
     apart = np.linalg.norm(motion.handle[:, :3] - motion.point, axis=1)
     assert apart[:2500].max() > 5e-3
     assert apart[-1] < 2e-4
+
+
+def silent(begin, length):
+    """Return the ages of messages of a link that is away for some ticks."""
+
+    def ages(parameters, period):
+        age = message_ages(parameters, period).copy()
+        away = np.arange(length)
+        age[begin : begin + length] = age[begin] + away
+        return age
+
+    return ages
+
+
+def test_both_sides_meet_again_after_a_link_was_away(monkeypatch):
+    """For a second, in which the hand goes on by 0.1 m and more; and it is given no energy."""
+    monkeypatch.setattr(point_module, "message_ages", silent(1500, 1000))
+    waves = PointTeleoperation(PointStation(CouplingParameters(impedance=40.0)))
+    asked = np.zeros((6000, 8))
+    asked[:, 0] = 0.25 * np.clip(PERIOD * np.arange(6000) - 1.0, 0.0, 1.0)
+    asked[:, 6:] = 300.0, 20.0
+    motion = waves.run(asked, *[ChannelParameters(0.1, seed=seed) for seed in (1, 2)])
+    apart = np.linalg.norm(motion.handle[:, :3] - motion.point, axis=1)
+    owed = of(motion.follower, "owed")
+    assert apart[2500] > 0.15
+    assert owed[3000] == pytest.approx(apart[3000], abs=0.05)
+    assert apart[-1] < 1e-3
+    assert owed[-1] < 1e-3
+    assert energy_of(motion, PLANES).coupling >= 0.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_links_that_are_away_give_no_energy(monkeypatch, seed):
+    random = np.random.default_rng(seed)
+    begin, length = random.integers(200, 800, 2).tolist()
+    monkeypatch.setattr(point_module, "message_ages", silent(begin, length))
+    there, drawn = PointTeleoperation(station()), draw_sequence(seed + 20, 2.0)
+    energy = energy_of(there.run(drawn.asked, drawn.there, drawn.back, drawn.wall), PLANES)
+    assert energy.coupling >= 0.0
+    assert energy.tank >= 0.0
 
 
 def test_energy_is_counted_as_the_ports_tell(waves):

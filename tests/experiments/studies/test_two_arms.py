@@ -16,6 +16,15 @@ def test_both_arms_are_the_shipped_ones_at_its_speed():
             assert told[key] == pytest.approx(own[key], rel=1e-12)
 
 
+def test_both_arms_keep_their_geometry_at_another_speed():
+    """Twice as fast: velocities are doubled, accelerations are fourfold."""
+    slow, fast = (read_scenario("pfc_two_arms", at_speed(speed)) for speed in (0.15, 0.3))
+    for one in (lambda data: data, lambda data: data["holder"]):
+        before, after = one(slow.data)["reference"], one(fast.data)["reference"]
+        assert after["velocity"] == pytest.approx(2.0 * before["velocity"])
+        assert after["acceleration"] == pytest.approx(4.0 * before["acceleration"])
+
+
 @pytest.mark.slow
 def test_jets_beat_the_pose_alone(tmp_path):
     world, lines = "nothing wrong", []

@@ -10,7 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 from scipy.stats import chi2
 
-from identification.estimation.least_squares import estimate
+from identification.estimation.least_squares import NormalEquations, estimate
 from identification.excitation.fourier import FourierTrajectory
 from identification.measurement.periods import average
 from identification.measurement.record import Record
@@ -172,3 +172,13 @@ def test_bad_input(comau, measure):
     nan[7, 2] = np.nan
     with pytest.raises(InputError, match="tau has values"):
         estimate(comau.regressor, comau.base, replace(motion, tau=nan))
+
+
+def test_sizes_are_root_mean_squares_in_units_of_the_noise():
+    """``sqrt(mean over time of the sum over joints of (Y / noise)^2)``."""
+    rng = np.random.default_rng(6)
+    matrix, noise = rng.normal(size=(50, 2, 3)) * [1.0, 20.0, 0.3], np.array([0.5, 4.0])
+    v = rng.choice([-1.0, 1.0], (50, 2))
+    equations = NormalEquations.of(matrix, v, rng.normal(size=(50, 2)), noise)
+    expected = np.sqrt(np.mean(np.sum((matrix / noise[:, None]) ** 2, axis=1), axis=0))
+    np.testing.assert_allclose(equations.sizes, expected, rtol=1e-12)

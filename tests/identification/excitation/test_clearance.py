@@ -1,9 +1,15 @@
 """Smooth bounds of distances against Drake's."""
 
+import itertools
+import math
+
+import casadi as ca
 import numpy as np
 import pytest
 from pydrake.geometry import Capsule, Cylinder, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw
 
+from identification.excitation import clearance
 from identification.excitation.balls import cover, ends
 from identification.excitation.clearance import (
     delta_posture_limits,
@@ -11,6 +17,7 @@ from identification.excitation.clearance import (
     soft_max,
     soft_min,
 )
+from identification.excitation.scene import Obstacle
 from identification.model.subject import load_subject
 from pfsc_drake.robot.delta.kinematics import rod_independence
 
@@ -43,6 +50,37 @@ def test_bounds_are_below_distances(limits, postures, comau_scene, comau_cell, o
     assert np.all(bound[near] + comau_cell.clearance <= distances[near] + 1e-9)
 
 
+SLANTED = {"start": np.array([0.3, -0.2, 0.1]), "end": np.array([0.7, 0.3, 0.9]), "radius": 0.15}
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"kind": "box", "center": np.array([0.3, -0.2, 0.5]), "size": np.array([0.4, 0.7, 1.1])},
+        {"kind": "sphere", "center": np.array([0.3, -0.2, 0.5]), "radius": 0.25},
+        {"kind": "cylinder", **SLANTED},
+        {"kind": "capsule", **SLANTED},
+    ],
+    ids=lambda shape: shape["kind"],
+)
+def test_distances_from_shapes_are_tight_on_all_sides(shape):
+    """Half a metre away along each axis; the rounding of edges takes at most 20 mm."""
+    obstacle = Obstacle(**shape)
+    half = np.full(3, obstacle.radius)
+    if obstacle.kind == "box":
+        half = obstacle.size / 2.0
+    elif obstacle.kind != "sphere":
+        cap = obstacle.radius if obstacle.kind == "capsule" else 0.0
+        half[2] = math.dist(obstacle.start, obstacle.end) / 2.0 + cap
+    x, y, z, *angles = obstacle.pose()
+    X_WO, point = RigidTransform(RollPitchYaw(*angles), [x, y, z]), ca.SX.sym("p", 3)
+    distance = ca.Function("d", [point], [clearance._distance(obstacle, point)])
+    for axis, side in itertools.product(range(3), (-1.0, 1.0)):
+        from_center = np.zeros(3)
+        from_center[axis] = side * (half[axis] + 0.5)
+        assert 0.48 < float(distance(X_WO @ from_center)) <= 0.5 + 1e-9
+
+
 def test_height_is_that_of_the_chain(limits, comau, postures, comau_cell):
     chain = comau.chain
     # forward kinematics with plain matrices
@@ -64,9 +102,15 @@ def test_ends_of_a_robot_with_its_tool(comau):
 
 
 def test_derivatives_exist_everywhere(limits, postures):
+    """They are finite in all postures, and difference quotients."""
     jacobian = limits.function.jacobian()
-    for q in postures[:20]:
-        assert np.isfinite(np.array(jacobian(q, 0.0))).all()
+    for k, q in enumerate(postures[:20]):
+        slopes = np.array(jacobian(q, 0.0))
+        assert np.isfinite(slopes).all()
+        if k < 3:
+            steps = 1e-5 * np.vstack([np.eye(6), -np.eye(6)])
+            up, down = np.split(limits.values(q + steps), 2)
+            np.testing.assert_allclose(slopes.T, (up - down) / 2e-5, rtol=0, atol=1e-4)
 
 
 def test_balls_cover_shapes(comau, comau_scene):

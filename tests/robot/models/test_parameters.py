@@ -108,7 +108,7 @@ def test_defaults_are_valid_but_no_substitute_for_what_a_file_must_say(tmp_path)
         (r"material: dark", "material: pink", r"bodies\.base\[0\]\.material = 'pink': must be one"),
         (r"radius: 0\.155", "radius: 0", r"bodies\.base\[1\]\.radius = 0\.0: must be positive"),
         (r"radius: 0\.155", "radius: big", r"'bodies\.base\[1\]\.radius' is 'big': expected"),
-        (r"radius: 0\.155", "radius: .inf", r"bodies\.base\[1\]\.radius = inf: must be positive"),
+        (r"radius: 0\.155", "radius: .inf", r"'bodies\.base\[1\]\.radius' is inf: expected .* m"),
         (r"end: \[0, 0, 0\.11\]", "end: [0, 0]", r"bodies\.base\[1\]\.end = .*must be 3"),
         (r"size: \[0\.40", "size: [-0.40", r"bodies\.base\[0\]\.size = .*must be positive"),
         (r"kind: box, ", "", r"missing key 'bodies\.base\[0\]\.kind': expected text"),

@@ -17,7 +17,7 @@ from pydrake.multibody.tree import (
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_rest
 
 
 def solid(mass):
@@ -118,6 +118,67 @@ def test_a_spring_without_motor_is_refused():
     plant.Finalize()
     with pytest.raises(InputError, match=r"joint 'hinge': has a spring but no coaxial motor"):
         chain_from_plant(plant, link.body_frame())
+
+
+class Pendulum:
+    """Two hinges without actuators, and a box that floats; arguments change the plant."""
+
+    def __init__(self, *actuators):
+        self.plant = plant = MultibodyPlant(0.0)
+        parent, box = plant.world_body(), plant.AddRigidBody("box", solid(1.0))
+        self.X_WB = RigidTransform(RollPitchYaw(0.1, 0.2, 0.3), [1.0, -2.0, 3.0])
+        plant.SetDefaultFloatingBaseBodyPose(box, self.X_WB)
+        for name in ("first", "second"):
+            link = plant.AddRigidBody(name, solid(2.0))
+            frames = plant.AddFrame(
+                FixedOffsetFrame(f"{name}_at", parent.body_frame(), RigidTransform([0.3, 0.0, 0.0]))
+            )
+            plant.AddJoint(RevoluteJoint(name, frames, link.body_frame(), [0.0, 1.0, 0.0]))
+            parent = link
+        for number, name in enumerate(actuators):
+            plant.AddJointActuator(f"drive_{number}", plant.GetJointByName(name), 9.0)
+        plant.Finalize()
+
+    def extract(self):
+        return chain_from_plant(self.plant, self.plant.GetFrameByName("second"))
+
+
+@pytest.mark.parametrize(
+    ("actuators", "missing"),
+    [((), "'first', 'second'"), (("first",), "'second'"), (("second",), "'first'")],
+)
+def test_joints_without_actuator_are_named(actuators, missing):
+    """The chain is known all the same: velocity servos need no actuators."""
+    chain, coordinates = Pendulum(*actuators).extract()
+    assert chain.dimension == 2
+    with pytest.raises(InputError, match=rf"joints without actuator: {missing}; .*AddJointAct"):
+        coordinates.actuation_rows(len(actuators))
+    with pytest.raises(InputError, match=rf"joints without actuator: {missing};"):
+        coordinates.actuators  # noqa: B018
+
+
+def test_actuators_in_another_order_than_the_joints():
+    _, coordinates = Pendulum("second", "first").extract()
+    np.testing.assert_array_equal(coordinates.actuation_rows(2), [[0.0, 1.0], [1.0, 0.0]])
+    assert coordinates.undriven == []
+
+
+def test_a_joint_with_two_actuators_is_refused():
+    with pytest.raises(InputError, match=r"joint 'first': actuators 'drive_0', 'drive_2'; allowed"):
+        Pendulum("first", "second", "first").extract()
+
+
+def test_the_state_leaves_everything_else_where_it_is():
+    pendulum = Pendulum("first", "second")
+    chain, coordinates = pendulum.extract()
+    x = state_at_rest(chain, coordinates, np.array([0.4, -0.7]))
+    plant, context = pendulum.plant, pendulum.plant.CreateDefaultContext()
+    plant.SetPositionsAndVelocities(context, x)
+    box = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName("box"))
+    assert box.IsNearlyEqualTo(pendulum.X_WB, 1e-12)
+    angles = [plant.GetJointByName(name).get_angle(context) for name in ("first", "second")]
+    assert angles == pytest.approx([0.4, -0.7], abs=1e-15)
+    np.testing.assert_allclose(coordinates.link_rows @ x, [0.4, -0.7, 0.0, 0.0], atol=1e-15)
 
 
 @pytest.fixture(scope="module", params=["", "_3r"], name="arms")

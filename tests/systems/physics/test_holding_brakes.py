@@ -31,14 +31,14 @@ def _velocity(load, fault=FAULT, end=0.6):
     inertia = builder.AddSystem(MatrixGain(np.array([[1.0 / INERTIA]])))
     torque = builder.AddSystem(Adder(2, 1))
     weight = builder.AddSystem(ConstantVectorSource([load]))
-    steps = PiecewisePolynomial.ZeroOrderHold([0.0, fault, 10.0], np.array([[0.0, 3.0, 3.0]]))
+    steps = PiecewisePolynomial.ZeroOrderHold([0.0, fault, 10.0], np.array([[-1.0, 0.0, 0.0]]))
     status = builder.AddSystem(TrajectorySource(steps))
     builder.Connect(weight.get_output_port(), torque.get_input_port(0))
     builder.Connect(brakes.GetOutputPort("resistance"), torque.get_input_port(1))
     builder.Connect(torque.get_output_port(), inertia.get_input_port())
     builder.Connect(inertia.get_output_port(), motor.get_input_port())
     builder.Connect(motor.get_output_port(), brakes.GetInputPort("velocity"))
-    builder.Connect(status.get_output_port(), brakes.GetInputPort("fault"))
+    builder.Connect(status.get_output_port(), brakes.GetInputPort("request"))
     log = LogVectorOutput(motor.get_output_port(), builder, TICK)
     simulator = Simulator(builder.Build())
     configure(simulator, "runge_kutta3", TICK)
@@ -70,6 +70,6 @@ def test_a_load_above_the_holding_torque_slips():
     np.testing.assert_allclose(slope, (60.0 - HOLDING) / INERTIA, rtol=1e-6)
 
 
-def test_without_fault_they_stay_open():
+def test_without_request_they_stay_open():
     t, v = _velocity(10.0, fault=9.0)
     np.testing.assert_allclose(v, 5.0 * t, atol=1e-9)

@@ -1,4 +1,4 @@
-"""What may be wrong with a path or with a task's orientation, and what to write then."""
+"""Warnings of paths and orientations out of proportion, with what would help."""
 
 import math
 from collections.abc import Callable
@@ -6,7 +6,10 @@ from collections.abc import Callable
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import Path, PathWaypoints, ShapeReport, euler_margin, noise_level
+from pfsc_drake.geometry.curves.smoothing import noise_level
+from pfsc_drake.geometry.paths.path import Path, PathWaypoints
+from pfsc_drake.geometry.paths.shape_report import ShapeReport
+from pfsc_drake.geometry.rotation import euler_margin
 
 # m: robots' paths are shorter, and distances below count for nothing
 _LARGE, _SMALL = 20.0, 1e-4
@@ -29,19 +32,25 @@ _LEAST, _LITTLE = np.deg2rad(1.0), np.deg2rad(10.0)
 _OTHER = {"zyx": "zyz", "zyz": "zyx"}
 
 
-def path_warnings(path: Path, shape: ShapeReport) -> list[str]:
+def path_warnings(path: Path, shape: ShapeReport, keys: str = "path.shape.") -> list[str]:
     """Return what is out of proportion in a path, one sentence each.
 
     Args:
         path: The path.
         shape: Its numbers, see :func:`shape_report`.
+        keys: What stands before the names of options that would help.
     """
     found = [_fast_turn(path, shape)]
     if path.waypoints is not None:
-        found += [far_waypoints(path.waypoints.positions), _nearly_closed(path, path.waypoints)]
+        found += [
+            far_waypoints(path.waypoints.positions),
+            _nearly_closed(path, path.waypoints, keys),
+        ]
         if path.waypoints.manner == "interpolated":
-            bends = _noise(path, shape) or _swing(shape) or _narrow_bend(path, shape)
-            found += [bends and (_close_waypoints(path.waypoints, shape) or bends)]
+            bends = (
+                _noise(path, shape, keys) or _swing(shape, keys) or _narrow_bend(path, shape, keys)
+            )
+            found += [bends and (_close_waypoints(path.waypoints, shape, keys) or bends)]
     return [sentence for sentence in found if sentence]
 
 
@@ -131,17 +140,17 @@ def far_waypoints(positions: np.ndarray) -> str | None:
     return f"waypoints lie up to {farthest:.4g} m from the origin; their unit is m, not mm"
 
 
-def _nearly_closed(path: Path, waypoints: PathWaypoints) -> str | None:
+def _nearly_closed(path: Path, waypoints: PathWaypoints, keys: str) -> str | None:
     gap = closing_gap(path)
     if gap is None:
         return None
     return (
         f"the path is open, and its ends are {_length(gap)} apart: if it is to go round, write "
-        "path.shape.closed: true"
+        f"{keys}closed: true"
     )
 
 
-def _noise(path: Path, shape: ShapeReport) -> str | None:
+def _noise(path: Path, shape: ShapeReport, keys: str) -> str | None:
     """Curvature that differs from waypoint to waypoint as much as it is large."""
     waypoints = path.waypoints
     if waypoints is None or len(waypoints.positions) < _FEWEST:
@@ -167,23 +176,23 @@ def _noise(path: Path, shape: ShapeReport) -> str | None:
     return (
         f"the path bends to and fro from waypoint to waypoint, with a radius of down to "
         f"{_length(shape.smallest_radius)} at eta = {shape.smallest_radius_at:.4g} m, as paths "
-        "through noisy points do: write path.shape.tolerance (m), perhaps "
+        f"through noisy points do: write {keys}tolerance (m), perhaps "
         f"{_round_up(noise):g}"
     )
 
 
-def _swing(shape: ShapeReport) -> str | None:
+def _swing(shape: ShapeReport, keys: str) -> str | None:
     off, chord = shape.distance_from_polygon, shape.chord_there
     if off is None or chord is None or off <= max(_SMALL, _SWING * chord):
         return None
     return (
         f"the path swings {_length(off)} beside the straight line between two waypoints "
         f"{_length(chord)} apart, at eta = {shape.distance_from_polygon_at:.4g} m: add waypoints "
-        "there, or write path.shape.corner_distance (m) for straight lines with rounded corners"
+        f"there, or write {keys}corner_distance (m) for straight lines with rounded corners"
     )
 
 
-def _close_waypoints(waypoints: PathWaypoints, shape: ShapeReport) -> str | None:
+def _close_waypoints(waypoints: PathWaypoints, shape: ShapeReport, keys: str) -> str | None:
     """Two waypoints in nearly one place, whose direction is chance, as a cause of bends."""
     lengths = np.linalg.norm(np.diff(waypoints.positions, axis=0), axis=1)
     nearest = int(np.argmin(lengths))
@@ -194,11 +203,11 @@ def _close_waypoints(waypoints: PathWaypoints, shape: ShapeReport) -> str | None
         f"waypoints {nearest + 1} and {nearest + 2} are {1e6 * lengths[nearest]:.3g} um apart, "
         f"others {_length(usual)}: between them the path has a direction by chance, and bends with "
         f"a radius of down to {1e6 * shape.smallest_radius:.3g} um: take one of the two out, or "
-        "write path.shape.tolerance (m)"
+        f"write {keys}tolerance (m)"
     )
 
 
-def _narrow_bend(path: Path, shape: ShapeReport) -> str | None:
+def _narrow_bend(path: Path, shape: ShapeReport, keys: str) -> str | None:
     waypoints = path.waypoints
     if waypoints is None:
         return None
@@ -211,8 +220,8 @@ def _narrow_bend(path: Path, shape: ShapeReport) -> str | None:
     return (
         f"the path bends with a radius of {_length(shape.smallest_radius)} at eta = "
         f"{shape.smallest_radius_at:.4g} m, where waypoints are {_length(chord)} apart: add "
-        "waypoints there, write path.shape.tolerance (m) if they are noisy, or "
-        "path.shape.corner_distance (m) if they are corners"
+        f"waypoints there, write {keys}tolerance (m) if they are noisy, or "
+        f"{keys}corner_distance (m) if they are corners"
     )
 
 

@@ -1,11 +1,10 @@
-"""What is said beforehand of a law, its robot and its guidance."""
+"""Warnings of a law on its robot, before it moves."""
 
 from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
 
-from diagrams.scenario import ComplianceParameters, ControllerParameters
 from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_inertia_error,
@@ -18,6 +17,8 @@ from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
+from pfsc_drake.following.options.compliance import ComplianceParameters
+from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.robot_model import RobotModel, joint_resonances
 from pfsc_drake.yaml.typed import spread

@@ -11,7 +11,7 @@ from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.robot.robot_model import joint_resonances
 from tests.scenarios import shipped_scenario
 
-SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
+SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
 
 
 @pytest.fixture(name="scenario")

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from diagrams.tasks.manifold_warnings import closing_gap, path_warnings, turning_back
 from pfsc_drake.geometry import (
     OrientationCurve,
     Path,
@@ -15,6 +14,7 @@ from pfsc_drake.geometry import (
     shape_report,
     zyx_to_quaternion,
 )
+from pfsc_drake.geometry.paths.path_warnings import closing_gap, path_warnings, turning_back
 
 ANGLE = np.linspace(0.0, 2.0, 241)
 WAVE = np.stack([0.3 * np.cos(ANGLE), 0.3 * np.sin(ANGLE), 0.1 * np.sin(2.0 * ANGLE)], axis=1)

@@ -1,24 +1,21 @@
-"""Why a station stopped, and where: from what its log knows of that instant."""
+"""Sentences on faults: cause, place and joints, from the signals of that instant."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from pydrake.systems.framework import Context
 
-from diagrams.scenario.checks import coordinate_text, listed, posture_text
-from diagrams.signal_log import SignalLog
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import PlaceManifold, indices
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import euler_margin
+from pfsc_drake.robot.coordinate_text import coordinate_text, listed, posture_text
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture, singularity_name
-from pfsc_drake.systems.fuse import BlockAccess
 
 _STATE = ("q_J", "v_J", "q_M", "v_M")
 # m, from which on a distance from the path is worth a word where an arm becomes singular
@@ -29,7 +26,7 @@ _NEARLY = 0.1
 
 @dataclass(frozen=True)
 class FoundFault:
-    """Why a station stopped.
+    """Cause of a stop.
 
     Attributes:
         sentence: What, and where.
@@ -42,11 +39,11 @@ class FoundFault:
 
 @dataclass(frozen=True)
 class FaultInstant:
-    """What a station's log knows of one instant.
+    """Signals of one instant.
 
     Attributes:
         time: When [s].
-        signals: By name, each of shape (size,), see :class:`~diagrams.station.Station`.
+        signals: By name, each of shape (size,).
     """
 
     time: float
@@ -60,7 +57,7 @@ class FaultInstant:
 
 @dataclass(frozen=True)
 class FaultScene:
-    """Who was in a fault, and when.
+    """Robot, law and signals of a fault.
 
     Attributes:
         law: The law that moved the robot.
@@ -85,32 +82,6 @@ class FaultScene:
     oscillating: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
-def first_instant(
-    log: SignalLog, blocks: BlockAccess, root: Context, signal: str, column: int
-) -> tuple[FaultInstant, FaultInstant | None]:
-    """Return the first instant at which a logged fault was there, and the one before.
-
-    Args:
-        log: The log.
-        blocks: Blocks of the diagram.
-        root: Context of the diagram, in which the fault holds.
-        signal: Logged signal with the fault.
-        column: Column of the signal, where the fault is.
-    """
-    times, raw = log.read(root)
-    faults = np.flatnonzero(raw[signal][:, column])
-    k = int(faults[0]) if len(faults) else len(times)
-    instants = [
-        FaultInstant(float(times[i]), {name: x[i] for name, x in raw.items()})
-        for i in (k - 1, k)
-        if 0 <= i < len(times)
-    ]
-    if k == len(times):
-        # it is so new that it has not been logged
-        instants.append(FaultInstant(root.get_time(), log.now(blocks, root)))
-    return instants[-1], instants[0] if len(instants) > 1 else None
-
-
 def describe(fault: Fault, scene: FaultScene) -> str:
     """Return one sentence on a fault: what, where on the path, when, and through which joints.
 
@@ -123,6 +94,7 @@ def describe(fault: Fault, scene: FaultScene) -> str:
         Fault.PROJECTION_FAILED: _projection_failed,
         Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD: _outside,
         Fault.SINGULAR: _singular,
+        Fault.BEYOND_END: _beyond_end,
         Fault.MEASUREMENT_IMPLAUSIBLE: _implausible,
         Fault.JOINT_LIMIT: _joint_limit,
         Fault.JOINT_SPEED: _joint_speed,
@@ -234,6 +206,13 @@ def _outside(scene: FaultScene) -> str:
         f"{Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD.explanation} {_place(scene)}: "
         f"xi = [{xi}] mm, alpha = {alpha:.3g}"
     )
+
+
+def _beyond_end(scene: FaultScene) -> str:
+    eta = scene.now.signals["manifold_point"][scene.place.layout.eta].item()
+    first, last = scene.place.coordinates[0].ends
+    end, beyond = ("start", first - eta) if eta < first else ("end", eta - last)
+    return f"{Fault.BEYOND_END.explanation} {_place(scene)}: {1e3 * beyond:.1f} mm beyond its {end}"
 
 
 def _singular(scene: FaultScene) -> str:
