@@ -68,8 +68,7 @@ class FaultScene:
         before: The last one without, if there is any.
         suspects: Which components of the measured state are implausible, nonzero if so, shape
             (4N,); empty if that is not known.
-        oscillating: Drives whose commands swung to and fro before, by index, see
-            :func:`~diagrams.oscillation.oscillating_drives`.
+        oscillating: Drives whose commands swung to and fro before, by index.
     """
 
     law: FollowingLaw
