@@ -12,6 +12,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from diagrams.fault_instant import first_instant
 from diagrams.named_builder import PrefixingBuilder
+from diagrams.oscillation import oscillation_before
 from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.drives import add_drives, add_friction, believed_friction
 from diagrams.robots.held_workpiece import holding
@@ -121,7 +122,10 @@ class Holder:
         own, column = log.of(HOLDER), self.law.layout.status.start
         now, before = first_instant(own, blocks, root, "law", column)
         place, robot = self.task.place, self.part.belief.robot
-        scene = FaultScene(self.law, robot, place, self.on_motors, now, before, suspects)
+        oscillating = oscillation_before(now.time, own, root, self.law)
+        scene = FaultScene(
+            self.law, robot, place, self.on_motors, now, before, suspects, oscillating
+        )
         sentence = f"the robot that holds the workpiece: {describe(fault, scene)}"
         return FoundFault(sentence, now.time)
 

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from diagrams.fault_instant import first_instant
 from diagrams.holder_station import Holder
+from diagrams.oscillation import oscillation_before
 from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import FurtherLength, Workpiece
 from diagrams.signal_log import SignalLog
@@ -210,7 +211,10 @@ class Station:
         """Return what there is to say of a fault that is logged in a column of a signal."""
         now, before = first_instant(self.log, self.blocks, root, signal, column)
         place, robot = self.task.place, self.part.belief.robot
-        scene = FaultScene(self.law, robot, place, self.on_motors, now, before, suspects)
+        oscillating = oscillation_before(now.time, self.log, root, self.law)
+        scene = FaultScene(
+            self.law, robot, place, self.on_motors, now, before, suspects, oscillating
+        )
         return FoundFault(describe(fault, scene), now.time)
 
     def mode_name(self, mode: int) -> str:

@@ -79,7 +79,8 @@ class Streamed:
         seed: Of jitter and noise.
         new_paths: Further paths, one after the other.
         plane: Where a person draws, in ``live``.
-        inputs: CSV file with what a person has drawn, as a live session leaves it.
+        inputs: CSV file with what a person has drawn, as a live session leaves it. Its column
+            ``time`` is in s; ``tick``, of older files, counts sampling intervals.
         length: How many way points a message holds.
         follow: How way points become a path, and how fast it is followed.
     """

@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
+from diagrams.scenario.recorded_times import TIME, sampling_instants, time_column, time_text
 from diagrams.scenario.simulation import OperatorParameters
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, REQUESTS
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
@@ -17,7 +18,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
 
-_TICK, _REGION = "tick", "region_"
+_REGION = "region_"
 _HAND = ("push_x", "push_y", "push_z", "hold", "target_x", "target_y", "target_z")
 
 
@@ -32,45 +33,51 @@ def columns(regions: Sequence[str]) -> list[str]:
     return [*_HAND, *tuned, *(f"{_REGION}{name}" for name in regions)]
 
 
-def read_controls(name: str, regions: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+def read_controls(
+    name: str, regions: Sequence[str], period: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Read a file.
 
     Args:
         name: The file.
         regions: Names of what can be switched on and off.
+        period: Sampling time [s].
 
     Returns:
-        The ticks, shape (rows,), and the controls from each on, shape (rows, size).
+        The sampling instants, shape (rows,), and the controls from each on, shape (rows, size).
 
     Raises:
-        InputError: If the file cannot be read, a column is missing, or the ticks are not whole
-            numbers that increase from 0.
+        InputError: If the file cannot be read, a column is missing, or the times do not
+            increase from 0.
     """
-    known = [_TICK, *columns(regions)]
 
     def check_header(place: str, header: list[str]) -> None:
+        known = [time_column(header), *columns(regions)]
         check_columns(place, header, known=known, required=known)
 
     table = read_numbers(name, "lines of controls", check_header)
-    order = [table.header.index(label) for label in known]
-    rows = table.rows[:, order]
-    ticks = rows[:, 0]
-    if ticks[0] != 0.0 or np.any(np.diff(ticks) <= 0.0) or np.any(ticks != np.round(ticks)):
-        raise InputError(f"{name}: ticks; whole numbers that increase from 0 are required")
-    return ticks, rows[:, 1:]
+    when = time_column(table.header)
+    rows = table.rows[:, [table.header.index(label) for label in (when, *columns(regions))]]
+    times = rows[:, 0]
+    if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
+        raise InputError(f"{name}: column '{when}' must increase from 0")
+    return sampling_instants(name, when, times, period), rows[:, 1:]
 
 
-def controls_text(ticks: Sequence[int], rows: Sequence[np.ndarray], regions: Sequence[str]) -> str:
+def controls_text(
+    ticks: Sequence[int], rows: Sequence[np.ndarray], regions: Sequence[str], period: float
+) -> str:
     """Return what :func:`read_controls` reads back, to the last bit.
 
     Args:
         ticks: Shape (rows,).
         rows: Each (size,).
         regions: Names of what can be switched on and off.
+        period: Sampling time [s].
     """
-    lines = [",".join([_TICK, *columns(regions)])]
+    lines = [",".join([TIME, *columns(regions)])]
     for tick, row in zip(ticks, rows, strict=True):
-        lines.append(",".join([str(tick), *map(_number, row.tolist())]))
+        lines.append(",".join([time_text(tick, period), *map(_number, row.tolist())]))
     return "\n".join(lines) + "\n"
 
 
@@ -172,7 +179,7 @@ def add_operator(
     panel = builder.AddNamedSystem("operator_panel", OperatorPanel(parts, period))
     if parameters.inputs:
         try:
-            recorded = read_controls(str(folder / parameters.inputs), regions)
+            recorded = read_controls(str(folder / parameters.inputs), regions, period)
         except InputError as error:
             raise InputError(f"operator.inputs: {error}") from None
         player = builder.AddNamedSystem("recorded_controls", RecordedControls(*recorded, period))

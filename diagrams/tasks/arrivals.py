@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diagrams.scenario.recorded_times import TIME, sampling_instants, time_column, time_text
 from diagrams.scenario.streamed import Streamed
 from pfsc_drake.control.streams.course import POSE, POSITION
 from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender
@@ -20,13 +21,14 @@ WAY_POINT, NEW_PATH, END = range(3)
 _SOON = 1  # tick
 
 
-def columns(dimension: int) -> list[str]:
+def columns(dimension: int, when: str = TIME) -> list[str]:
     """Return the columns of a file of what was drawn.
 
     Args:
         dimension: 3 or 7.
+        when: Name of the column with times.
     """
-    return ["tick", "kind", *_POSITION, *(_QUATERNION if dimension == POSE else ())]
+    return [when, "kind", *_POSITION, *(_QUATERNION if dimension == POSE else ())]
 
 
 def read_poses(file: FilePath, key: str) -> np.ndarray:
@@ -113,7 +115,9 @@ def tell(sender: WaypointSender, event: Event) -> None:
 
 
 def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.ndarray, np.ndarray]:
-    """Return when messages change, shape (k,), and what they become, shape (k, size).
+    """Return when messages change, shape (k + 1,), and what they become, shape (k + 1, size).
+
+    The first is that before all events, at tick 0.
 
     Args:
         events: What a person did.
@@ -123,11 +127,8 @@ def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.n
     ticks, rows = [0], [sender.message]
     for event in events:
         tell(sender, event)
-        if event.tick == ticks[-1]:
-            rows[-1] = sender.message
-        else:
-            ticks.append(event.tick)
-            rows.append(sender.message)
+        ticks.append(event.tick)
+        rows.append(sender.message)
     return np.array(ticks), np.array(rows)
 
 
@@ -146,38 +147,41 @@ def strokes(events: Sequence[Event]) -> list[np.ndarray]:
     return [np.array(line) for line in lines if len(line) > 1]
 
 
-def drawn_text(events: Sequence[Event], dimension: int) -> str:
+def drawn_text(events: Sequence[Event], dimension: int, period: float) -> str:
     """Return what :func:`read_drawn` reads back, to the last bit.
 
     Args:
         events: What a person did.
         dimension: 3 or 7.
+        period: Sampling time [s].
     """
     lines = [",".join(columns(dimension))]
     for tick, kind, pose in events:
-        lines.append(",".join([str(tick), str(kind), *(repr(float(x)) for x in pose)]))
+        when = time_text(tick, period)
+        lines.append(",".join([when, str(kind), *(repr(float(x)) for x in pose)]))
     return "\n".join(lines) + "\n"
 
 
-def read_drawn(name: str, dimension: int) -> list[Event]:
+def read_drawn(name: str, dimension: int, period: float) -> list[Event]:
     """Return what a person has drawn.
 
     Args:
         name: The file.
         dimension: 3 or 7.
+        period: Sampling time [s].
 
     Raises:
-        InputError: If it cannot be read, or its ticks decrease.
+        InputError: If it cannot be read, or its times decrease.
     """
-    known = columns(dimension)
 
     def check_header(place: str, header: list[str]) -> None:
+        known = columns(dimension, time_column(header))
         check_columns(place, header, known=known, required=known)
 
     table = read_numbers(name, "events of a drawing", check_header)
-    rows = table.rows[:, [table.header.index(label) for label in known]]
-    ticks, kinds = rows[:, 0], rows[:, 1]
-    whole = np.all(ticks == np.round(ticks)) and np.all(np.isin(kinds, (WAY_POINT, NEW_PATH, END)))
-    if not whole or np.any(np.diff(ticks) < 0.0):
-        raise InputError(f"{name}: ticks and kinds; whole numbers, ticks not decreasing")
-    return [Event(int(row[0]), int(row[1]), row[2:]) for row in rows]
+    when = time_column(table.header)
+    rows = table.rows[:, [table.header.index(label) for label in columns(dimension, when)]]
+    ticks = sampling_instants(name, when, rows[:, 0], period)
+    if not np.all(np.isin(rows[:, 1], (WAY_POINT, NEW_PATH, END))):
+        raise InputError(f"{name}: column 'kind' must be {WAY_POINT}, {NEW_PATH} or {END}")
+    return [Event(int(tick), int(row[1]), row[2:]) for tick, row in zip(ticks, rows, strict=True)]

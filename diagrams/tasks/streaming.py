@@ -24,7 +24,8 @@ from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.waypoint_source import Arrivals, WaypointSource
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel
+from pfsc_drake.systems.physics.recorded_pen import RecordedPen
 
 _SETTLES = 3.0  # s, after the last way point has come, of a run that tells no duration
 _SLOWEST = 0.3  # of the largest speed, to tell how long a run may take
@@ -71,7 +72,7 @@ class StreamTask(Task):
         keyframes = f"{len(said.keyframes)} given"
         require(not said.keyframes, "path.orientation.keyframes", keyframes, "none of a stream")
         period, order = controller.sampling_time, RELATIVE_DEGREE[controller.law]
-        self.plane, self._period = shape.plane, period
+        self.plane, self.period = shape.plane, period
         self.arrivals: Arrivals | None = None
         self.drawn: list[Event] | None = None
         if shape.plane is None:
@@ -88,7 +89,7 @@ class StreamTask(Task):
             self.arrivals = without_orientation(self.arrivals)
         if shape.inputs:
             try:
-                self.drawn = read_drawn(str(folder / shape.inputs), len(begin))
+                self.drawn = read_drawn(str(folder / shape.inputs), len(begin), period)
             except InputError as error:
                 raise InputError(f"path.shape.inputs: {error}") from None
         require(any(ahead), "path.shape.file", shape.file, "way points that differ")
@@ -107,7 +108,7 @@ class StreamTask(Task):
             raise InputError("duration = 0: must be a positive number [s] where a person draws")
         places = np.vstack([self.path.start, self.arrivals.rows[:, :-1]])[:, :POSITION]
         way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-        come = self.arrivals.ends * self._period
+        come = self.arrivals.ends * self.period
         return float(np.ceil(max(come, way / (_SLOWEST * shape.follow.velocity)) + _SETTLES))
 
     @property
@@ -172,7 +173,9 @@ class StreamTask(Task):
         builder.Connect(panel.GetOutputPort("waypoints"), stream.waypoints)
         if self.drawn is not None:
             told = told_messages(self.drawn, messages)
-            player = builder.AddNamedSystem("recorded_pen", RecordedControls(*told, period))
+            pen = RecordedPen(*told, messages.length, period)
+            player = builder.AddNamedSystem("recorded_pen", pen)
+            builder.Connect(stream.stream, player.get_input_port())
             builder.Connect(player.get_output_port(), panel.GetInputPort("controls"))
         return panel
 

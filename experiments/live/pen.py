@@ -76,7 +76,7 @@ class Pen:
 
     def text(self) -> str:
         """Return the content of a file that :func:`~diagrams.tasks.arrivals.read_drawn` reads."""
-        return drawn_text(self._events, len(self._task.path.start))
+        return drawn_text(self._events, len(self._task.path.start), self._task.period)
 
     def content(self, y_t: np.ndarray, stream: np.ndarray) -> dict[str, object]:
         """Return what a page shows, for JSON.

@@ -51,7 +51,9 @@ class ControlRecord:
 
     def text(self) -> str:
         """Return the content of a file, see :mod:`diagrams.surroundings.operator`."""
-        return controls_text(self._ticks, self._rows, self._operator.regions)
+        return controls_text(
+            self._ticks, self._rows, self._operator.regions, self._operator.panel.period
+        )
 
 
 class TakeFolders:

@@ -68,6 +68,7 @@ class FaultScene:
         before: The last one without, if there is any.
         suspects: Which components of the measured state are implausible, nonzero if so, shape
             (4N,); empty if that is not known.
+        oscillating: Drives whose commands swung to and fro before, by index.
     """
 
     law: FollowingLaw
@@ -77,6 +78,7 @@ class FaultScene:
     now: FaultInstant
     before: FaultInstant | None
     suspects: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    oscillating: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
 def describe(fault: Fault, scene: FaultScene) -> str:
@@ -134,7 +136,15 @@ def _component_names(components: np.ndarray, num_joints: int) -> list[str]:
 def _implausible(scene: FaultScene) -> str:
     names = _component_names(np.flatnonzero(scene.suspects), scene.robot.dimension)
     what = f": {listed(names)}" if names else ""
-    return f"{Fault.MEASUREMENT_IMPLAUSIBLE.explanation}{what} {_place(scene)}"
+    sentence = f"{Fault.MEASUREMENT_IMPLAUSIBLE.explanation}{what} {_place(scene)}"
+    if not len(scene.oscillating):
+        return sentence
+    axes = listed(map(str, scene.oscillating + 1))
+    return (
+        f"the loop oscillates: commands of {axes} swung to and fro, and {sentence}; an unstable "
+        "loop does that with good sensors ('margins' tells whether it is stable), a faulty "
+        "sensor can make it unstable"
+    )
 
 
 def _joint_limit(scene: FaultScene) -> str:

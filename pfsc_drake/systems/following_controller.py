@@ -229,5 +229,6 @@ class ControllerAccess(FaultAccess):
         if self._is_supervised:
             watch = f"{self.name}.supervision"
             blocks.set_state(root, f"{watch}.last", joint_state)
-            for name in ("sums", "unchanged"):
-                blocks.set_state(root, f"{watch}.{name}", np.zeros(len(joint_state)))
+            for name in ("sums", "unchanged", "unseen"):
+                sums = blocks.state(root, f"{watch}.{name}")
+                blocks.set_state(root, f"{watch}.{name}", np.zeros(len(sums)))

@@ -174,6 +174,29 @@ def test_a_servo(six_axes):
     )
 
 
+@pytest.mark.parametrize("unstable", [False, True])
+def test_an_unstable_loop_is_not_blamed_on_sensors_alone(six_axes, unstable):
+    """Measured values that part while commands swing; without, they alone are named."""
+    station, root = run(six_axes, 0.02)
+    now, before = first_instant(
+        station.log, station.blocks, root, "law", station.law.layout.status.start
+    )
+    scene = FaultScene(
+        station.law,
+        station.robot,
+        station.task.place,
+        False,
+        now,
+        before,
+        np.eye(24)[10],
+        np.array([1, 4]) if unstable else np.zeros(0, dtype=int),
+    )
+    sentence = describe(Fault.MEASUREMENT_IMPLAUSIBLE, scene)
+    assert "measured values of a joint contradict each other: v_J_5 at eta = " in sentence
+    assert ("commands of 2 and 5 swung to and fro" in sentence) == unstable
+    assert ("an unstable loop does that with good sensors" in sentence) == unstable
+
+
 def test_what_is_known_without_a_run(six_axes):
     """Forces and references that are no numbers; a projection without a result."""
     station, root = run(six_axes, 0.04)

@@ -14,8 +14,8 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, largest_speeds
 
-# 1/s, by which differences of what is compared are forgotten
-_FORGETTING = 20.0
+# 1/s, by which differences of what is compared are forgotten, and ways beside a position that rests
+_FORGETTING, _FORGETTING_RESTS = 20.0, 2.0
 # part of the tolerance that tells a jump within a tick, or a rest for some ticks
 _AT_ONCE = 0.5
 # how far a spring may be bent, over what the drive's limit bends it
@@ -32,7 +32,7 @@ class SupervisionParameters:
         resolution: Resolution of the measured positions [rad or m], shape (N,) or one for all;
             widens the tolerance by twice its value.
         filter_time: By which measured velocities are late [s]; widens it by twice the way that a
-            joint makes in that time at its fastest.
+            joint makes in that time at its present speed.
         joint_limits: Whether a joint at its limit is a fault.
         saturation_time: How long a drive may be at its limit [s], half of the time that it is not
             being taken off; 0 for ever.
@@ -65,7 +65,13 @@ class Supervision(Block):
     Of every joint four signals tell the same motion: positions and integrated velocities of
     link and motor. From tick to tick each adds to a leaky sum (by 20 1/s), so that offsets
     between them do not count. Position and velocity of one side must agree up to the tolerance;
-    the sides up to what the drive's torque, twice, bends the spring of an elastic joint.
+    the sides up to what the drive's torque, twice, bends the spring of an elastic joint. A
+    velocity that is late by ``filter_time`` lags behind by ``filter_time (v - v_m)``, where v_m is
+    its mean with the same forgetting: the tolerance is wider by twice the larger of both, each
+    up to the speed that is a fault.
+
+    A position that rests to the last bit must not do so while its velocity tells of more way than
+    the tolerance, which here is forgotten by 2 1/s: so it is found also where the joint is slow.
 
     Of a side that disagrees with itself the position is suspected if it jumped, by half the
     tolerance within this tick, or if it has rested, to the last bit, while the velocity told of
@@ -76,7 +82,8 @@ class Supervision(Block):
     So a position that jumps or freezes, and a velocity that jumps or freezes, are found as soon
     as position and integrated velocity part by the tolerance: a jump of a position in the same
     tick, of a velocity by ``dv`` after ``tolerance / dv``. What cannot be found: a value that
-    is frozen at rest, as long as the joint rests; drifts slower than tolerance times 20 1/s.
+    is frozen at rest, as long as the joint rests; drifts slower than tolerance times 20 1/s, or
+    2 1/s beside a position that rests.
 
     A joint is too fast if link or motor is, by its velocity as by the way since the last tick: one
     of the two alone may be a sensor's error, which the comparison above finds.
@@ -89,7 +96,9 @@ class Supervision(Block):
 
     State:
         joint_state of the ``last`` tick, and whether there was one (``known``); the leaky ``sums``
-        of the four ways, shape (4N,); for how many ticks each value was ``unchanged``, shape (4N,).
+        of the four ways, shape (4N,); for how many ticks each value was ``unchanged``, shape
+        (4N,); the ways by velocity since the positions of link and motor rest (``unseen``), shape
+        (2N,).
 
     Args:
         robot: The robot as it is believed, N joints.
@@ -121,8 +130,8 @@ class Supervision(Block):
             "ignored": Port(4 * n),
         }
         self.outputs = {"fault": Port(1), "suspects": Port(4 * n)}
-        self.inner = {"sums": 4 * n, "unchanged": 4 * n}
-        self.states = {"last": 4 * n, "known": 1, "sums": 4 * n, "unchanged": 4 * n}
+        self.inner = {"sums": 4 * n, "unchanged": 4 * n, "unseen": 2 * n}
+        self.states = {"last": 4 * n, "known": 1} | self.inner
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero."""
@@ -130,12 +139,14 @@ class Supervision(Block):
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        results = self._function(u.joint_state, x.last, x.sums, x.unchanged, x.known, u.ignored)
-        return dict(zip(("fault", "suspects", "sums", "unchanged"), results, strict=True))
+        remembered = (x.last, x.sums, x.unchanged, x.unseen, x.known)
+        results = self._function(u.joint_state, *remembered, u.ignored)
+        return dict(zip(("fault", "suspects", *self.inner), results, strict=True))
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""
-        return {"last": u.joint_state, "known": 1.0, "sums": y.sums, "unchanged": y.unchanged}
+        later = {name: getattr(y, name) for name in self.inner}
+        return {"last": u.joint_state, "known": 1.0} | later
 
 
 @once_per_content()
@@ -146,17 +157,15 @@ def _supervision_function(
     parameters: SupervisionParameters,
     period: float,
 ) -> ca.Function:
-    """Return ``(state, last, sums, unchanged, known, ignored) -> (fault, suspects, ..)``.
+    """Return ``(state, last, sums, unchanged, unseen, known, ignored) -> (fault, suspects, ..)``.
 
-    The last two results are the next sums and unchanged.
+    The last three results are the next sums, unchanged and unseen.
     """
     n = robot.dimension
     names = ("state", "last", "sums", "unchanged")
     state, last, total, steady = (ca.SX.sym(name, 4 * n) for name in names)
     known, ignored = ca.SX.sym("known"), ca.SX.sym("ignored", 4 * n)
-    speed = robot.gather("velocity_limit")
-    speed = np.where(np.isfinite(speed), speed, 0.0)
-    tolerance = parameters.tolerance + 2.0 * (speed * parameters.filter_time + resolution)
+    hidden = ca.SX.sym("unseen", 2 * n)
     bending = robot.elastic_joints * _BENDING * np.minimum(limits, 1e300) / robot.K_s
     now, before, sums = (ca.vertsplit(x, n) for x in (state, last, total))
     unchanged = where(state == last, steady + known, 0.0)
@@ -172,23 +181,34 @@ def _supervision_function(
         ca.logic_and(is_finite(x), skip == 0.0)
         for x, skip in zip(now, ca.vertsplit(ignored, n), strict=True)
     ]
+    allowed = largest_speeds(robot) * (1.0 + parameters.overspeed)
+    tolerances, unseen, overlooked = [], [], []
+    for side, way in zip((0, 2), ca.vertsplit(hidden, n), strict=True):
+        fast = ca.fmin(_recent_speed(now[side + 1], ways[side + 1]), allowed)
+        late = parameters.filter_time * fast
+        tolerances.append(parameters.tolerance + 2.0 * (late + resolution))
+        further = np.exp(-_FORGETTING_RESTS * period) * way + steps[side + 1]
+        rest = ca.logic_and(rests[side] > 0, used[side + 1])
+        unseen.append(where(ca.logic_and(rest, is_finite(further)), further, 0.0))
+        overlooked.append(ca.fabs(unseen[-1]) > tolerances[-1])
     q_J, v_J, q_M, v_M = _substituted(ways, used)
-    wrong_J, wrong_M = ca.fabs(q_J - v_J) > tolerance, ca.fabs(q_M - v_M) > tolerance
+    wrong_J = ca.logic_or(ca.fabs(q_J - v_J) > tolerances[0], overlooked[0])
+    wrong_M = ca.logic_or(ca.fabs(q_M - v_M) > tolerances[1], overlooked[1])
     link, motor = (q_J + v_J) / 2.0, (q_M + v_M) / 2.0
-    apart = ca.fabs(link - motor) > tolerance + bending
+    apart = ca.fabs(link - motor) > ca.fmax(*tolerances) + bending
     neither, both = ca.logic_not(wrong_J + wrong_M), wrong_J * wrong_M
     link_moved_less = ca.fabs(link) < ca.fabs(motor)
     less = (link_moved_less, 1 - link_moved_less)
     suspects = []
     for side, wrong in ((0, wrong_J), (2, wrong_M)):
         slip, change = steps[side] - steps[side + 1], now[side + 1] - before[side + 1]
-        at_once = _AT_ONCE * tolerance
+        at_once = _AT_ONCE * tolerances[side // 2]
         # a velocity that jumped has let them part in the ticks before, too
         agreed = ca.fabs(sums[side] - sums[side + 1]) < at_once / 2.0
         sudden = period * ca.fabs(change) < ca.fabs(slip)
         jumped = (ca.fabs(slip) > at_once) * agreed * sudden
         rested = period * rests[side] * ca.fabs(now[side + 1]) > at_once
-        of_position = (1 - both) * ca.fmax(jumped, rested)
+        of_position = (1 - both) * ca.fmax(ca.fmax(jumped, rested), overlooked[side // 2])
         suspects += [wrong * of_position, wrong * (1 - of_position)]
     # joints that bend by more than they should move on both sides
     still = [(rests[side] > 0) * (rests[side + 1] > 0) for side in (0, 2)]
@@ -201,7 +221,7 @@ def _supervision_function(
     lower, upper = robot.gather("position_limits").T
     at_limit = ca.sum1((now[0] <= lower) + (now[0] >= upper)) if parameters.joint_limits else 0
     # a difference of positions is as coarse as they are
-    fastest = largest_speeds(robot) * (1.0 + parameters.overspeed) + 2.0 * resolution / period
+    fastest = allowed + 2.0 * resolution / period
     speeds = [ca.fmin(ca.fabs(steps[side]) / period, ca.fabs(now[side + 1])) for side in (0, 2)]
     too_fast = ca.sum1((speeds[0] > fastest) + (speeds[1] > fastest))
     fault = first_of(
@@ -211,15 +231,26 @@ def _supervision_function(
         otherwise=Fault.NONE,
     )
     decay = np.exp(-_FORGETTING * period)
-    results = [fault, suspect, ca.vertcat(*[decay * way for way in ways]), unchanged]
+    sums = ca.vertcat(*[decay * way for way in ways])
+    results = [fault, suspect, sums, unchanged, ca.vertcat(*unseen)]
     return ca.Function(
         "supervision",
-        [state, last, total, steady, known, ignored],
+        [state, last, total, steady, hidden, known, ignored],
         ca.cse([ca.densify(ca.SX(result)) for result in results]),
-        [*names, "known", "ignored"],
-        ["fault", "suspects", "next_sums", "next_unchanged"],
+        [*names, "unseen", "known", "ignored"],
+        ["fault", "suspects", "next_sums", "next_unchanged", "next_unseen"],
         MAY_BE_PARAMETRIC,
     )
+
+
+def _recent_speed(v: ca.SX, way: ca.SX) -> ca.SX:
+    """Return how fast joints move or have moved, shape (N,).
+
+    Args:
+        v: Velocities, shape (N,); what is no number is none.
+        way: Their leaky sums, shape (N,).
+    """
+    return ca.fmax(where(is_finite(v), ca.fabs(v), 0.0), _FORGETTING * ca.fabs(way))
 
 
 def _substituted(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:

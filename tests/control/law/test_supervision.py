@@ -104,6 +104,38 @@ def test_coarse_and_late_measurements_are_believed(chain):
     assert watch(chain, late, resolution=np.array([step]), filter_time=time) is None
 
 
+def slow_motion(speed):
+    """Return states of joint 1 that rests, and sets off after half of the time."""
+    way = speed * PERIOD * np.maximum(np.arange(1600) - 800, 0)
+    states = np.zeros((1600, 4 * N))
+    states[:, [0, 2 * N]] = way[:, None]
+    # difference quotients
+    states[1:, [N, 3 * N]] = np.diff(way)[:, None] / PERIOD
+    return states
+
+
+@pytest.mark.parametrize("filter_time", [PERIOD, 10.0 * PERIOD])
+@pytest.mark.parametrize(("side", "name"), [(0, "q_J_1"), (2 * N, "q_M_1")])
+def test_an_encoder_that_froze_at_rest_is_found_by_the_tolerance(chain, filter_time, side, name):
+    """At 0.03 rad/s, though joints may move at 4 rad/s: velocities are late by what is slow now."""
+    speed = 0.03
+    frozen = slow_motion(speed)
+    assert watch(chain, frozen, joint_limits=False, filter_time=filter_time) is None
+    frozen[:, side] = 0.0
+    k, fault, suspects = watch(chain, frozen, joint_limits=False, filter_time=filter_time)
+    assert (fault, suspects) == (Fault.MEASUREMENT_IMPLAUSIBLE, [name])
+    way = (k - 800) * PERIOD * speed
+    assert 2e-3 < way < 1.15 * (2e-3 + 2.0 * filter_time * speed)
+
+
+@pytest.mark.parametrize(("bias", "believed"), [(3e-3, True), (5e-3, False)])
+def test_a_resting_position_beside_a_velocity_that_is_off(chain, bias, believed):
+    """Up to the tolerance times 2 1/s, an offset of a velocity is no motion."""
+    states = np.zeros((4000, 4 * N))
+    states[:, N + 1] = bias
+    assert (watch(chain, states, joint_limits=False) is None) == believed
+
+
 def test_coarse_encoders_are_believed(chain):
     """Positions in steps of 4 mrad beside exact velocities part by more than the tolerance."""
     coarse, step = motion(chain), 4e-3

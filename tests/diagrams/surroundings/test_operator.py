@@ -35,7 +35,7 @@ def write(folder, settings, *rows, regions=()):
         ticks.append(tick)
         controls.append(now)
     file = folder / "operator.csv"
-    file.write_text(controls_text(ticks, controls, regions), encoding="utf-8")
+    file.write_text(controls_text(ticks, controls, regions, 1e-3), encoding="utf-8")
     settings.operator.inputs = str(file)
 
 

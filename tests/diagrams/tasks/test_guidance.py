@@ -56,7 +56,7 @@ def test_a_person_switches_a_region_off(wedge, tmp_path):
     rows[1:, 2] = -20.0
     rows[2, -len(regions)] = 0.0  # the lower plane
     file = tmp_path / "operator.csv"
-    file.write_text(controls_text([0, 200, 700], rows, regions))
+    file.write_text(controls_text([0, 200, 700], rows, regions, 1e-3))
     settings = copy.deepcopy(settings)
     settings.hand, settings.friction.file = None, ""
     settings.start.position = [0.95, 0.0, 0.802]

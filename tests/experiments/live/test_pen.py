@@ -87,13 +87,13 @@ def test_the_tool_follows_while_one_draws_and_a_take_is_repeated_to_the_last_bit
 def test_messages_of_a_drawing_are_those_that_were_told(tmp_path):
     name = tmp_path / DRAWING
     name.write_text("tick,kind,x,y,z\n10,0,1,2,3\n10,0,1.5,2,3\n30,1,4,5,6\n40,2,4,5,6\n")
-    events = read_drawn(str(name), 3)
+    events = read_drawn(str(name), 3, 1e-3)
     assert [event.kind for event in events] == [WAY_POINT, WAY_POINT, NEW_PATH, END]
     ticks, rows = told_messages(events, WaypointLayout(3, 4))
-    assert ticks.tolist() == [0, 10, 30, 40]
-    assert rows[:, 0].tolist() == [0, 2, 3, 3]
-    assert rows[:, 1].tolist() == [0, 0, 0, 1]
-    assert rows[2, -4:].tolist() == [4, 5, 6, 1]
+    assert ticks.tolist() == [0, 10, 10, 30, 40]
+    assert rows[:, 0].tolist() == [0, 1, 2, 3, 3]
+    assert rows[:, 1].tolist() == [0, 0, 0, 0, 1]
+    assert rows[3, -4:].tolist() == [4, 5, 6, 1]
 
 
 @pytest.mark.parametrize("bad", ["1", "[[1, 2]]", "[[1, 2, null]]", '[["a", 1, 0]]'])

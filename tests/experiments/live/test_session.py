@@ -114,7 +114,7 @@ def test_a_take_is_repeated_to_the_last_bit(tmp_path, capsys):
     free = (1500.0 + 3500.0 * np.exp(-2.0)) * np.exp(-2.0)
     assert log["stiffness"][1000, 1] == pytest.approx(free, rel=2e-3)
     assert 2.0 * free < log["stiffness"][-1, 1] <= 1500.0
-    ticks, _ = read_controls(str(first / "operator.csv"), [])
+    ticks, _ = read_controls(str(first / "operator.csv"), [], 1e-3)
     assert ticks[0] == 0
     assert ticks[1] == 400
 

@@ -13,8 +13,14 @@ from experiments.simulation import chunk_ticks
 from pfsc_drake.errors import InputError
 
 
+def operator_at(period):
+    """Return an operator without regions whose panel is sampled."""
+    panel = SimpleNamespace(period=period)
+    return SimpleNamespace(idle=idle_controls([]), regions=[], panel=panel)
+
+
 def test_only_changes_are_kept_even_those_of_a_sign():
-    record = ControlRecord(SimpleNamespace(idle=idle_controls([]), regions=[]))
+    record = ControlRecord(operator_at(2e-3))
     pushed = idle_controls([])
     pushed[1] = 5.0
     negative = idle_controls([])
@@ -22,12 +28,12 @@ def test_only_changes_are_kept_even_those_of_a_sign():
     for tick, controls in [(0, idle_controls([])), (10, pushed), (20, pushed), (30, negative)]:
         record.note(tick, controls)
     lines = record.text().splitlines()[1:]
-    assert [line.split(",")[0] for line in lines] == ["0", "10", "30"]
+    assert [line.split(",")[0] for line in lines] == ["0", "0.02", "0.06"]
     assert lines[-1].split(",")[1] == "-0"
 
 
 def test_what_is_set_before_the_first_tick_counts_from_there():
-    record = ControlRecord(SimpleNamespace(idle=idle_controls([]), regions=[]))
+    record = ControlRecord(operator_at(2e-3))
     pushed = idle_controls([])
     pushed[2] = 0.1
     record.note(0, pushed)
