@@ -238,7 +238,8 @@ def _measure(
     metrics.update(mounting_metrics(log))
     metrics.update(holder_metrics(log, settings.reference.dwell))
     metrics.update(stream_metrics(log))
-    metrics.update(obstacle_metrics(log, settings.obstacles))
+    goal = station.task.motion.derivatives(station.task.motion.domain[1:], 0)[0, 0]
+    metrics.update(obstacle_metrics(log, settings.obstacles, goal))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
@@ -272,7 +273,7 @@ def _measure(
         *guidance_warnings(log, settings),
         *unpromised_distance(metrics, settings.controller.law),
     ]
-    broken = broken_promises(metrics, whole=lasted and result.fault is None)
+    broken = broken_promises(metrics, whole=lasted, stopped=result.fault is not None)
     return _Measured(log, motion, metrics, warnings, result.fault, broken, end, stop)
 
 

@@ -28,6 +28,10 @@ _ALWAYS = (
     *("least_port_tank", "energy_margin", "least_distance_while_moving"),
     *("motion_after_fault", "slide_motion_after_fault"),
 )
+# what a longer run can only make larger
+_MAXIMA = ("max_", "peak_", "largest_", "deepest_")
+# m, within which a tool has arrived at the end of its motion
+_ARRIVED = 1e-3
 # m, by which a tool may be past the end of what it knows of its path: it follows its reference
 _PAST = 1e-3
 # m, that leader and follower may be apart in the end because energy lacks to tell it
@@ -97,6 +101,8 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     if settings.obstacles is not None and "least_distance_while_moving" in metrics:
         bound = f">= {settings.obstacles.watch.margin:g}"
         metrics.set_target("least_distance_while_moving", bound, "obstacles.watch.margin")
+    if "remaining_distance" in metrics:
+        metrics.set_target("remaining_distance", f"<= {_ARRIVED:g}", "the motion arrives")
     if settings.compliance.needs_sensor and "max_unanswered_force" in metrics:
         # what is less would be taken for a bias
         bound = f"<= {settings.sensor.taring_spread[:3].max():g}"
@@ -115,18 +121,27 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
             metrics.set_target(name, target.bound, target.source)
 
 
-def broken_promises(metrics: Metrics, *, whole: bool) -> list[str]:
-    """Return what was promised and not kept, one phrase each.
+def broken_promises(metrics: Metrics, *, whole: bool, stopped: bool = False) -> list[str]:
+    """Return the requirements that were missed, one phrase each.
 
     Args:
         metrics: With their targets. One without a value has missed its target.
-        whole: Whether the run lasted as long as its scenario, without a fault. Of others only
-            those promises count that hold at every instant, and of which there is a value.
+        whole: Whether the run lasted as long as its scenario. Of one that was cut short only
+            requirements count that hold at every instant, and maxima: one that was exceeded stays
+            so. Those without a value do not count.
+        stopped: Whether a fault stopped the run: then maxima of before and after do not count.
     """
+
+    def is_judged(name: str, metric: Metric) -> bool:
+        if whole and not stopped:
+            return True
+        is_maximum = not stopped and name.startswith(_MAXIMA) and metric.is_upper_bound
+        return (name in _ALWAYS or is_maximum) and not math.isnan(metric.value)
+
     return [
         _phrase(name, metric)
         for name, metric in metrics.items()
-        if metric.passed is False and (whole or (name in _ALWAYS and not math.isnan(metric.value)))
+        if metric.passed is False and is_judged(name, metric)
     ]
 
 

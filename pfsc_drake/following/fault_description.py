@@ -172,8 +172,11 @@ def _joint_speed(scene: FaultScene) -> str:
 
 
 def _at_limit(fault: Fault, scene: FaultScene) -> str:
-    before = scene.before or scene.now
-    share = np.abs(before.signals["law"][scene.law.layout.drive]) / scene.law.limits
+    before = (scene.before or scene.now).signals
+    if "drive_torque" in before and fault is Fault.DRIVE_CHATTERS:  # of velocity servos
+        share = np.abs(before["drive_torque"]) / scene.robot.gather("effort_limit")
+    else:
+        share = np.abs(before["law"][scene.law.layout.drive]) / scene.law.limits
     # one that goes from limit to limit may be between them now
     axes = map(str, np.flatnonzero(share >= min(1.0, float(share.max())) * (1.0 - 1e-9)) + 1)
     return f"{fault.explanation}: {listed(axes)} {_place(scene)}"

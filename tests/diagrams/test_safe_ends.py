@@ -282,8 +282,8 @@ def test_three_free_turns_about_the_tools_axis(six_axes):
 
 
 @pytest.mark.parametrize("end", [0, 1])
-def test_over_the_end_of_an_open_path(load_exact_scenario, end):
-    """Pushed over the end at 0.4 m/s; the tool turned on the way to it."""
+def test_at_the_end_of_an_open_path(load_exact_scenario, end):
+    """Pushed against the end at 0.4 m/s, which is a wall; the tool turned on the way to it."""
     settings, sign = load_exact_scenario("operator_hand_6r"), 2 * end - 1
     settings.hand = None
     settings.reference.points = [[0.08, 0.08], [0.94, 0.94]][end]
@@ -295,9 +295,9 @@ def test_over_the_end_of_an_open_path(load_exact_scenario, end):
     station, result, _, log = go_on(settings, 1.0)
     assert result.fault is None
     eta = log["manifold_point"][:, station.task.place.layout.eta]
-    beyond = eta[-1] - station.path.length if end else -eta[-1]
-    assert beyond > 0.07
+    beyond = (eta - station.path.length if end else -eta)[300:, 0]
+    assert beyond[-1] > -1e-3 and beyond.max() < 1e-3
     drive = log["law"][:, station.law.layout.drive]
-    # the push itself takes 10 Nm a tick where it sets in
-    assert np.abs(np.diff(drive[350:], axis=0)).max() < 15.0
+    # rigid joints brake from one sample to the next; a reference that ends takes 1,000 Nm
+    assert np.abs(np.diff(drive[350:], axis=0)).max() < 120.0
     assert np.abs(drive).max() < 400.0

@@ -1,6 +1,7 @@
 """Joint velocity control, with what watches and stops it, in Drake."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
@@ -9,7 +10,7 @@ from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Constant
 from pfsc_drake.control.law.fault import FaultLatch, FaultSwitch
 from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
-from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
+from pfsc_drake.control.law.supervision import DriveWatch, Supervision, SupervisionParameters
 from pfsc_drake.physics.velocity_servo import SampledServo, VelocityServoLaw
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
@@ -27,10 +28,11 @@ class VelocityServo(Diagram):
     hold of its own in front of ``velocity_reference``, whose new value the servo takes up
     one servo period after the tick.
 
-    An input that is not finite, a measurement that contradicts itself, if that is supervised, and
-    a bus that is silent for too long are faults. The first one holds (:class:`FaultLatch`): from
-    that instant on the servo stops the joints and holds them where they have come to rest
-    (:class:`SafeStop`), whatever the reference. Only a new initialization leaves that state.
+    An input that is not finite, a bus that is silent for too long and, if they are supervised, a
+    measurement that contradicts itself and torques that jump between their limits are faults. The
+    first one holds (:class:`FaultLatch`): from that instant on the servo stops the joints and holds
+    them where they have come to rest (:class:`SafeStop`), whatever the reference. Only a new
+    initialization leaves that state.
 
     Ports:
         joint_state, velocity_reference, silence (optional) (input): See :class:`SampledServo`.
@@ -84,12 +86,20 @@ class VelocityServo(Diagram):
             connect(watch, "suspects", stop, "suspects")
             causes["measurement"] = watch.GetOutputPort("fault")
             measures.append(watch)
+            # torques may be at a limit for long, for servos are told velocities
+            only_turns = replace(supervision, saturation_time=0.0)
+            drives = add("drive_watch", DriveWatch(law.limits, only_turns, self.period))
+            connect(servo, "drive_torque", drives, "drive")
+            causes["drives"] = drives.GetOutputPort("fault")
         causes["bus"] = servo.GetOutputPort("bus_fault")
         # the root cause first
         latch, switch = add("fault_latch", FaultLatch(list(causes))), add("switch", FaultSwitch(n))
         for name, port in causes.items():
             builder.Connect(port, latch.GetInputPort(name))
-        for system, name in ((servo, "stopping"), (stop, "fault"), (switch, "fault")):
+        told = [(servo, "stopping"), (stop, "fault"), (switch, "fault")]
+        if supervision is not None:
+            told.append((drives, "stopping"))
+        for system, name in told:
             connect(latch, "fault", system, name)
         connect(servo, "drive_torque", switch, "drive")
         connect(stop, "torque", switch, "stop")

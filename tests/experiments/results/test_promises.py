@@ -44,14 +44,21 @@ def test_a_force_that_nobody_answers_is_a_promise_broken():
     assert not broken_promises(free, whole=True)
 
 
-def test_a_run_cut_short_is_judged_by_what_holds_at_every_instant():
+def test_a_run_cut_short_is_judged_by_maxima_and_what_holds_at_every_instant():
     found = metrics(deepest_violation=1.3e-3, max_path_deviation=2e-3, settling_time=math.nan)
     found.set_target("deepest_violation", "<= 0.5e-3")
     found.set_target("max_path_deviation", "< 1e-3")
     found.set_target("settling_time", "< 1")
-    assert [phrase.split()[0] for phrase in broken_promises(found, whole=False)] == [
-        "deepest_violation"
-    ]
+
+    def missed(**how):
+        return [phrase.split()[0] for phrase in broken_promises(found, **how)]
+
+    assert missed(whole=False) == ["deepest_violation", "max_path_deviation"]
+    assert missed(whole=False, stopped=True) == missed(whole=True, stopped=True)
+    assert missed(whole=True, stopped=True) == ["deepest_violation"]
+    found.set_target("max_path_deviation", "> 1")
+    assert missed(whole=False) == ["deepest_violation"]
+    found.set_target("max_path_deviation", "< 1e-3")
     whole = broken_promises(found, whole=True)
     assert len(whole) == 3
     assert "settling_time has no value, target < 1" in whole[2]
@@ -59,7 +66,13 @@ def test_a_run_cut_short_is_judged_by_what_holds_at_every_instant():
 
 @pytest.mark.parametrize(
     ("bound", "duration", "status"),
-    [("< 1e-3", [], 0), ("< 1e-12", [], 3), ("< 1e-12", ["--duration", "0.2"], 0)],
+    [
+        ("< 1e-3", [], 0),
+        ("< 1e-12", [], 3),
+        # a maximum that was exceeded stays so
+        ("< 1e-12", ["--duration", "0.2"], 3),
+        ("> 1", ["--duration", "0.2"], 0),
+    ],
 )
 def test_the_last_line_and_the_status_tell(tmp_path, capfd, bound, duration, status):
     changes = [

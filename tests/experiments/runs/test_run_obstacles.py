@@ -97,3 +97,20 @@ def test_who_is_faster_than_was_said_breaks_the_promise_and_the_run_says_so(tmp_
 def test_what_does_not_suit_is_refused_by_its_key(tmp_path, override, message):
     with pytest.raises(InputError, match=message):
         _run(tmp_path, override)
+
+
+def test_a_motion_that_does_not_arrive_is_no_success(tmp_path):
+    """The person stays on the path until the run, which is not cut short, is over."""
+    stays = "{kind: column, radius: 0.25, way: [{time: 0.0, position: [0.8, 0.3, 0.0]}, \
+{time: 1.0, position: [0.8, 0.3, 0.0]}]}"
+    outcome = _run(
+        tmp_path,
+        f"obstacles.moving=[{stays}]",
+        "obstacles.watch.retreat=0",
+        "judged_after=1.5",
+        duration=1.6,
+    )
+    assert outcome.fault is None
+    (broken,) = [phrase for phrase in outcome.broken if phrase.startswith("remaining_distance")]
+    assert "target <= 1" in broken
+    assert outcome.metrics["remaining_distance"].value > 0.3

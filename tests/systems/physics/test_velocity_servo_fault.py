@@ -196,3 +196,19 @@ def test_a_start_without_measurement(bench):
     bench.simulator.Initialize()
     assert bench.fault is Fault.INPUT_NOT_FINITE
     assert np.isfinite(bench.torque).all()
+
+
+@pytest.mark.parametrize(("turns", "found"), [(6.0, 7), (0.0, None)])
+def test_torques_that_jump_between_their_limits_are_a_fault(turns, found):
+    """References of 40 rad/s either way ask axis 2 for more than it has; then the robot stops."""
+    watched = SupervisionParameters(
+        tolerance=0.0, joint_limits=False, overspeed=np.inf, chatter_turns=turns
+    )
+    bench = Bench(supervision=watched)
+    for k in range(20):
+        bench.set(reference=40.0 * (-1.0) ** k * np.eye(6)[1])
+        expected = Fault.DRIVE_CHATTERS if found and k > found else Fault.NONE
+        assert bench.fault == expected, k
+        saturated = np.isclose(np.abs(bench.torque), bench.limits)
+        assert saturated.tolist() == [False, expected == Fault.NONE, *[False] * 4]
+        bench.tick()
