@@ -21,11 +21,23 @@ if TYPE_CHECKING:
     from reporting.metrics import Metric
 
 
-def print_run(console: Console, outcome: "RunOutcome") -> None:
-    """What came out of a run, as far as it is no reason for concern; quietly its last line."""
+def print_warning(console: Console, sentence: str) -> None:
+    """Print a warning, a line of its own."""
+    console.print(f"\n[yellow]warning:[/] {escape(sentence)}", soft_wrap=True)
+
+
+def print_run(console: Console, outcome: "RunOutcome", said: Sequence[str] = ()) -> None:
+    """Print what came out of a run, as far as it is no reason for concern; quietly its last line.
+
+    Args:
+        console: Where to.
+        outcome: What came out.
+        said: Warnings that have been printed before.
+    """
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
-        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+        if warning not in said:
+            print_warning(console, warning)
     if outcome.margins is not None:
         console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
     _print_report(console, outcome.report)

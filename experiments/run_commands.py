@@ -33,6 +33,7 @@ from experiments.outcomes import (
     print_live,
     print_run,
     print_sweep,
+    print_warning,
 )
 from experiments.scenario_file import expand_home, list_scenarios
 from experiments.study_commands import study_command
@@ -105,6 +106,12 @@ def run_command(
         folder = expand_home(out) if out is not None else Path("out") / loaded.name
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console(quiet=quiet)
+        said: list[str] = []
+
+        def warn(sentence: str) -> None:
+            said.append(sentence)
+            print_warning(console, sentence)
+
         with ProgressDisplay(console, loaded.name, seconds) as progress:
             outcome = run_scenario(
                 loaded,
@@ -115,8 +122,9 @@ def run_command(
                 progress=progress,
                 after_fault=further,
                 margins=margins,
+                warn=warn,
             )
-        print_run(console, outcome)
+        print_run(console, outcome, said)
         raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
 
 

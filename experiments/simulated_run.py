@@ -1,5 +1,6 @@
 """One run: from a scenario file to log, metrics, figures, recording and report."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
@@ -24,6 +25,7 @@ def run_scenario(
     progress: ProgressListener,
     margins: bool = False,
     after_fault: float = 0.0,
+    warn: Callable[[str], None] = lambda sentence: None,
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
 
@@ -36,6 +38,8 @@ def run_scenario(
         progress: Told how far the run is.
         margins: Whether to tell the margins of the loop at the start.
         after_fault: How long to go on after a fault [s], so that one sees how it ends.
+        warn: Called with each warning that is known before anything moves; they are among those
+            of the outcome, too.
 
     Raises:
         InputError: If the scenario is wrong or the folder cannot be used; nothing has moved then.
@@ -44,6 +48,8 @@ def run_scenario(
     inputs = scenario.inputs()
     check_folder(out, "run", inputs)
     prepared = prepare(scenario, duration, recording=recording, progress=progress)
+    for sentence in prepared.warnings:
+        warn(sentence)
     analysis = _analyse(prepared, scenario.path.parent, progress) if margins else None
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)

@@ -41,10 +41,13 @@ class FakeRun:
         self.outcome = Outcome()
         self.raises: BaseException | None = None
         self.calls: list[tuple] = []
+        self.warns: list[str] = []
 
-    def run_scenario(self, scenario, out, duration, figures, recording, progress, **_):
+    def run_scenario(self, scenario, out, duration, figures, recording, progress, warn, **_):
         self.calls.append((scenario, out, duration, figures, recording))
         progress(0.0, "building")
+        for sentence in self.warns:
+            warn(sentence)
         progress.expect(1.0)
         for step in range(11):
             progress(0.1 * step, "simulating")
@@ -368,3 +371,14 @@ def test_the_identification_runs_by_its_name(monkeypatch, tmp_path, capsys):
     for command in ("run", "study"):
         assert main([command, *arguments]) == 0
         assert capsys.readouterr().out == f"Open the study: {tmp_path}/found/report.html\n"
+
+
+def test_warnings_come_before_anything_moves(fake_run, scenario, capsys):
+    """Those that are known beforehand once, before the metrics; others after them."""
+    fake_run.warns = ["the joints resonate too fast"]
+    fake_run.outcome.warnings = [*fake_run.warns, "the tool was far from its path"]
+    assert main(["run", str(scenario)]) == 0
+    out = capsys.readouterr().out
+    places = [out.index(words) for words in ("resonate", "simulating", "Metric", "was far from")]
+    assert places == sorted(places)
+    assert out.count("resonate") == 1
