@@ -20,6 +20,7 @@ from reporting.provenance import (
     STAGED,
     UNFINISHED,
     find_obstacle,
+    is_result,
     listed_results,
     manifest_text,
 )
@@ -77,6 +78,7 @@ class ResultsFolder:
         Returns:
             The file as it is called after the exchange; None if it could not be written anywhere.
         """
+        assert is_result(name), name
         if isinstance(content, str):
             content = content.encode("utf-8", "backslashreplace")  # names of files may be no text
         if name in _INPUTS:

@@ -87,9 +87,11 @@ FIGURES = "figures"
 RESULTS = (
     "scenario.yaml",
     "operator.csv",
+    "drawing.csv",
     "log.h5",
     "metrics.json",
     "recording.html",
+    "excitation.html",
     "report.html",
     "margins.json",
     "sweep.json",
@@ -120,6 +122,11 @@ def kind_of_results(folder: Path) -> str | None:
     """Return the kind of results that the manifest of a folder names; None without one."""
     manifest = _read_manifest(folder)
     return None if manifest is None else manifest[0]
+
+
+def is_result(name: str) -> bool:
+    """Return whether a file of a folder of results may have a name."""
+    return name in RESULTS or _FIGURE.fullmatch(name) is not None
 
 
 def read_outcome(folder: Path, kind: str) -> dict[str, Any]:
@@ -200,7 +207,7 @@ def _read_manifest(folder: Path) -> tuple[str, list[str]] | None:
         return None
     # a manifest is a file like any other: it cannot name what no result is called
     kind, names = manifest
-    return kind, [name for name in names if name in RESULTS or _FIGURE.fullmatch(name)]
+    return kind, [name for name in names if is_result(name)]
 
 
 def _names(folder: Path) -> list[str]:

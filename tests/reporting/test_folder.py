@@ -392,3 +392,12 @@ def test_how_it_ended_is_told_in_the_manifest(out):
         read_outcome(out, "sweep")
     with pytest.raises(InputError, match=r"holds no results"):
         read_outcome(out.parent, "run")
+
+
+def test_what_the_manifest_could_not_list_is_not_written(out):
+    with open_results(out, "run") as results:
+        for name in ("notes.txt", "figures/../x.png", MANIFEST):
+            with pytest.raises(AssertionError):
+                results.write(name, "x")
+        assert results.write("excitation.html", "x") == out / "excitation.html"
+    assert set(content(out)) == {MANIFEST, "excitation.html"}
