@@ -250,8 +250,8 @@ def safe_state(
     """
     effort = robot.gather("effort_limit") * parameters.effort_scale
     damping = parameters.brake_damping * np.where(np.isfinite(effort), effort, 0.0)
-    delay = np.inf if faults.brakes is None else faults.brakes.delay
-    return SafeState(damping, faults.hold_bandwidth, faults.effort_share, delay)
+    has_brakes = faults.brakes is not None
+    return SafeState(damping, faults.hold_bandwidth, faults.effort_share, has_brakes)
 
 
 def supervision(law: str, faults: FaultParameters, believed: Believed) -> SupervisionParameters:

@@ -119,7 +119,7 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
                 "faults.effort_share",
             )
         ),
-        Rule("faults.brakes.torque", False, "it is the plant's"),
+        *(Rule(f"faults.brakes.{key}", False, "it is the plant's") for key in ("torque", "delay")),
         Rule(
             "controller.max_beyond_end",
             bool(np.isfinite([c.ends for c in followed.manifold.coordinates]).any()),

@@ -58,8 +58,7 @@ class StationLoop:
     parameters: Mapping[str, float] | None = None
 
     def __init__(self, settings: Scenario, folder: Path, like: "StationLoop | None" = None) -> None:
-        # blocks as one are simulated three times as fast
-        settings = replace(settings, simulation=replace(settings.simulation, fused=True))
+        settings = _without_brakes(settings)
         built = None if like is None else like.station
         self.station: Station = build_station(settings, folder, like=built, with_slope=True)
         diagram, period = self.station.diagram, self.station.controller.period
@@ -95,7 +94,7 @@ class StationLoop:
         )
         if of_numbers or not (self.rest_is_physics and self.derivative.can_be_parametrized):
             return False
-        settings = replace(settings, simulation=replace(settings.simulation, fused=True))
+        settings = _without_brakes(settings)
         twin = build_station(settings, folder, like=self.station, with_slope=True, parametric=True)
         self.derivative.parametrize(twin.diagram)
         return True
@@ -251,6 +250,13 @@ class StationLoop:
         is_servo = "velocity_hold.held" in states
         # the newest of those that are on their way
         return states["velocity_hold.held" if is_servo else "hold.held"][-N:], is_servo
+
+
+def _without_brakes(settings: Scenario) -> Scenario:
+    """Return a scenario without brakes, which close after faults alone, its blocks fused."""
+    # blocks as one are simulated three times as fast
+    simulation = replace(settings.simulation, fused=True)
+    return replace(settings, simulation=simulation, faults=replace(settings.faults, brakes=None))
 
 
 def _only(diagram: Diagram, kind: type[Kind]) -> Kind | None:

@@ -12,10 +12,10 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_of, is_finite, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.stopping_step import (
+    UNHELD,
     Joints,
     StopMemory,
     inverse_dynamics,
-    requests_brakes,
     stopping_step,
 )
 from pfsc_drake.errors import InputError
@@ -27,6 +27,8 @@ _SHORTEST = 0.05
 _PEAK = 1.5
 # share of the torque limit that braking is granted however much gravity takes
 _LEAST_SHARE = 0.1
+# s, from the planned end of a stop until brakes are requested
+_SETTLING = 0.2
 
 
 class StopCategory(enum.IntEnum):
@@ -59,14 +61,13 @@ class SafeState:
         damping: Damping of every drive at least [Nm s/rad], shape (N,).
         bandwidth: ``omega`` of the position hold [rad/s].
         effort_share: Part of the drives' limits that braking is planned with, up to 1.
-        brake_delay: From the request of the robot's holding brakes until they hold [s]; infinite
-            for a robot without.
+        has_brakes: Whether the robot has holding brakes, which are requested after the stop.
     """
 
     damping: np.ndarray
     bandwidth: float = 60.0
     effort_share: float = 0.7
-    brake_delay: float = np.inf
+    has_brakes: bool = False
 
     def check(self, num_joints: int) -> None:
         """Refuse what is out of range.
@@ -85,10 +86,6 @@ class SafeState:
             )
         if not 0.0 < self.bandwidth < np.inf:
             raise InputError(f"safe state bandwidth: {self.bandwidth}; must be positive and finite")
-        if not self.brake_delay >= 0.0:
-            raise InputError(
-                f"safe state brake delay: {self.brake_delay}; must be zero or a positive number"
-            )
         if not 0.0 < self.effort_share <= 1.0:
             raise InputError(
                 f"safe state effort share: {self.effort_share}; must be above 0, at most 1"
@@ -121,8 +118,8 @@ class SafeStop(Block):
 
     ``stop_category`` is that of IEC 60204-1: 1 during a stop of a robot with brakes, 2 of one
     without, which the drives hold; 0 requests the brakes at once: 0.2 s after the planned end of
-    the stop where there are brakes, and in any case once nothing has held a joint for 50 ms. Until
-    the brakes hold, the drives go on; then ``tau_J`` is left of their torques.
+    the stop where there are brakes, and in any case once nothing has held a joint for 50 ms. The
+    drives go on, also while brakes hold.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -158,8 +155,8 @@ class SafeStop(Block):
         n, robot = robot.dimension, robot.numeric
         joints = Joints.of(robot, np.asarray(limits), settings.damping)
         self._start = starting_function(robot, joints, settings.effort_share, period)
-        self._step = stopping_step(robot, joints, settings.bandwidth, settings.brake_delay, period)
-        self._brake_delay = settings.brake_delay
+        self._step = stopping_step(robot, joints, settings.bandwidth, period)
+        self._has_brakes = settings.has_brakes
         self._sizes = StopMemory.sizes(n)
         self.inputs = {
             "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
@@ -201,9 +198,11 @@ class SafeStop(Block):
 
     def _category(self, fault: Any, stopping: Any, memory: StopMemory) -> Any:
         """Return the stop category, of the memory of a stop that has begun before."""
-        has_brakes = np.isfinite(self._brake_delay)
-        controlled = StopCategory.CONTROLLED if has_brakes else StopCategory.HOLD
-        brakes = all_of(stopping, requests_brakes(memory, self._brake_delay))
+        controlled = StopCategory.CONTROLLED if self._has_brakes else StopCategory.HOLD
+        due = memory.unheld >= UNHELD
+        if self._has_brakes:
+            due = ca.logic_or(due, memory.elapsed >= memory.duration + _SETTLING)
+        brakes = all_of(stopping, due)
         category = where(brakes, float(StopCategory.BRAKES), float(controlled))
         return where(fault, category, float(StopCategory.NONE))
 
@@ -250,7 +249,6 @@ def starting_function(
         position=q_M,
         rate=v_M,
         unheld=ca.SX(1, 1),
-        braked=ca.SX(1, 1),
         ignored=suspects,
         last=state,
     )

@@ -1,6 +1,5 @@
 """One tick of a robot that is being stopped and held, as a function."""
 
-import math
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -23,10 +22,6 @@ _DIFFERENTIATED = 0.5
 _FAR_SIDE = 0.5
 # s, the longest time for which a joint may be held by nothing until brakes are requested
 UNHELD = 0.05
-# s, from the planned end of a stop until brakes are requested
-_SETTLING = 0.2
-# s, beyond their delay, until brakes surely hold
-_BRAKES_HOLD = 0.05
 # damping ratio by which a motor that is not seen is thought to follow its link
 _FOLLOWING = 0.3
 
@@ -46,7 +41,6 @@ class StopMemory(NamedTuple):
         rate: Rate of their position, differentiated, shape (N,).
         unheld: For how long nothing has held some joint, of which nothing is measured [s],
             shape (1,).
-        braked: For how long brakes have been requested [s], shape (1,).
         ignored: What of the state is not to be believed, nonzero if so, shape (4N,).
         last: State of the last tick, shape (4N,).
     """
@@ -61,7 +55,6 @@ class StopMemory(NamedTuple):
     position: Any
     rate: Any
     unheld: Any
-    braked: Any
     ignored: Any
     last: Any
 
@@ -72,7 +65,7 @@ class StopMemory(NamedTuple):
         Args:
             num_joints: N.
         """
-        sizes = [1, 1, *[num_joints] * 7, 1, 1, 4 * num_joints, 4 * num_joints]
+        sizes = [1, 1, *[num_joints] * 7, 1, 4 * num_joints, 4 * num_joints]
         return dict(zip(cls._fields, sizes, strict=True))
 
 
@@ -115,7 +108,7 @@ class Joints(NamedTuple):
 
 @once_per_content()
 def stopping_step(
-    robot: RobotModel, joints: Joints, bandwidth: float, brake_delay: float, period: float
+    robot: RobotModel, joints: Joints, bandwidth: float, period: float
 ) -> ca.Function:
     """Return ``(elapsed, .., last, state, suspects) -> (drive, elapsed, .., last)``.
 
@@ -127,7 +120,6 @@ def stopping_step(
         robot: The robot as it is believed, N joints.
         joints: Constants of its joints.
         bandwidth: ``omega`` of the position hold [rad/s].
-        brake_delay: From the request of the brakes until they hold [s]; infinite without any.
         period: Sampling time [s].
     """
     n, sizes = robot.dimension, StopMemory.sizes(robot.dimension)
@@ -148,10 +140,7 @@ def stopping_step(
 
     q_M, v_M, share, braking = _motors(memory, now, good, far, joints)
     K_p, K_v = _gains(memory.inertia, joints, bandwidth, period)
-    # a motor that a brake holds would swing on the brake's stiffness
-    free = memory.braked < brake_delay + _BRAKES_HOLD
-    feedback = share * K_p * (reference - q_M) + braking * K_v * (rate_r - v_M)
-    wanted = forward + free * feedback
+    wanted = forward + share * K_p * (reference - q_M) + braking * K_v * (rate_r - v_M)
     drive = ca.fmin(ca.fmax(wanted, -joints.limits), joints.limits)
 
     # of the link's position, with the spring's deflection as it is planned
@@ -172,7 +161,6 @@ def stopping_step(
         position=position,
         rate=rate,
         unheld=ca.if_else(is_held, 0.0, memory.unheld + period),
-        braked=ca.if_else(requests_brakes(memory, brake_delay), memory.braked + period, 0.0),
         ignored=ca.fmax(memory.ignored, suspects),
         last=state,
     )
@@ -183,19 +171,6 @@ def stopping_step(
         [*sizes, "state", "suspects"],
         ["drive", *(f"next_{name}" for name in sizes)],
     )
-
-
-def requests_brakes(memory: StopMemory, brake_delay: float) -> Any:
-    """Return whether brakes are requested: after a stop, or once nothing holds a joint.
-
-    Args:
-        memory: Memory of the stop.
-        brake_delay: From the request of the brakes until they hold [s]; infinite without any.
-    """
-    unheld = memory.unheld >= UNHELD
-    if brake_delay == math.inf:
-        return unheld
-    return ca.logic_or(unheld, memory.elapsed >= memory.duration + _SETTLING)
 
 
 def inverse_dynamics(robot: RobotModel, q: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:

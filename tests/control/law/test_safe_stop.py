@@ -249,10 +249,10 @@ def test_a_motor_whose_position_is_lost_does_not_drift(robot):
     assert drift < 1e-3
 
 
-def categories(robot, brake_delay, lost_from, lost_until, ticks=800):
-    """Return stop categories and torques of a robot at rest; of joint 2 nothing is measured."""
+def categories(robot, has_brakes, lost_from, lost_until, ticks=400):
+    """Return stop categories of a robot at rest, of whose joint 2 nothing is measured."""
     block = SafeStop(
-        robot.chain, robot.limits, SafeState(np.zeros(N), brake_delay=brake_delay), PERIOD
+        robot.chain, robot.limits, SafeState(np.zeros(N), has_brakes=has_brakes), PERIOD
     )
     stepper, measured = Stepper(block), robot.rows @ robot.state(POSTURE, np.zeros(N))
     found = [stepper.step(joint_state=measured, fault=0.0, suspects=NOTHING)]
@@ -260,42 +260,35 @@ def categories(robot, brake_delay, lost_from, lost_until, ticks=800):
         told = measured.copy()
         if lost_from <= k < lost_until:
             told[[1, N + 1, 2 * N + 1, 3 * N + 1]] = np.nan
-        # off the place where the robot is held, so that the feedback shows
-        told[[2 * N, 0]] += 0.01 * (k > 0)
         found.append(stepper.step(joint_state=told, fault=3.0, suspects=NOTHING))
-    return [np.array([row[name].ravel() for row in found]) for name in ("stop_category", "torque")]
+    return np.array([row["stop_category"] for row in found])
 
 
-@pytest.mark.parametrize("brake_delay", [np.inf, 0.1])
-def test_brakes_are_requested_where_nothing_holds_a_joint(robot, brake_delay):
+@pytest.mark.parametrize("has_brakes", [False, True])
+def test_brakes_are_requested_where_nothing_holds_a_joint(robot, has_brakes):
     """After 50 ms, and for good; what comes back before is held again."""
-    controlled = StopCategory.HOLD if brake_delay == np.inf else StopCategory.CONTROLLED
-    found, _ = categories(robot, brake_delay, 20, 1000, ticks=120)
+    controlled = StopCategory.CONTROLLED if has_brakes else StopCategory.HOLD
+    found = categories(robot, has_brakes, 20, 1000, ticks=120)
     # the count begins with the sample at which the joint is lost first
     expected = [StopCategory.NONE, *[controlled] * 70, *[StopCategory.BRAKES] * 50]
     assert found[:, 0].tolist() == expected
-    found, _ = categories(robot, brake_delay, 20, 69, ticks=120)
+    found = categories(robot, has_brakes, 20, 69, ticks=120)
     assert set(found[1:, 0]) == {controlled}
-    found, _ = categories(robot, brake_delay, 20, 75, ticks=120)
+    found = categories(robot, has_brakes, 20, 75, ticks=120)
     assert found[-1] == StopCategory.BRAKES
 
 
-def test_brakes_follow_a_controlled_stop_and_then_drives_only_carry_the_weight(robot):
-    """From rest a stop takes 50 ms; brakes come 0.2 s later and hold 0.15 s after that."""
-    found, torques = categories(robot, 0.1, 0, 0)
+def test_brakes_follow_a_controlled_stop(robot):
+    """From rest a stop takes 50 ms; brakes come 0.2 s later."""
+    found = categories(robot, True, 0, 0)
     assert found[0] == StopCategory.NONE
     assert np.flatnonzero(found[:, 0] == StopCategory.CONTROLLED)[[0, -1]].tolist() == [1, 250]
     assert set(found[251:, 0]) == {StopCategory.BRAKES}
-    weight = robot.weight(POSTURE)
-    with_feedback = np.abs(torques[10:395] - weight).max(axis=1)
-    assert with_feedback.min() > 1.0
-    np.testing.assert_allclose(torques[405:], np.tile(weight, (396, 1)), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (SafeState(np.zeros(N), brake_delay=-0.1), "brake delay: -0.1"),
         (SafeState(np.zeros(N), bandwidth=0.0), "bandwidth: 0.0"),
         (SafeState(np.zeros(N), effort_share=1.5), "effort share: 1.5"),
         (SafeState(np.full(N, np.nan)), "damping.*3 finite"),

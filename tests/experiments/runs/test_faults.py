@@ -207,6 +207,7 @@ def test_a_tool_that_is_turned_away(fault):
         f"path.shape.file={TAUGHT}",
         "targets={}",
         "compliance={}",
+        "controller.max_beyond_end=0.5",
         "encoders={}",
         "friction={}",
         "controller.friction={}",
