@@ -137,7 +137,8 @@ def test_metrics_follow_from_the_log(three_axes):
 def test_the_resolved_scenario_gives_the_same_run(run_scenario, three_axes, tmp_path):
     first = three_axes("start.offset=[0.005, -0.002]", "reference.dwell=0.02", duration="0.1")
     again = run_scenario(tmp_path / "again", first.folder / "scenario.yaml")
-    assert again.status == 0
+    # while the tool comes to its path it is farther away than the target allows later
+    assert again.status == first.status == 3
     assert set(again.log) == set(first.log)
     for name in first.log:
         np.testing.assert_array_equal(again[name], first[name], err_msg=name)
