@@ -84,7 +84,7 @@ def test_a_surface_has_no_second_coordinate_to_swing(tmp_path, capsys):
 def test_the_hand_leads_the_tool_along_an_edge(tmp_path):
     """True place of the tool against the equations of paraboloid and cylinder."""
     places = "{time: 0.3, position: [0, 0, 0]}, {time: 1.2, position: [0.15, 0.05, 0]}"
-    log = run(tmp_path, "vf_edge", 1.4, f"hand.waypoints=[{places}]")
+    log = run(tmp_path, "vf_edge", 1.4, f"hand.waypoints=[{places}]", "targets={}")
     y_t = log["y_t"][300:]
     x, axis = y_t - [0.85, 0.0, 0.75], np.array([0.3, 0.1, 1.0]) / np.sqrt(1.1)
     slope = 8.0 * np.linalg.norm(x[:, :2], axis=1)
