@@ -92,6 +92,7 @@ def test_a_torque_about_the_vertical_turns_the_tool_past_half_a_turn(scara):
     run = scara(
         compliance,
         torque,
+        "targets={}",
         "controller.external_torque.source=measured",
         "reference={points: [0.0, 0.01], velocity: 0.01, acceleration: 1.0}",
         "start={posture_deg: [-20, 60, 0, -40]}",
