@@ -40,6 +40,8 @@ from pfsc_drake.yaml.typed import spread
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
 _BRISTLES_PER_STEP = 0.5
+# s; shorter steps change nothing about the bristles
+_SHORTEST_STEP = 1e-3
 # share of that frequency of brakes, whose dampers act beside those of friction
 _OF_BRAKES = 0.3
 # of the links' inertia in the middle, what brakes of drives without a rotor count on
@@ -228,7 +230,9 @@ def add_friction(
     if torque is not None:
         assert options.brakes is not None
         holding = replace(drives, inertia=_behind_brakes(part))
-        bristles = _bristles_now(options, torque, np.zeros(n), holding, _OF_BRAKES)
+        bristles = _bristles_of_step(
+            _step(options, drives), torque, np.zeros(n), holding, _OF_BRAKES
+        )
         sizes = [port.size() for port in stops]
         brakes = builder.AddNamedSystem(
             "holding_brakes",
@@ -320,27 +324,56 @@ def _bristles(
             f"simulation.integrator = {simulation.integrator} with friction; allowed: "
             f"{', '.join(allowed)}, or error control"
         )
-    drift = options.friction.drift
+    drift, given = options.friction.drift, options.friction.presliding
     stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
-    now = _bristles_now(options, stiffest, f_v, drives, 1.0)
-    return replace(now, coulomb=f_c)
+    if given:
+        presliding = _per_joint("friction.presliding", given, f_c.size)
+        return _of_presliding(options, f_c, f_v, drives, presliding)
+    longer = max(_step(options, drives), _SHORTEST_STEP)
+    return replace(_bristles_of_step(longer, stiffest, f_v, drives, 1.0), coulomb=f_c)
 
 
-def _bristles_now(
+def _of_presliding(
     options: FrictionOptions,
     f_c: np.ndarray,
     f_v: np.ndarray,
     drives: Drives,
-    share: float,
+    presliding: np.ndarray,
 ) -> BristleFriction:
-    """Return friction with bristles of a share of the frequency that the step allows."""
-    if drives.step is not None:
-        return bristles_for_step(
-            f_c, f_v, drives.inertia, drives.step, frequency=share * _BRISTLES_PER_STEP
+    """Return friction of given presliding displacements, critically damped while stuck.
+
+    Raises:
+        InputError: If fixed steps are too long for it.
+    """
+    step, drift = _step(options, drives), options.friction.drift
+    stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
+    least = _bristles_of_step(step, stiffest, f_v, drives, 1.0).presliding
+    ratio = presliding / least
+    i = int(np.argmin(ratio))
+    if ratio[i] < 1.0 - 1e-9 and (options.simulation.accuracy == 0.0 or drives.step is not None):
+        raise InputError(
+            f"friction.presliding = {presliding[i]:.3g} of joint {i + 1}: steps of {step:g} s "
+            f"integrate {least[i]:.2e} and more; write simulation.max_step = "
+            f"{0.99 * step * np.sqrt(ratio[i]):.1e}, or simulation.accuracy"
         )
-    # stiff enough for the step of the integration, or of the hold if that is shorter
-    step = min(options.simulation.max_step, options.period)
+    sliding = f_c > 0.0
+    frequency = np.sqrt(np.where(sliding, f_c, 1.0) / (presliding * drives.inertia))
+    relaxation = np.where(sliding, 2.0 / frequency, 2.0 * step)
+    return BristleFriction(f_c, f_v, presliding, relaxation)
+
+
+def _bristles_of_step(
+    step: float, f_c: np.ndarray, f_v: np.ndarray, drives: Drives, share: float
+) -> BristleFriction:
+    """Return friction with bristles of a share of the frequency that a step allows."""
+    # a plant with steps of its own reads the force once per step
+    share = share if drives.step is None else share * _BRISTLES_PER_STEP
     return bristles_for_step(f_c, f_v, drives.inertia, step, frequency=share)
+
+
+def _step(options: FrictionOptions, drives: Drives) -> float:
+    """Return the step that integrates friction [s]: that of the hold if that is shorter."""
+    return drives.step or min(options.simulation.max_step, options.period)
 
 
 def _coefficients(
@@ -367,8 +400,13 @@ def _given_coefficients(
         return known.coulomb[:n], known.viscous[:n]
     values = []
     for key in ("f_c", "f_v"):
-        given = spread(getattr(parameters, key), n) or [0.0] * n
-        if len(given) != n:
-            raise InputError(f"{block}.{key}: {len(given)} values; the robot has {n} joints")
-        values.append(np.array(given, dtype=float))
+        values.append(_per_joint(f"{block}.{key}", getattr(parameters, key) or [0.0], n))
     return values[0], values[1]
+
+
+def _per_joint(key: str, given: list[float], n: int) -> np.ndarray:
+    """Return one number for each joint, shape (N,)."""
+    values = spread(given, n)
+    if len(values) != n:
+        raise InputError(f"{key}: {len(values)} values; the robot has {n} joints")
+    return np.array(values, dtype=float)

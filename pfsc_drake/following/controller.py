@@ -8,7 +8,7 @@ from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.reference import SmoothStart
 from pfsc_drake.following.compliance import add_compliance, has_impedance, reference_order
 from pfsc_drake.following.followed import Wanted
-from pfsc_drake.following.friction import add_friction_compensation
+from pfsc_drake.following.friction import add_friction_compensation, rest_hold
 from pfsc_drake.following.law import Believed, supervision
 from pfsc_drake.following.observed_forces import add_external_torque, add_observed_forces
 from pfsc_drake.following.options.compliance import ComplianceParameters, ObservedForceParameters
@@ -138,7 +138,9 @@ def add_controller(
     watched = supervision(options.law, faults, believed)
     controller = builder.AddNamedSystem(
         "following_controller",
-        FollowingController(law, options.sampling_time, watched, carries=carries),
+        FollowingController(
+            law, options.sampling_time, watched, carries=carries, hold=rest_hold(law, options)
+        ),
     )
     robot, signals = believed.robot, dict(ports)
     signals |= add_external_torque(builder, robot, options, controller, signals)

@@ -13,6 +13,8 @@ from pfsc_drake.control.estimation.momentum import (
     MomentumObserver,
     drive_momentum,
 )
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.rest_hold import RestHold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import Believed, Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
@@ -20,8 +22,30 @@ from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
 
+# rad or m, rad or m, s; see RestHold
+_SHAKING, _WINDOW, _SETTLING = 1e-3, 2e-4, 0.03
+# m or rad; up to which error a law with an integral part leaves the rest to friction
+_LARGEST_ERROR = 2e-3
 # by which part of itself a coefficient is thought to change from sample to sample
 _DRIFT = 1e-3
+
+
+def rest_hold(law: FollowingLaw, options: ControllerParameters) -> RestHold | None:
+    """Return what holds the torques of drives that stick, if friction is compensated.
+
+    A manifold that moves with time does not tell whether it rests: there the law goes on.
+
+    Args:
+        law: The law.
+        options: What is chosen of the controller.
+    """
+    friction, linearization = options.friction, law.linearization
+    if friction.source == "none" or not friction.hold_at_rest:
+        return None
+    if linearization.relative_degree == 1 or linearization.manifold.follows_time:
+        return None
+    largest = _LARGEST_ERROR if law.stabilization.has_integral_part else np.inf
+    return RestHold(_SHAKING, _WINDOW, max(1, round(_SETTLING / options.sampling_time)), largest)
 
 
 def add_friction_compensation(

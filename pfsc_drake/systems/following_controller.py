@@ -10,6 +10,7 @@ from pfsc_drake.control.law.exact_linearization import ExactLinearization
 from pfsc_drake.control.law.fault import Fault, FaultLatch, FaultSwitch
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.joint_jet import JointJet
+from pfsc_drake.control.law.rest_hold import RestHold
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.sampled_law import LawReport, SampledLaw
 from pfsc_drake.control.law.supervision import DriveWatch, Supervision, SupervisionParameters
@@ -87,6 +88,7 @@ class FollowingController(Diagram):
         supervision: What is watched of joints and drives; nothing if omitted.
         carries: Whether the robot carries something that moves with it, for which its motion is
             told.
+        hold: Holds the torques of drives that stick; they follow the law if omitted.
 
     Attributes:
         period: Sampling time [s].
@@ -102,6 +104,7 @@ class FollowingController(Diagram):
         supervision: SupervisionParameters | None = None,
         *,
         carries: bool = False,
+        hold: RestHold | None = None,
     ) -> None:
         super().__init__()
         self.period, self.layout = period, law.layout
@@ -118,7 +121,7 @@ class FollowingController(Diagram):
                 builder.Connect(source, port)
 
         linear = add("linearization", ExactLinearization(law.linearization))
-        sampled = add("law", SampledLaw(law, period))
+        sampled = add("law", SampledLaw(law, period, hold))
         connect(linear.GetOutputPort("relation"), sampled.GetInputPort("relation"))
         drive = add("drive", Rows(law.layout.size, range(law.layout.drive.stop)))
         connect(sampled.GetOutputPort("evaluation"), drive.GetInputPort("whole"))

@@ -9,6 +9,7 @@ from pfsc_drake.blocks.cases import where
 from pfsc_drake.control.law.exact_linearization import Relation
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw, LawLayout
+from pfsc_drake.control.law.rest_hold import RestHold
 
 
 class SampledLaw(Block):
@@ -17,8 +18,8 @@ class SampledLaw(Block):
     With the virtual output ``yhat`` and relative degree r the closed loop is
     ``e^(r) + a_r e^(r-1) + ... + a_1 e + a_0 int e = 0``, ``e = yhat - yhat_p``.
 
-    The integral is held while a drive is at its limit. After a fault nothing is remembered any
-    more.
+    The integral is held while a drive is at its limit or torques are held. After a fault nothing
+    is remembered any more.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -45,15 +46,17 @@ class SampledLaw(Block):
     State:
         ``integral`` of the error, shape (m,); ``held``, the part of the drive input that is
         extrapolated over the hold, shape (N,), and whether it is ``known``; virtual ``output`` of
-        the last tick, shape (m,); ``reference_velocity``, if the law tells it.
+        the last tick, shape (m,); ``reference_velocity``, if the law tells it; those of
+        :class:`RestHold`, with a hold.
 
     Args:
         law: The law.
         period: Sampling time [s].
+        hold: Holds the torques of drives that stick; they follow the law if omitted.
     """
 
-    def __init__(self, law: FollowingLaw, period: float) -> None:
-        self._law, self._period = law, period
+    def __init__(self, law: FollowingLaw, period: float, hold: RestHold | None = None) -> None:
+        self._law, self._period, self._hold = law, period, hold
         linearization, layout = law.linearization, law.layout
         n, m = linearization.num_joints, linearization.num_outputs
         r = linearization.relative_degree
@@ -77,6 +80,9 @@ class SampledLaw(Block):
             "input_fault": Port(1),
         }
         self.states = {"integral": m, "held": n, "known": 1, "output": m}
+        if hold is not None:
+            self.states |= hold.states(n)
+            self.inner = {"holds": 1} | {f"next_{k}": size for k, size in hold.states(n).items()}
         self._tells_velocity = layout.reference_velocity.stop > layout.reference_velocity.start
         if self._tells_velocity:
             self.outputs["reference_velocity"] = Port(n, "rad/s or m/s")
@@ -110,6 +116,15 @@ class SampledLaw(Block):
         }
         if self._tells_velocity:
             outputs["reference_velocity"] = x.reference_velocity
+        if self._hold is not None:
+            m, n = x.output.shape[0], x.held.shape[0]
+            error = result[layout.manifold_state][:m] - u.reference[:m]
+            q_M, drive = u.joint_state[2 * n : 3 * n], result[layout.drive]
+            friction = getattr(u, "friction_torque", None)
+            friction = ca.DM.zeros(n) if friction is None else friction
+            holds, drive, kept = self._hold.step(x, q_M, u.reference[m:], error, drive, friction)
+            outputs["evaluation"] = ca.vertcat(drive, result[layout.drive.stop :])
+            outputs |= {"holds": holds} | {f"next_{name}": value for name, value in kept.items()}
         return outputs
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
@@ -126,7 +141,10 @@ class SampledLaw(Block):
             "output": output,
         }
         if law.stabilization.has_integral_part:
-            later["integral"] = x.integral + where(saturated, 0.0, self._period * error)
+            waits = saturated if self._hold is None else ca.logic_or(saturated, y.holds)
+            later["integral"] = x.integral + where(waits, 0.0, self._period * error)
+        if self._hold is not None:
+            later |= {name: getattr(y, f"next_{name}") for name in self._hold.states(1)}
         if self._tells_velocity:
             later["reference_velocity"] = y.evaluation[layout.reference_velocity]
         return {name: where(u.stopping, getattr(x, name), new) for name, new in later.items()}

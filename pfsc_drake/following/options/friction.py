@@ -14,6 +14,7 @@ _OBSERVERS = ("disturbance", "kalman")
 _VELOCITIES = ("measured", "reference")
 
 
+_PRESLIDING = 1e-7, 0.1  # rad or m
 _LARGEST = 1e9  # of friction; what it multiplies stays within a float
 
 
@@ -27,14 +28,22 @@ class JointFrictionParameters:
         file: Instead, name of a shipped robot or YAML file with robot parameters, whose
             friction of the first joints is taken.
         drift: How it changes during the run; null for not at all.
+        presliding: Displacement at which a stuck drive begins to slide, of every joint or one
+            number for all [rad or m]; empty for the least that steps of 1 ms can integrate.
+            Gears have 1 to 1000 urad.
     """
 
     f_c: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     f_v: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     file: str = dc.field(default="", metadata=NAME_OR_FILE)
     drift: FrictionDrift | None = None
+    presliding: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
 
     def __post_init__(self) -> None:
+        low, high = _PRESLIDING
+        valid = all(low <= value <= high for value in self.presliding)
+        allowed = f"numbers between {low:g} and {high:g} (rad or m)"
+        require(valid, "presliding", self.presliding, allowed)
         for key in ("f_c", "f_v"):
             values = getattr(self, key)
             valid = all(0.0 <= value <= _LARGEST for value in values)
@@ -110,6 +119,8 @@ class FrictionCompensationParameters:
         kalman: The friction Kalman filter.
         watched: Whether the observer runs beside ``none`` or ``model``, only to be logged.
         believed: Coefficients that are believed.
+        hold_at_rest: Whether drives that stick get constant torques while the reference rests, see
+            :class:`RestHold`; with ``none`` they do not.
     """
 
     source: str = "none"
@@ -120,6 +131,7 @@ class FrictionCompensationParameters:
     kalman: KalmanParameters = dc.field(default_factory=KalmanParameters)
     watched: bool = False
     believed: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
+    hold_at_rest: bool = True
 
     def __post_init__(self) -> None:
         require_one_of("source", self.source, _SOURCES)
@@ -132,6 +144,8 @@ class FrictionCompensationParameters:
         require(told, "velocity", self.velocity, allowed)
         drift = self.believed.drift
         require(drift is None, "believed.drift", drift, "null; what is believed does not drift")
+        bristles = self.believed.presliding
+        require(not bristles, "believed.presliding", bristles, "empty; it is not compensated")
 
     @property
     def is_given(self) -> bool:
