@@ -1,6 +1,6 @@
 """Surfaces of a scenario: from shapes and from files."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any, Literal, cast
 
@@ -27,13 +27,14 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import interpolate
+from pfsc_drake.geometry.files.unit import Unit
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION
 from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, surface_of_revolution
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
-from pfsc_drake.geometry.surfaces.point_file import Unit, read_profile, read_surface_points
+from pfsc_drake.geometry.surfaces.point_file import read_profile, read_surface_file
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered
 from pfsc_drake.geometry.surfaces.shapes import (
     Pair,
@@ -56,10 +57,12 @@ class MadeSurface:
     Attributes:
         surface: The surface.
         fit: Where the points stand, or None.
+        notes: Sentences on what of a file was ignored.
     """
 
     surface: Surface
     fit: Residuals | None = None
+    notes: tuple[str, ...] = ()
 
 
 def make_surface(
@@ -223,10 +226,11 @@ def surface_from_file(
     if isinstance(shape, Fitted):
         file = _file_of(shape, folder)
         tell(0.0, f"reading {file.name}")
-        points = read_surface_points(file, cast(Unit, shape.unit))
+        points, notes = read_surface_file(file, cast(Unit, shape.unit))
         placed = points @ shape.rotation.T + shape.origin
         tell(0.0, f"fitting a surface to {len(points)} points")
-        return _near_grid(shape, placed, made) if shape.grid else _scattered(shape, placed, made)
+        fitted = _near_grid if shape.grid else _scattered
+        return replace(fitted(shape, placed, made), notes=notes)
     rotation = shape.rotation
     profile = profile_from_file(shape, smoothness, folder)
     if isinstance(shape, Revolved):

@@ -40,7 +40,7 @@ def path_warnings(path: Path, shape: ShapeReport, keys: str = "path.shape.") -> 
         shape: Its numbers, see :func:`shape_report`.
         keys: What stands before the names of options that would help.
     """
-    found = [_fast_turn(path, shape)]
+    found = [*path.notes, _fast_turn(path, shape)]
     if path.waypoints is not None:
         found += [
             far_waypoints(path.waypoints.positions),
@@ -137,7 +137,7 @@ def far_waypoints(positions: np.ndarray) -> str | None:
     farthest = float(np.abs(positions).max())
     if farthest <= _LARGE:
         return None
-    return f"waypoints lie up to {farthest:.4g} m from the origin; their unit is m, not mm"
+    return f"waypoints lie up to {farthest:.4g} m from the origin; if they are in mm write unit: mm"
 
 
 def _nearly_closed(path: Path, waypoints: PathWaypoints, keys: str) -> str | None:

@@ -114,7 +114,7 @@ def test_parametrizations() -> None:
 def test_errors() -> None:
     x = np.arange(9.0)
     points = np.stack([x, x**2], axis=1)
-    with pytest.raises(InputError, match=r"rows 3 and 4 \(from 0\) coincide"):
+    with pytest.raises(InputError, match=r"4 and 5 coincide"):
         interpolate(points[[0, 1, 2, 3, 3, 4, 5]], smoothness=2)
     with pytest.raises(InputError, match="6 distinct for an open curve of class C\\^5; at least 7"):
         interpolate(points[:6], smoothness=5)
@@ -124,7 +124,7 @@ def test_errors() -> None:
         interpolate(points[[0, 1, 0]], smoothness=2, closed=True)
     broken = points.copy()
     broken[4, 1] = math.nan
-    with pytest.raises(InputError, match="row 4"):
+    with pytest.raises(InputError, match="waypoint 5: "):
         interpolate(broken, smoothness=2)
     with pytest.raises(InputError, match="smoothness: 7"):
         interpolate(points, smoothness=7)

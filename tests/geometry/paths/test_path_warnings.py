@@ -86,7 +86,7 @@ def test_ends_that_meet():
 def test_millimetres():
     (sentence,) = warnings(1e3 * WAVE, smoothness=3)
     assert "299.9" not in sentence
-    assert "up to 300 m from the origin; their unit is m, not mm" in sentence
+    assert "up to 300 m from the origin; if they are in mm write unit: mm" in sentence
 
 
 def test_orientation_that_turns_faster_than_was_asked_for():
