@@ -9,6 +9,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.smoothing import noise_level
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 from pfsc_drake.geometry.paths.shape_report import ShapeReport
+from pfsc_drake.geometry.paths.smoothing import allows_tolerance
 from pfsc_drake.geometry.rotation import euler_margin
 
 # m: robots' paths are shorter, and distances below count for nothing
@@ -173,12 +174,15 @@ def _noise(path: Path, shape: ShapeReport, keys: str) -> str | None:
     if np.linalg.norm(turns, axis=1).max() > _CORNER and similar > _TO_AND_FRO:
         return None
     noise = _TIMES_NOISE * noise_level(waypoints.parameters, waypoints.positions, across=True)
-    return (
+    tolerance = _round_up(noise)
+    said = (
         f"the path bends to and fro from waypoint to waypoint, with a radius of down to "
         f"{_length(shape.smallest_radius)} at eta = {shape.smallest_radius_at:.4g} m, as paths "
-        f"through noisy points do: write {keys}tolerance (m), perhaps "
-        f"{_round_up(noise):g}"
+        f"through noisy points do: "
     )
+    if allows_tolerance(waypoints.positions, tolerance, path.closed):
+        return f"{said}write {keys}tolerance (m), perhaps {tolerance:g}"
+    return f"{said}the way is too short for their scatter: add waypoints, or measure them anew"
 
 
 def _swing(shape: ShapeReport, keys: str) -> str | None:

@@ -130,7 +130,7 @@ def test_errors() -> None:
         interpolate(points, smoothness=7)
     with pytest.raises(InputError, match="'arc'; 'chord' or 'centripetal'"):
         interpolate(points, smoothness=2, parametrization="arc")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="parameters 1 and 2: 2 and 1"):
+    with pytest.raises(InputError, match="parameters 2 and 3: 2 and 1"):
         interpolate(points, smoothness=2, parameters=[0, 2, 1, 3, 4, 5, 6, 7, 8])
     with pytest.raises(InputError, match=r"parameters: shape \(3,\)"):
         interpolate(points, smoothness=2, parameters=[0, 1, 2])

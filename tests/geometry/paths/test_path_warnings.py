@@ -127,3 +127,15 @@ def test_a_path_that_turns_back_on_itself():
     assert turning_back(points[:2]) is None
     assert turning_back(points + 0.01 * np.diag([0, 0, 0, 1])[:, [0, 3, 1]]) is None
     assert turning_back(WAVE) is None
+
+
+def test_a_tolerance_that_would_be_refused_is_not_advised():
+    """Scatter as large as the path: five times the noise is more than the whole way."""
+    advised = 0
+    for seed in range(8):
+        points = 0.05 * np.random.default_rng(seed).normal(size=(24, 3))
+        points[:, 0] += np.linspace(0.0, 0.3, 24)
+        for sentence in warnings(points, smoothness=3):
+            assert "write path.shape.tolerance" not in sentence
+            advised += "too short for their scatter" in sentence
+    assert advised > 0
