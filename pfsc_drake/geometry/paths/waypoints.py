@@ -225,6 +225,8 @@ def _angles(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.nd
     return np.deg2rad(values) if degrees else values
 
 
+# Of a length.
+_ROUNDING = 1e-9
 # Splines through more waypoints would take minutes and gigabytes.
 MAX_INTERPOLATED = 50_000
 
@@ -372,6 +374,20 @@ def _rounded_path(table: WaypointTable, smoothness: int, closed: bool, distance:
             q = np.vstack([q, q[:1]])
         q = check_neighbours(q)
         orientation = OrientationCurve(rounded(q, closed))
-    return Path(
-        position, orientation, waypoints=PathWaypoints(points, theta, "rounded"), notes=table.notes
+    waypoints = PathWaypoints(points, theta, "rounded")
+    notes = (*table.notes, *_cut_corners(chords, distance))
+    return Path(position, orientation, waypoints=waypoints, notes=notes)
+
+
+def _cut_corners(chords: np.ndarray, distance: float) -> tuple[str, ...]:
+    """Say where lines are too short for the distance that was asked for."""
+    short = np.flatnonzero(chords < 2.0 * distance * (1.0 - _ROUNDING))
+    if len(chords) < 2 or not short.size:
+        return ()
+    worst = int(np.argmin(chords))
+    numbers = f"{worst + 1} and {(worst + 1) % len(chords) + 1}"
+    return (
+        f"path.shape.corner_distance = {distance:g} m is more than half of {short.size} of"
+        f" {len(chords)} lines, of which the shortest, between waypoints {numbers}, has"
+        f" {chords[worst]:.4g} m: corners there are rounded from half the line on",
     )

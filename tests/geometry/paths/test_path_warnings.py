@@ -139,3 +139,15 @@ def test_a_tolerance_that_would_be_refused_is_not_advised():
             assert "write path.shape.tolerance" not in sentence
             advised += "too short for their scatter" in sentence
     assert advised > 0
+
+
+def test_lines_too_short_for_the_corner_distance():
+    """Of a rectangle of 30 by 100 mm, whose corners are rounded by 15 mm at most."""
+    points = [[0, 0, 0], [0.1, 0, 0], [0.1, 0.03, 0], [0, 0.03, 0]]
+    options = {"smoothness": 3, "closed": True}
+    (sentence,) = warnings(points, corner_distance=0.02, **options)
+    assert "corner_distance = 0.02 m is more than half of 2 of 4 lines" in sentence
+    assert "between waypoints 2 and 3, has 0.03 m" in sentence
+    (sentence,) = warnings(points, corner_distance=0.06, **options)
+    assert "4 of 4 lines" in sentence
+    assert warnings(points, corner_distance=0.015, **options) == []
