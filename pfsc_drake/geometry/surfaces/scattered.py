@@ -1,6 +1,7 @@
 """Surfaces fitted to scattered points, as people scan workpieces."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,7 +139,9 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     slopes = _slopes(surface_of(spline.fit(exponent)), theta, base.normals(cloud))
     spline.weigh(slopes**2)
     exponent, noise = spline.best_predicting(exponent)
-    uncertainty = _uncertainty(spline, exponent, noise, near, options.tolerance)
+    uncertainty = _uncertainty(
+        spline, exponent, noise, near, options.tolerance, lambda: surface_of(spline.fit(exponent))
+    )
     if options.tolerance is None:
         coefficients = spline.fit(exponent)
     else:
@@ -260,6 +263,7 @@ def _uncertainty(
     noise: float,
     near: Neighbourhoods,
     tolerance: float | None,
+    estimate: Callable[[], ProductSurface],
 ) -> float:
     """Largest standard error of heights; refuses what the points leave open."""
     sides = [np.linspace(knots.begin, knots.end, _ERROR_SAMPLES) for knots in spline.knots]
@@ -268,10 +272,14 @@ def _uncertainty(
     worst = int(np.argmax(errors))
     allowed = max(_NOISES * noise, _ERROR_SPACINGS * near.spacing, tolerance or 0.0)
     if errors[worst] > allowed:
+        x, y, z = estimate().partials(theta[[worst]], 0)[0, 0]
         raise InputError(
-            f"surface points: leave the surface open by {errors[worst]:.2g} m (standard error) at"
-            f" theta = [{theta[worst, 0]:.4g}, {theta[worst, 1]:.4g}] m, at the edge or in a hole;"
-            f" {allowed:.2g} m would do: scan the place, or trim the patch with a smaller"
+            "surface points: do not determine the surface near"
+            f" [{x:.4g}, {y:.4g}, {z:.4g}] m, at its edge or in a hole: its standard error there is"
+            f" {errors[worst]:.2g} m, where {allowed:.2g} m are allowed. Points scatter by"
+            f" {noise:.2g} m about the smooth surface that predicts them best: if that is more than"
+            " the scanner's noise, the workpiece has a step or an edge, which no smooth surface"
+            " follows: fit a part of it; else scan the place, or trim the patch with a smaller"
             " largest_hole"
         )
     return float(errors[worst])
