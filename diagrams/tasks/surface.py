@@ -203,6 +203,8 @@ def _pair(values: object) -> Pair:
     return float(first), float(last)
 
 
+# times the distance of points, from which on a place without any is a hole
+_HOLE = 2.0
 # how many times further apart neighbours are where a row ends unseen
 _JUMP = 3.0
 
@@ -230,7 +232,8 @@ def surface_from_file(
         placed = points @ shape.rotation.T + shape.origin
         tell(0.0, f"fitting a surface to {len(points)} points")
         fitted = _near_grid if shape.grid else _scattered
-        return replace(fitted(shape, placed, made), notes=notes)
+        found = fitted(shape, placed, made)
+        return replace(found, notes=(*notes, *found.notes))
     rotation = shape.rotation
     profile = profile_from_file(shape, smoothness, folder)
     if isinstance(shape, Revolved):
@@ -334,4 +337,12 @@ def _scattered(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurfac
         trim=shape.trim,
     )
     fit = fit_scattered(points, options)
-    return MadeSurface(fit.surface, fit.residuals)
+    notes = ()
+    if fit.hole > _HOLE * fit.spacing:
+        place = ", ".join(f"{value:.4g}" for value in fit.hole_at)
+        notes = (
+            f"{shape.file}: no point within {1e3 * fit.hole:.3g} mm of [{place}] m, others are "
+            f"{1e3 * fit.spacing:.3g} mm apart: the surface bridges that hole; largest_hole (m) "
+            "refuses it",
+        )
+    return MadeSurface(fit.surface, fit.residuals, notes)

@@ -84,6 +84,7 @@ class SurfaceFit:
         base: What the points were projected on, for people.
         spacing: Distance at which points stand, m.
         hole: Largest distance of a place on the surface from the nearest point, m.
+        hole_at: That place, [3], m.
         noise: Standard deviation of the points' noise along the normal as estimated from the
             residuals and the number of parameters that the fit has used up, m.
         uncertainty: Largest standard error of the surface along the base's normal that such
@@ -96,6 +97,7 @@ class SurfaceFit:
     base: str
     spacing: float
     hole: float
+    hole_at: np.ndarray
     noise: float
     uncertainty: float
 
@@ -125,7 +127,7 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     _check_length("largest_hole", options.largest_hole)
     near = neighbourhoods(cloud)
     base = choose_base(cloud, near, options.base, options.seen_from, options.along)
-    kept, domain, hole = _covered(cloud, base, options)
+    kept, domain, (centre, hole) = _covered(cloud, base, options)
     cloud = cloud[kept]
     theta = base.parameters(cloud)
     knots = _knots(domain, near.spacing, options.smoothness + 1, base.closed)
@@ -155,7 +157,10 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     _check_upright(surface, base)
     left = residuals(surface, cloud, theta)
     check_scatter(left, cloud, near.spacing, options.tolerance)
-    return SurfaceFit(surface, cloud, left, base.name, near.spacing, hole, noise, uncertainty)
+    hole_at = surface.partials(centre[None], 0)[0, 0]
+    return SurfaceFit(
+        surface, cloud, left, base.name, near.spacing, hole, hole_at, noise, uncertainty
+    )
 
 
 def check_cloud(points: ArrayLike) -> np.ndarray:
@@ -198,8 +203,8 @@ def check_cloud(points: ArrayLike) -> np.ndarray:
 
 def _covered(
     points: np.ndarray, base: Base, options: ScatteredFitOptions
-) -> tuple[np.ndarray, tuple[Interval, Interval], float]:
-    """Which points are kept, the rectangle of parameters, and the radius of its largest hole."""
+) -> tuple[np.ndarray, tuple[Interval, Interval], tuple[np.ndarray, float]]:
+    """Which points are kept, the rectangle of parameters, and its largest hole, see `Coverage`."""
     theta = base.parameters(points)
     low, high = theta.min(axis=0), theta.max(axis=0)
     domain = (Interval(*_floats(low[0], high[0])), Interval(*_floats(low[1], high[1])))
@@ -210,7 +215,7 @@ def _covered(
     coverage = cover(theta, domain, reach, closed=base.closed[0])
     centre, radius = coverage.hole
     if radius <= reach:
-        return np.full(len(points), True), domain, radius
+        return np.full(len(points), True), domain, coverage.hole
     if not options.trim:
         nearest = points[int(np.argmin(np.linalg.norm(theta - centre, axis=1)))]
         raise InputError(
@@ -233,7 +238,7 @@ def _covered(
             f"surface points: {np.count_nonzero(kept)} are left in the covered rectangle;"
             f" at least {FEWEST_POINTS} are required"
         )
-    hole = cover(theta, part, reach, closed=base.closed[0]).hole[1]
+    hole = cover(theta, part, reach, closed=base.closed[0]).hole
     return kept, part, hole
 
 

@@ -251,3 +251,13 @@ def test_a_place_that_points_leave_open_is_named_in_space():
     points[:, 2] = 0.005 * (points[:, 0] > 0.01) + 2e-5 * rng.normal(size=3000)
     with pytest.raises(InputError, match=r"surface near \[.*, .*, .*\] m, .* a step or an edge"):
         fit_scattered(points)
+
+
+def test_the_place_of_the_largest_hole():
+    points = workpiece(4000)
+    flat = flat_place(points)
+    centre = np.array([0.05, -0.03])
+    left = points[np.linalg.norm(flat[:, :2] - centre, axis=1) > 0.015]
+    fit = fit_scattered(left, ScatteredFitOptions(largest_hole=0.03))
+    assert 0.013 < fit.hole < 0.02
+    np.testing.assert_allclose(flat_place(fit.hole_at)[:2], centre, atol=5e-3)
