@@ -337,7 +337,7 @@ def _scattered(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurfac
         trim=shape.trim,
     )
     fit = fit_scattered(points, options)
-    notes = ()
+    notes: tuple[str, ...] = ()
     if fit.hole > _HOLE * fit.spacing:
         place = ", ".join(f"{value:.4g}" for value in fit.hole_at)
         notes = (
