@@ -35,7 +35,7 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.yaml.reading import resolve_files
 from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.folder import check_folder, open_results
-from reporting.processes import noticed_interruption
+from reporting.interruption import noticed_interruption
 from reporting.progress import ProgressListener
 
 _FIRST_STATUS = 5.0  # s

@@ -19,7 +19,7 @@ from pfsc_drake.drivers.driver_rules import DriverOptions, check_mode
 from pfsc_drake.drivers.link import RobotEnd
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
 from pfsc_drake.yaml.typed import load_typed
-from reporting.processes import noticed_interruption
+from reporting.interruption import noticed_interruption
 
 # for a plant that is to keep up with the clock
 _SCHEME = "runge_kutta3"

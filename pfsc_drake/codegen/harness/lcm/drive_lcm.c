@@ -315,7 +315,9 @@ static void go_first(void)
 
 int main(int argc, char **argv)
 {
-    struct sigaction caught;
+    static const int of_terminals[] = {SIGINT, SIGHUP};
+    size_t k;
+    struct sigaction caught, before;
     const char *reason;
     if (argc == 5 && strcmp(argv[1], "-r") == 0) {
         reason = repeat(argv[2], atof(argv[3]), argv[4]);
@@ -328,9 +330,12 @@ int main(int argc, char **argv)
     }
     memset(&caught, 0, sizeof caught);
     caught.sa_handler = interrupt;
-    sigaction(SIGINT, &caught, NULL);
     sigaction(SIGTERM, &caught, NULL);
-    sigaction(SIGHUP, &caught, NULL);
+    for (k = 0; k < sizeof of_terminals / sizeof of_terminals[0]; k++) {
+        if (sigaction(of_terminals[k], NULL, &before) == 0 && before.sa_handler != SIG_IGN) {
+            sigaction(of_terminals[k], &caught, NULL); /* ignored, as by nohup, it stays so */
+        }
+    }
     caught.sa_handler = SIG_IGN;
     sigaction(SIGPIPE, &caught, NULL);
     if (!open_bus(argv[1], argv[2], argv[3])) {
