@@ -132,6 +132,7 @@ def stands(status, ticks):
         (Event.INTERRUPTED, "interrupted"),
         (Event.ALONE, "who started the controller is gone"),
         (Event.UNRECORDED, "its record could not be written"),
+        (Event.FOREIGN, "another sender commands the robot"),
     ],
 )
 def test_a_stop_ends_when_the_robot_has_rested(panda, told, event, said):
