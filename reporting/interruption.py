@@ -46,13 +46,13 @@ def noticed_interruption() -> Iterator[Callable[[], bool]]:
     Raises:
         KeyboardInterrupt: If there was one before, and a library swallowed the exception.
     """
-    noticed: list[int] = []
+    noticed: list[signal.Signals] = []
 
     def notice(number: int, _frame: FrameType | None) -> None:
         _forget_closed_terminal()
         if noticed and number == signal.SIGINT:
             raise KeyboardInterrupt
-        noticed.append(number)
+        noticed.append(signal.Signals(number))
 
     before = {number: signal.getsignal(number) for number in _obeyed()}
     if any(isinstance(handler, _Raise) and handler.has_raised for handler in before.values()):

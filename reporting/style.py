@@ -172,7 +172,7 @@ def shade(
     corners = np.stack([spans[:, [0, 0, 1, 1]], np.tile([0.0, 1.0, 1.0, 0.0], (len(spans), 1))], -1)
     for panel in panels:
         shades = PolyCollection(
-            corners,
+            list(corners),
             transform=panel.get_xaxis_transform(),
             facecolor=colour,
             edgecolor="#9CA3AF" if hatch else "none",
