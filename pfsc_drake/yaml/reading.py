@@ -112,7 +112,7 @@ def _resolved(name: str, folder: Path) -> str:
 TAG_KEY = "_tag"
 MAX_NODES = 100_000
 MAX_DEPTH = 100
-_LONGEST_NUMBER = 1000  # characters
+_LONGEST_NUMBER = 100  # characters, of one to the base of 60
 _NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
@@ -299,7 +299,7 @@ class _NodeCheck:
         if any(character == "\0" or "\ud800" <= character <= "\udfff" for character in node.value):
             text = shortened(ascii(node.value))
             self._refuse(node, f"{text} holds a NUL or half a character; allowed: text")
-        if node.tag in _NUMBER_TAGS and len(node.value) > _LONGEST_NUMBER:
+        if node.tag in _NUMBER_TAGS and ":" in node.value and len(node.value) > _LONGEST_NUMBER:
             length = len(node.value)
             self._refuse(node, f"a number of {length} characters; allowed: up to {_LONGEST_NUMBER}")
 
