@@ -13,9 +13,10 @@ from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from pydrake.common import MemoryFile
-from pydrake.geometry import InMemoryMesh, Mesh, Meshcat, MeshcatParams
+from pydrake.geometry import InMemoryMesh, Mesh
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
 
 _OBJ_WORDS = {b"v", b"vn", b"vt", b"f", b"o", b"g", b"s"}
 _GLTF_KEYS = (
@@ -86,7 +87,7 @@ def _gltf(file: Path) -> bytes:
         text = json.dumps(reduced).encode()
         # no other kind of file makes Meshcat raise
         mesh = Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".gltf", file.name)))
-        Meshcat(MeshcatParams(host="localhost")).SetObject("mesh", mesh)
+        hidden_meshcat().SetObject("mesh", mesh)
     except (AttributeError, KeyError, TypeError, RuntimeError):  # of another structure
         raise NoMesh from None
     return text

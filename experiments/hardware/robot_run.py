@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robot_station import RobotStation, build_robot_station
@@ -18,6 +17,7 @@ from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.drivers.driver_rules import DriverOptions, check_mode
 from pfsc_drake.drivers.link import RobotEnd
+from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
 from pfsc_drake.yaml.typed import load_typed
 from reporting.interruption import noticed_interruption
@@ -93,7 +93,7 @@ class _View:
         tell: Callable[[str], None],
     ) -> None:
         assert isinstance(station.part, Arm)
-        meshcat = Meshcat(MeshcatParams(host="localhost"))
+        meshcat = hidden_meshcat()
         drawing = draw_robot(station.part.model, station.part.tool, parameters, folder)
         self._robot = RobotVisualizer(drawing.plant, drawing.parts, meshcat, 1.0)
         self._context = self._robot.CreateDefaultContext()
