@@ -88,13 +88,15 @@ def local_cluster(
 ) -> Iterator["Client"]:
     """Give a client of processes of this machine, which listen on its loopback address alone.
 
+    They take work from nobody but each other: their certificate exists only as long as they do.
+
     Args:
         workers: Number of processes.
         preload: Module that prepares each of them, see :func:`dask_setup`.
         settings: Further settings of Dask.
     """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with (
@@ -105,6 +107,8 @@ def local_cluster(
             threads_per_worker=1,
             processes=True,
             host=_LOOPBACK,
+            protocol="tls",
+            security=Security.temporary(),
             dashboard_address=f"{_LOOPBACK}:0",
             scheduler_kwargs={"dashboard": False},
             local_directory=folder,
@@ -126,6 +130,7 @@ def count_cores(instead: str = "") -> int:
         InputError: If Dask is not installed.
     """
     try:
+        import cryptography  # noqa: F401  of the cluster's certificate
         import distributed  # noqa: F401
         from dask.system import CPU_COUNT
     except ImportError as error:
