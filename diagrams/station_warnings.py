@@ -9,6 +9,7 @@ from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
+from diagrams.warnings.encoders import coarse_encoders
 from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
 from diagrams.warnings.obstacles import obstacle_warnings
 from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
@@ -57,6 +58,8 @@ def controller_warnings(
     said = law_warnings(parameters, robot, law, link_state, sampled)
     if parameters.law == "velocity_servo":
         said += servo_warnings(scenario.servo.bandwidth, robot, link_state)
+    q_J, period = link_state[: robot.dimension], parameters.sampling_time
+    said += coarse_encoders(scenario.encoders, period, robot, law, q_J)
     said += untold_forces(
         expected_forces(scenario), bearable, parameters, robot, law, rest, sampled
     )

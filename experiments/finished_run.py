@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
@@ -52,12 +51,14 @@ from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
 from pfsc_drake.following.fixtures import free_motion
 from pfsc_drake.robot.coordinate_text import posture_text
+from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
 from reporting.page import Report, report_page, write_report
 from reporting.progress import ProgressListener
 from reporting.provenance import standard_attributes
 
+_MESHCATS = 3  # of a recording, at most
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
 
 
@@ -347,10 +348,23 @@ def _report(
 
 
 def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:
-    """Return the recording as a page of its own."""
-    meshcat, settings = Meshcat(MeshcatParams(host="localhost")), prepared.settings
-    diagram = build_station_replay(settings, prepared.station, prepared.drawing, motion, meshcat)
-    page = record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
+    """Return the recording as a page of its own; a Meshcat that is ended from outside is replaced.
+
+    Raises:
+        RuntimeError: If it was ended again and again.
+    """
+    settings = prepared.settings
+    for left in reversed(range(_MESHCATS)):
+        meshcat = hidden_meshcat()
+        try:
+            diagram = build_station_replay(
+                settings, prepared.station, prepared.drawing, motion, meshcat
+            )
+            page = record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
+            break
+        except RuntimeError:
+            if not left:
+                raise
     mounting = prepared.station.mounting
     return page if mounting is None else explained(page, mounting_stages(mounting, motion.phases))
 

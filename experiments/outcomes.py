@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from reporting.processes import INTERRUPTED
+from reporting.interruption import INTERRUPTED
 from reporting.terminal import FAULT, NOT_WRITTEN, WRONG_INPUT, print_error, print_page
 
 if TYPE_CHECKING:

@@ -1,5 +1,6 @@
 """Everything that is done before a run moves anything, so that wrong input is found out first."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,8 +24,10 @@ MAX_TICKS = 1_000_000  # of the controller; 1000 s at 1 kHz
 MAX_FRAMES = 50_000  # of a recording; almost half an hour at the default of 32 ms
 # of six elastic axes on one core: wall clock time of a tick with its integration [s]
 _SECONDS_PER_TICK = 2e-4
-# of each logged number: in a container that doubles as it grows, and in the signals made of it
-_COPIES = 4
+# of each logged number: in a container that doubles as it grows, in signals, and in figures
+_COPIES = 8
+_MEMORY = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")  # bytes of this machine
+LONGEST_SESSION = 600.0  # s, of a live one, unless it is given
 _UNITS = (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0))
 
 
@@ -61,7 +64,8 @@ def prepare(
 
     Args:
         scenario: The scenario as read.
-        duration: Simulated time [s] instead of the scenario's.
+        duration: Simulated time [s] instead of the scenario's, or of a live session's
+            LONGEST_SESSION or what the memory of this machine allows.
         recording: Whether the motion will be recorded.
         progress: Told what goes on.
         live: Whether there is a person at the controls of an operator.
@@ -75,6 +79,8 @@ def prepare(
         nobody = settings.operator is not None and not settings.operator.inputs and not live
         require(not nobody, "operator.inputs", "''", "a file that a live session has recorded")
         station = _build(settings, folder, progress)
+        if live and duration is None:
+            duration = min(LONGEST_SESSION, _longest(station))
         settle(settings, scenario.name, station, duration, recording=recording)
         progress(0.0, "choosing the integration")
         station, integration = _integrated(settings, folder, station)
@@ -163,7 +169,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def check_length(settings: Scenario, station: Station) -> None:
-    """Refuse a run of more than MAX_TICKS sampling intervals of the controller.
+    """Refuse a run that takes too many sampling intervals, or more memory than there is.
 
     Args:
         settings: The scenario, with its duration.
@@ -172,17 +178,26 @@ def check_length(settings: Scenario, station: Station) -> None:
     Raises:
         InputError: One line that says how long the run would take, and how much memory.
     """
-    period, duration = station.controller.period, settings.duration
-    ticks = duration / period
-    if ticks <= MAX_TICKS:
+    period, duration, longest = station.controller.period, settings.duration, _longest(station)
+    if duration <= longest:
         return
-    sizes = (rows.stop - rows.start for rows in station.log.rows.values())
-    memory = 8.0 * sum(sizes) * ticks * _COPIES
+    ticks = duration / period
     raise InputError(
         f"duration = {duration:g} s: {ticks:.3g} sampling intervals, about "
-        f"{_time(ticks * _SECONDS_PER_TICK)} and {memory / 1e9:.3g} GB of memory; "
-        f"allowed: up to {MAX_TICKS * period:g} s (--duration, or duration: in the scenario)"
+        f"{_time(ticks * _SECONDS_PER_TICK)} and {ticks * _tick_memory(station) / 1e9:.3g} GB of "
+        f"memory; allowed: up to {longest:g} s (--duration, or duration: in the scenario)"
     )
+
+
+def _longest(station: Station) -> float:
+    """Return the longest duration of a run on this machine [s]."""
+    ticks = min(MAX_TICKS, _MEMORY // _tick_memory(station))
+    return ticks * station.controller.period
+
+
+def _tick_memory(station: Station) -> float:
+    """Return the memory that a sampling interval of a run takes until its figures are drawn [B]."""
+    return 8.0 * _COPIES * sum(rows.stop - rows.start for rows in station.log.rows.values())
 
 
 def check_frames(duration: float, frame_period: float) -> None:

@@ -1,6 +1,6 @@
 """The start of the process, before anything slow is imported."""
 
-from reporting.processes import leave_when_interrupted
+from reporting.interruption import leave_when_interrupted
 from reporting.terminal import prepare_streams, silence_libraries
 
 

@@ -125,7 +125,8 @@ class ScenarioFile:
     def name(self) -> str:
         """Key ``name`` of the file, else the file's name without suffix, as text."""
         stem = os.fsencode(self.path.stem).decode("utf-8", "replace")
-        return str(self.data.get("name", stem))
+        given = self.data.get("name")
+        return given if isinstance(given, str) else stem
 
     @property
     def fingerprint(self) -> str:

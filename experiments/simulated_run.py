@@ -11,7 +11,7 @@ from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.result import MarginAnalysis
 from reporting.folder import check_folder, open_results
-from reporting.processes import noticed_interruption
+from reporting.interruption import noticed_interruption
 from reporting.progress import ProgressListener
 
 

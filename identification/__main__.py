@@ -2,7 +2,7 @@
 
 import sys
 
-from reporting.processes import leave_when_interrupted
+from reporting.interruption import leave_when_interrupted
 from reporting.terminal import prepare_streams, silence_libraries
 
 if __name__ == "__main__":

@@ -1,100 +1,17 @@
-"""Processes of this machine that work side by side, and what an interruption does to them."""
+"""Processes of this machine that work side by side."""
 
 import logging
-import os
 import signal
-import sys
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from tempfile import TemporaryDirectory
-from types import FrameType, MappingProxyType
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from pfsc_drake.errors import InputError
 
 if TYPE_CHECKING:
     from distributed import Client
-
-INTERRUPTED = 130  # exit status
-
-
-def leave_when_interrupted() -> None:
-    """Ends the process with one line and INTERRUPTED at Ctrl-C, until told otherwise."""
-    if _is_obeyed():
-        signal.signal(signal.SIGINT, _leave)
-
-
-@contextmanager
-def raised_interruption() -> Iterator[None]:
-    """Lets Ctrl-C raise KeyboardInterrupt; a library that swallows it only delays it."""
-    if not _is_obeyed():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, _Raise())
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def noticed_interruption(*also: signal.Signals) -> Iterator[Callable[[], bool]]:
-    """Gives a function that tells whether Ctrl-C was pressed since the context began.
-
-    The first Ctrl-C is only noticed; the next one raises KeyboardInterrupt.
-
-    Args:
-        also: Signals that count as one, such as that of a terminal that closes.
-
-    Raises:
-        KeyboardInterrupt: If Ctrl-C was pressed before, and a library swallowed the exception.
-    """
-    noticed = False
-
-    def notice(_number: int, _frame: FrameType | None) -> None:
-        nonlocal noticed
-        if noticed:
-            raise KeyboardInterrupt
-        noticed = True
-
-    if not _is_obeyed():
-        yield lambda: False
-        return
-    before = signal.getsignal(signal.SIGINT)
-    if isinstance(before, _Raise) and before.has_raised:
-        raise KeyboardInterrupt
-    others = {number: signal.signal(number, notice) for number in also}
-    signal.signal(signal.SIGINT, notice)
-    try:
-        yield lambda: noticed
-    finally:
-        for number, handler in ({signal.SIGINT: before} | others).items():
-            signal.signal(number, handler)
-
-
-class _Raise:
-    """Handler that raises KeyboardInterrupt and remembers it."""
-
-    def __init__(self) -> None:
-        self.has_raised = False
-
-    def __call__(self, _number: int, _frame: FrameType | None) -> None:
-        self.has_raised = True
-        raise KeyboardInterrupt
-
-
-def _is_obeyed() -> bool:
-    """Whether Ctrl-C is this thread's business: jobs in the background may ignore it."""
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    return in_main_thread and signal.getsignal(signal.SIGINT) not in (signal.SIG_IGN, None)
-
-
-def _leave(_number: int, _frame: FrameType | None) -> None:
-    newline = "\n" if sys.stderr.isatty() else ""  # after the ^C of the terminal
-    os.write(sys.stderr.fileno(), f"{newline}interrupted\n".encode())
-    os._exit(INTERRUPTED)
-
 
 Common = TypeVar("Common")
 Task = TypeVar("Task")
@@ -171,13 +88,15 @@ def local_cluster(
 ) -> Iterator["Client"]:
     """Give a client of processes of this machine, which listen on its loopback address alone.
 
+    They take work from nobody but each other: their certificate exists only as long as they do.
+
     Args:
         workers: Number of processes.
         preload: Module that prepares each of them, see :func:`dask_setup`.
         settings: Further settings of Dask.
     """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with (
@@ -188,6 +107,8 @@ def local_cluster(
             threads_per_worker=1,
             processes=True,
             host=_LOOPBACK,
+            protocol="tls",
+            security=Security.temporary(),
             dashboard_address=f"{_LOOPBACK}:0",
             scheduler_kwargs={"dashboard": False},
             local_directory=folder,
@@ -209,6 +130,7 @@ def count_cores(instead: str = "") -> int:
         InputError: If Dask is not installed.
     """
     try:
+        import cryptography  # noqa: F401  of the cluster's certificate
         import distributed  # noqa: F401
         from dask.system import CPU_COUNT
     except ImportError as error:
@@ -221,6 +143,7 @@ def count_cores(instead: str = "") -> int:
 
 def dask_setup(_worker: Any) -> None:
     """Prepare a process before it takes tasks; called by Dask."""
-    # Ctrl-C reaches every process of the terminal; the one that leads ends the others
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # these reach every process of a terminal; the one that leads ends the others, by SIGTERM
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

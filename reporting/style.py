@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure as Canvas
 from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
@@ -153,31 +154,45 @@ def draw_reference(panel: Axes, time: ArrayLike, values: ArrayLike, label: str) 
 def shade(
     panels: list[Axes], time: FloatArray, where: ArrayLike, label: str, colour: str, hatch: str = ""
 ) -> None:
-    """Shades the times at which something holds, from sample to sample.
+    """Shade the times at which something holds, from sample to sample.
+
+    Gaps that no screen shows are shaded, too: what flickers has as many intervals as samples.
 
     Args:
         panels: All of them are shaded; the first gets an entry for the legend.
         time: [samples] s.
         where: [samples] bool.
-        label: What holds.
+        label: Name of what holds.
         colour: Colour of the shade.
         hatch: Pattern, where colour alone could be mistaken.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(where, dtype=int), [0]])))
-    spans = edges.reshape(-1, 2)
+    spans = _visible_spans(time, where)
+    if not len(spans):
+        return
+    corners = np.stack([spans[:, [0, 0, 1, 1]], np.tile([0.0, 1.0, 1.0, 0.0], (len(spans), 1))], -1)
     for panel in panels:
-        for number, (first, after) in enumerate(spans):
-            panel.axvspan(
-                time[first],
-                time[min(after, len(time) - 1)],
-                facecolor=colour,
-                edgecolor="#9CA3AF" if hatch else "none",
-                linewidth=0.0,
-                alpha=0.45,
-                hatch=hatch,
-                zorder=0.5,
-                label=label if panel is panels[0] and number == 0 else None,
-            )
+        shades = PolyCollection(
+            list(corners),
+            transform=panel.get_xaxis_transform(),
+            facecolor=colour,
+            edgecolor="#9CA3AF" if hatch else "none",
+            linewidth=0.0,
+            alpha=0.45,
+            hatch=hatch,
+            zorder=0.5,
+            label=label if panel is panels[0] else None,
+        )
+        panel.add_collection(shades, autolim=False)
+
+
+def _visible_spans(time: FloatArray, where: ArrayLike) -> FloatArray:
+    """Return beginnings and ends of intervals with gaps that can be seen, [intervals, 2] s."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(where, dtype=int), [0]])))
+    if not edges.size:
+        return np.zeros((0, 2))
+    begins, ends = time[edges[::2]], time[np.minimum(edges[1::2], len(time) - 1)]
+    seen = begins[1:] - ends[:-1] > (time[-1] - time[0]) / (WIDTH * DPI)
+    return np.column_stack([begins[np.r_[True, seen]], ends[np.r_[seen, True]]])
 
 
 def late_samples(time: FloatArray) -> NDArray[np.bool_]:

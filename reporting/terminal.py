@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from pfsc_drake.errors import InputError, WriteError
-from reporting.processes import INTERRUPTED, raised_interruption
+from reporting.interruption import INTERRUPTED, raised_interruption
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -1,14 +1,13 @@
 """How a robot's model is drawn: which meshes can be, and sticks where none are."""
 
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
 import numpy as np
-from pydrake.geometry import Box, Cylinder, Mesh, Meshcat, MeshcatParams, Rgba, Shape, Sphere
+from pydrake.geometry import Box, Cylinder, Mesh, Rgba, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -21,6 +20,7 @@ from pydrake.multibody.tree import (
     RigidBody,
 )
 
+from diagrams.drawing.mesh_geometry import NoMesh, geometry_of, in_memory
 from pfsc_drake.errors import InputError, nearest_file
 from pfsc_drake.geometry.files.mesh_files import read_stl
 from pfsc_drake.robot.models.model_text import (
@@ -28,6 +28,7 @@ from pfsc_drake.robot.models.model_text import (
     distinct_materials,
     edited_text,
     with_attributes,
+    without_textures,
 )
 from pfsc_drake.robot.models.model_xml import Element, read_model_xml
 from pfsc_drake.systems.drawing.robot_visualizer import BodyPart, Triangles
@@ -36,7 +37,7 @@ _DRAWN = "obj, gltf, dae and stl"
 
 
 def drawn_mesh(mesh: Mesh) -> Mesh | Triangles:
-    """Return what to draw for a mesh of a model: itself, or the triangles of an STL file.
+    """Return what to draw for a mesh of a model: its geometry, or the triangles of an STL file.
 
     Args:
         mesh: The mesh as read by Drake, from a file.
@@ -45,11 +46,11 @@ def drawn_mesh(mesh: Mesh) -> Mesh | Triangles:
         InputError: If its file cannot be drawn.
     """
     file = FilePath(mesh.source().path())
-    check_mesh_file(file)
-    if file.suffix.lower() != ".stl":
-        return mesh
-    vertices, triangles = read_stl(file)
-    return Triangles(vertices * mesh.scale3(), triangles)
+    with _explained(file):
+        if file.suffix.lower() != ".stl":
+            return in_memory(file, mesh)
+        vertices, triangles = read_stl(file)
+        return Triangles(vertices * mesh.scale3(), triangles)
 
 
 def check_mesh_file(file: FilePath) -> None:
@@ -61,50 +62,28 @@ def check_mesh_file(file: FilePath) -> None:
     Raises:
         InputError: If it is missing, of another kind or not what its name says.
     """
+    with _explained(file):
+        if file.suffix.lower() != ".stl":  # whose reader says best what is wrong with one
+            geometry_of(file)
+
+
+@contextmanager
+def _explained(file: FilePath) -> Iterator[None]:
+    """Say what is wrong with the file of a mesh while it is read.
+
+    Raises:
+        InputError: If it is missing, of another kind or not what its name says.
+    """
     if not file.is_file():
         raise InputError(f"{file}: no such file{nearest_file(file)}")
-    checks = {".obj": _is_obj, ".gltf": _is_gltf, ".dae": _is_collada, ".stl": _is_stl}
-    check = checks.get(file.suffix.lower())
-    if check is None:
+    if file.suffix.lower() not in (".obj", ".gltf", ".dae", ".stl"):
         raise InputError(f"{file}: meshes of this kind are not drawn; drawn are {_DRAWN}")
     try:
-        readable = check(file)
+        yield
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}") from None
-    if not readable:
-        raise InputError(f"{file}: holds no mesh that could be drawn")
-
-
-def _is_obj(file: FilePath) -> bool:
-    lines = file.read_bytes().splitlines()
-    return all(any(line.lstrip().startswith(key) for line in lines) for key in (b"v ", b"f "))
-
-
-def _is_gltf(file: FilePath) -> bool:
-    try:
-        content = json.loads(file.read_bytes())
-    except ValueError:
-        return False
-    if not isinstance(content, dict) or not content.get("meshes"):
-        return False
-    try:  # no other kind of file makes Meshcat raise
-        Meshcat(MeshcatParams(host="localhost")).SetObject("mesh", Mesh(str(file)))
-    except RuntimeError:
-        return False
-    return True
-
-
-def _is_collada(file: FilePath) -> bool:
-    try:
-        root = ElementTree.parse(file).getroot()
-    except ElementTree.ParseError:
-        return False
-    return root.tag.endswith("COLLADA") and root.find(".//{*}geometry/{*}mesh") is not None
-
-
-def _is_stl(file: FilePath) -> bool:
-    """Readers of STL files say best what is wrong with one."""
-    return True
+    except NoMesh:
+        raise InputError(f"{file}: holds no mesh that could be drawn") from None
 
 
 Resolve = Callable[[str], FilePath]
@@ -143,7 +122,8 @@ def drawable_text(file: FilePath, resolve: Resolve) -> tuple[str, list[NotDrawn]
     model, missing = read_model_xml(file), list[NotDrawn]()
     edits = list(distinct_materials(model))
     every = list(model.root.within())
-    edits += [(element, "") for element in every if element.name in ("collision", "texture")]
+    edits += without_textures(model)
+    edits += [(element, "") for element in every if element.name == "collision"]
     for link in (element for element in every if element.name == "link"):
         for visual in link.all("visual"):
             try:

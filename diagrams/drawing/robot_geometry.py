@@ -1,5 +1,6 @@
 """What a robot looks like: its model's visual geometry, or a stick figure."""
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
@@ -107,6 +108,9 @@ def _visual_parts(
         body = shown.GetBodyFromFrameId(inspector.GetFrameId(geometry))
         assert body is not None  # every frame of this source is one of the plant's bodies
         try:
+            shape = inspector.GetShape(geometry)
+            if isinstance(shape, Mesh):  # of kinds that are read as they are, too
+                _within(FilePath(shape.source().path()), file, packages)
             parts.append(_part(inspector, geometry, _same_body(plant, shown, body)))
         except InputError as error:
             missing.append(NotDrawn(body.name(), str(error)))
@@ -140,7 +144,7 @@ def _resolve(address: str, file: FilePath, packages: PackageMap) -> FilePath:
     """Return the file that a model's mesh address means.
 
     Raises:
-        InputError: If its package is not known.
+        InputError: If its package is not known, or it is outside the model's packages.
     """
     for scheme in ("package://", "model://"):
         if address.startswith(scheme):
@@ -150,5 +154,24 @@ def _resolve(address: str, file: FilePath, packages: PackageMap) -> FilePath:
                     f"the package '{package}' is not known, no package.xml above the model "
                     f"names it: write robot.packages: {{{package}: FOLDER}}"
                 )
-            return FilePath(packages.GetPath(package)) / rest
-    return file.parent / address.removeprefix("file://")
+            return _within(FilePath(packages.GetPath(package)) / rest, file, packages)
+    return _within(file.parent / address.removeprefix("file://"), file, packages)
+
+
+def _within(mesh: FilePath, file: FilePath, packages: PackageMap) -> FilePath:
+    """Return a mesh of a model's packages, or of the folder above the model's or below.
+
+    Raises:
+        InputError: If it is elsewhere.
+    """
+    path = FilePath(os.path.normpath(mesh.absolute()))
+    # those that Drake knows by itself may have to be downloaded first
+    names = set(packages.GetPackageNames()) - set(PackageMap().GetPackageNames())
+    folders = [packages.GetPath(name) for name in names]
+    for folder in (file.absolute().parent.parent, *folders):
+        if FilePath(os.path.normpath(folder)) in path.parents:
+            return path
+    raise InputError(
+        f"{mesh}: outside the model's packages: write robot.packages: {{NAME: FOLDER}}, and "
+        "package://NAME/.. in the model"
+    )

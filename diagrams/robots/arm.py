@@ -43,6 +43,8 @@ from pfsc_drake.systems.plants.external_forces import LinkPushes
 from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index
 
 _ROUNDING = 1e-6  # m
+# times the reach: as far away as a number in mm, read in m
+_IN_MM = 50.0
 
 
 @dataclass(frozen=True)
@@ -102,10 +104,11 @@ class Arm(RobotPart):
         base, reach = self.robot.links[0].p_PF, self.robot.reach
         distance = float(np.linalg.norm(position - base))
         if distance > reach + _ROUNDING:
+            hint = "; unit: mm reads a file in mm" if distance > _IN_MM * reach else ""
             raise InputError(
                 f"{where}: tool point {np.round(position, 4).tolist()} m is unreachable, "
                 f"{distance:.4g} m from the first joint at {np.round(base, 4).tolist()} m; the "
-                f"robot reaches {reach:.4g} m at most"
+                f"robot reaches {reach:.4g} m at most{hint}"
             )
 
     def start_warnings(

@@ -16,6 +16,7 @@ from diagrams.scenario.checks import (
 from diagrams.scenario.streamed import Streamed
 from diagrams.scenario.surface import SurfaceShape, require_jacobian
 from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
+from pfsc_drake.geometry.files.unit import UNITS
 from pfsc_drake.yaml.reading import FILE
 from pfsc_drake.yaml.typed import equal
 
@@ -75,12 +76,15 @@ class Waypoints:
     """A path through the waypoints of a CSV file, or near them; orientation included.
 
     It is a spline through all of them, unless ``tolerance`` or ``corner_distance`` is given.
-    Columns of the file: ``x, y, z`` [m]; if it has an orientation, ``zyx_1, zyx_2, zyx_3`` or
-    ``zyz_1, ...`` [rad], ``zyx_deg_1, ...`` or ``zyz_deg_1, ...`` [deg], ``qw, qx, qy, qz``, or
-    ``r11, r12, ..., r33``; see :func:`read_waypoints`.
+    Columns of the file: ``x, y, z``; if it has an orientation, ``zyx_1, zyx_2, zyx_3``,
+    ``zyz_1, ...`` or ``roll, pitch, yaw`` [rad], ``zyx_deg_1, ...``, ``zyz_deg_1, ...`` or
+    ``roll_deg, ...`` [deg], the rotation vector ``rx, ry, rz`` [rad], ``qw, qx, qy, qz``, or
+    ``r11, r12, ..., r33``; for the task ``yaw`` the turn ``yaw`` or ``yaw_deg`` alone, which a
+    single keyframe, the tool's tilt, may go with; see :func:`read_waypoints`.
 
     Attributes:
         file: CSV file, relative to the scenario's folder.
+        unit: Unit of ``x, y, z``: ``m``, ``cm``, ``mm``, ``inch``.
         closed: Whether the path is closed.
         parametrization: ``chord`` or ``centripetal``, of a spline through all waypoints.
         smoothness: Class C^k of the spline; 0 chooses what the law needs.
@@ -93,6 +97,7 @@ class Waypoints:
     """
 
     file: str = dc.field(default="", metadata=FILE)
+    unit: str = "m"
     closed: bool = False
     parametrization: str = "chord"
     smoothness: int = 0
@@ -101,6 +106,7 @@ class Waypoints:
     corner_distance: float = 0.0
 
     def __post_init__(self) -> None:
+        require_one_of("unit", self.unit, UNITS)
         require_one_of("parametrization", self.parametrization, ("chord", "centripetal"))
         require(0 <= self.smoothness <= 6, "smoothness", self.smoothness, "0 to 6")
         # a blend shorter than any path is no motion, and takes long to be tabulated
@@ -124,18 +130,22 @@ class OnSurface:
     Attributes:
         thetas: Waypoints ``[theta_1, theta_2]``; two are joined by a straight line in the
             parameters. Closed directions of the surface may be led round and round.
-        file: CSV file with columns ``x, y, z`` [m] instead, relative to the scenario's folder;
+        file: CSV file with columns ``x, y, z`` instead, relative to the scenario's folder;
             the path is where the surface is nearest to them.
+        unit: Unit of ``x, y, z``: ``m``, ``cm``, ``mm``, ``inch``.
         max_distance: Largest distance of these points from the surface [m].
         closed: Whether the path is closed.
     """
 
     thetas: list[list[float]] = dc.field(default_factory=list)
     file: str = dc.field(default="", metadata=FILE)
+    unit: str = "m"
     max_distance: float = 1e-3
     closed: bool = False
 
     def __post_init__(self) -> None:
+        require_one_of("unit", self.unit, UNITS)
+        require(bool(self.file) or self.unit == "m", "unit", self.unit, "m without a file")
         for i, theta in enumerate(self.thetas):
             require_numbers(f"thetas[{i}]", theta, 2)
         good = 0.0 < self.max_distance <= FARTHEST

@@ -23,10 +23,10 @@ from diagrams.scenario.surface_shapes import (
     Turned,
 )
 from pfsc_drake.geometry.curves.curve import FARTHEST
+from pfsc_drake.geometry.files.unit import UNITS
 from pfsc_drake.yaml.reading import FILE
 from pfsc_drake.yaml.typed import equal
 
-_UNITS = ("m", "cm", "mm", "inch")
 _BASES = ("auto", "plane", "cylinder")
 _SHORTEST_TOLERANCE = 1e-7  # m
 
@@ -84,7 +84,7 @@ class Fitted(Placed):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key, values in {"unit": _UNITS, "base": _BASES}.items():
+        for key, values in {"unit": UNITS, "base": _BASES}.items():
             require_one_of(key, getattr(self, key), values)
         _require_smoothness(self.smoothness)
         for key in ("tolerance", "largest_hole"):

@@ -47,6 +47,8 @@ def read_poses(file: FilePath, key: str) -> np.ndarray:
         raise InputError(f"{key}: {error}") from None
     if len(table.positions) < 2:
         raise InputError(f"{key}: {file.name} has {len(table.positions)} way points; 2 or more")
+    if table.yaw_alone:
+        raise InputError(f"{key}: {file.name} has yaw alone; roll and pitch besides are required")
     if table.quaternions is None:
         return table.positions
     return np.hstack([table.positions, table.quaternions])

@@ -1,6 +1,6 @@
 """Whether the drives can follow the reference, and a slower one if they cannot."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.control.planning.course import CourseStart
+from pfsc_drake.control.planning.course import CourseError, CourseStart
 from pfsc_drake.control.planning.drive_demand import Clock, find_pace, with_pace
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
@@ -119,6 +119,8 @@ class DrivePlanner(MotionDemand):
         """Return a plan of the motion as it was asked for, or of a slower one."""
         try:
             step, course = self.course(_GLANCED)
+            if self.may_be_singular(self._task.motion, self._step(_GLANCED), course):
+                step, course = self.course(_SLOWED)
             fits = self.fits(course, _AT_A_GLANCE)
             if not fits and self.fits(course, 1.0):
                 step, course = self.course(_CHECKED)
@@ -128,8 +130,30 @@ class DrivePlanner(MotionDemand):
                 step, course = self.course(_SLOWED)
                 fits = self.fits(course, 1.0)
             demand = self.demand.of(course)
-        except InputError as error:
-            return self.unknown(str(error))
+        except CourseError as error:
+            said = self._beyond_limits(self._step(_GLANCED), error.course, still=True)
+            return self.unknown(str(error), said)
+        said = self._beyond_limits(step, course[:, 0], still=step > _CHECKED)
+        plan = self._of_course(course, demand, step, fits)
+        return replace(plan, said=[*said, *plan.said])
+
+    def _beyond_limits(self, step: float, postures: np.ndarray, *, still: bool) -> list[str]:
+        """Return which joint passes a limit on the way, if one does."""
+        motion = self._task.motion
+        said = self.beyond_limits(motion, step, postures)
+        if not said or not still or self._law.posture is None:
+            return said
+        # a glance leaves joints beyond the outputs where they are
+        try:
+            step, course = self.course(_SLOWED)
+        except CourseError as error:
+            return self.beyond_limits(motion, self._step(_SLOWED), error.course)
+        return self.beyond_limits(motion, step, course[:, 0])
+
+    def _of_course(
+        self, course: np.ndarray, demand: np.ndarray, step: float, fits: bool
+    ) -> DrivePlan:
+        """Return a plan of a course that the joints can go."""
         times, ones, motion = step * np.arange(len(course)), np.ones(len(course)), self._task.motion
         asked = DrivePlan(times, demand, demand, self.limits, ones, motion, [])
         if fits:
@@ -140,11 +164,12 @@ class DrivePlanner(MotionDemand):
             return self.warned(asked, course)
         return self.slowed(asked, course, step)
 
-    def unknown(self, error: str) -> DrivePlan:
-        """Return a plan of a motion of which nothing is known."""
+    def unknown(self, error: str, besides: Sequence[str] = ()) -> DrivePlan:
+        """Return a plan of a motion of which nothing is known, with what is said besides."""
         nothing, empty = np.zeros((0, len(self.limits))), np.zeros(0)
-        said = f"whether the drives can follow the reference is not known: its course is {error}"
-        return DrivePlan(empty, nothing, nothing, self.limits, empty, self._task.motion, [said])
+        said = f"whether the drives can follow the reference is not known: {error}"
+        motion = self._task.motion
+        return DrivePlan(empty, nothing, nothing, self.limits, empty, motion, [*besides, said])
 
     def course(
         self, longest: float, added: Callable[[np.ndarray], np.ndarray] | None = None
@@ -244,17 +269,11 @@ class DrivePlanner(MotionDemand):
         i, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
         share = np.abs(asked.demand[i, column]) / asked.limits[column]
         kind = "torque" if column < len(self.limits) // 2 else "speed"
-        where = self.where(asked.times[i])
+        where = self.where(self._task.motion, asked.times[i])
         return (
             f"as asked for it takes {100.0 * share:.0f} % of the {kind} of axis "
             f"{column % (len(self.limits) // 2) + 1} at {where}"
         )
-
-    def where(self, time: float) -> str:
-        """Return what to call a place of the motion as asked for."""
-        eta = self._task.motion.derivatives(np.array([time]), 0)[0, 0]
-        value = f"{eta[0]:.3g}" if len(eta) == 1 else f"({eta[0]:.3g}, {eta[1]:.3g})"
-        return f"eta = {value} m"
 
 
 def _retimed(motion: PiecewisePolynomialCurve, clock: Clock) -> PiecewisePolynomialCurve:

@@ -7,20 +7,25 @@ import numpy as np
 from diagrams.scenario import ReferenceParameters
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.planning.course import CourseFinder, CourseStart
+from pfsc_drake.control.planning.course import CourseError, CourseFinder, CourseStart
 from pfsc_drake.control.planning.drive_demand import (
     DriveDemand,
     DriveLimits,
     allowed_demand,
     with_pace,
 )
+from pfsc_drake.following.fault_description import describe_singularity
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.robot_model import largest_speeds
+from pfsc_drake.robot.singular_posture import singular_posture
 from pfsc_drake.yaml.typed import spread
 
 # share of joint speeds that is left where torques are commanded
 _SPEED_RESERVE = 0.05
+# of singular values of the tool's Jacobian: below, a singular place is the posture's fault
+_SINGULAR = 0.02
 
 
 class MotionDemand:
@@ -91,14 +96,87 @@ class MotionDemand:
                 (samples, r + 1, m), if any are.
 
         Raises:
-            InputError: If the joints cannot follow.
+            CourseError: If the joints cannot follow; says where.
         """
         times, reference = self._sampled(motion, step)
         if added is not None:
             reference += added(times)
         frames = self._frames(times)
-        course = self._finder.find(self._start, reference, times, still=still, frames=frames)
+        try:
+            course = self._finder.find(self._start, reference, times, still=still, frames=frames)
+        except CourseError as error:
+            raise self._located(error, motion, float(times[1])) from None
         return float(times[1]), self._continued(course, times[1])
+
+    def may_be_singular(
+        self, motion: PiecewisePolynomialCurve, step: float, course: np.ndarray
+    ) -> bool:
+        """Return whether a singular place may lie between the samples of a course.
+
+        The condition number of either side then leads there by the next sample.
+
+        Args:
+            motion: Tangential coordinates over time.
+            step: As it was asked for.
+            course: Its course.
+        """
+        times, reference = self._sampled(motion, step)
+        led = course[:, : reference.shape[1]]
+        rcond = self._finder.condition(self._start, led, reference, self._frames(times))
+        ahead = np.minimum(2.0 * rcond[1:-1] - rcond[:-2], 2.0 * rcond[1:-1] - rcond[2:])
+        return bool(np.any(ahead < self._law.inverse.min_rcond))
+
+    def _located(
+        self, error: CourseError, motion: PiecewisePolynomialCurve, step: float
+    ) -> CourseError:
+        """Return an error that says where on its way the robot cannot follow, and why."""
+        time, q = step * (len(error.course) - 1), error.course[-1]
+        where = self.where(motion, time)
+        said = f"the joints do not reach the reference at {where}"
+        if error.rcond is not None:
+            said = f"{error} at {where}"
+            place, tool = self._task.place, self._task.place.tool
+            axes = {"tool_axis": tool.tool_axis, "yaw_axis": tool.yaw_axis}
+            posture = singular_posture(self.robot, q, oriented=place.is_oriented, **axes)
+            if posture.rcond < _SINGULAR:
+                said = describe_singularity(self.robot, q, posture, f"singular at {where}")
+        located = CourseError(said, error.rcond)
+        located.course = error.course
+        return located
+
+    def where(self, motion: PiecewisePolynomialCurve, time: float) -> str:
+        """Return what to call a place of a motion.
+
+        Args:
+            motion: Tangential coordinates over time.
+            time: When it is there [s].
+        """
+        eta = motion.derivatives(np.array([time]), 0)[0, 0]
+        value = f"{eta[0]:.3g}" if len(eta) == 1 else f"({eta[0]:.3g}, {eta[1]:.3g})"
+        return f"eta = {value} m"
+
+    def beyond_limits(
+        self, motion: PiecewisePolynomialCurve, step: float, postures: np.ndarray
+    ) -> list[str]:
+        """Return which joint first passes a limit of its position, if one does, and where.
+
+        Args:
+            motion: Tangential coordinates over time.
+            step: Step of the grid [s].
+            postures: Joint coordinates on it, shape (samples, N).
+        """
+        lower, upper = self.robot.gather("position_limits").T
+        beyond = (postures < lower) | (postures > upper)
+        if not beyond.any():
+            return []
+        i = int(np.argmax(beyond.any(axis=1)))
+        joint = int(np.argmax(beyond[i]))
+        limit = posture_text(self.robot, np.clip(postures[i], lower, upper), [joint])
+        return [
+            f"joint {joint + 1} passes its limit, {limit}, at {self.where(motion, i * step)}, "
+            f"after {i * step:.3g} s of the reference: start in another posture "
+            "(start.posture_deg), or move the path"
+        ]
 
     def _frames(self, times: np.ndarray) -> np.ndarray | None:
         """Return the motion of what carries the manifold, at rest after its end."""

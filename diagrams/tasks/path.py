@@ -1,6 +1,7 @@
 """The path of a scenario."""
 
 import math
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Literal, cast
 
@@ -28,21 +29,29 @@ from pfsc_drake.geometry import (
     Path,
     PiecewisePolynomialCurve,
     Tolerance,
+    WaypointTable,
     find_edge,
     find_edges,
     interpolate_orientation,
+    matrix_to_quaternion,
     path_from_waypoints,
+    quaternion_to_matrix,
     read_waypoints,
+    rotation_to_axis,
 )
+from pfsc_drake.geometry.files.unit import Unit
 from pfsc_drake.geometry.paths.path_warnings import far_waypoints, turning_back
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION
+from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION, rotation_vector_to_quaternion
 from pfsc_drake.geometry.surfaces.surface import Surface
 
-_GIVE_ORIENTATION = (
-    "give the orientation too: columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
-    "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
-)
+_KEYFRAMES = "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
+
+
+def _give_orientation(path: Path) -> str:
+    """Return how a path gets an orientation."""
+    columns = "columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
+    return f"give the orientation too: {columns if path.waypoints else ''}{_KEYFRAMES}"
 
 
 def make_path(
@@ -72,15 +81,16 @@ def make_path(
         path = Path(position, _orientation(parameters.orientation, position, smoothness))
     task = parameters.orientation.task
     if task == "none" and path.orientation is not None:
-        path = Path(path.position, waypoints=path.waypoints)
+        path = Path(path.position, waypoints=path.waypoints, notes=path.notes)
     if task in ("tool_axis", "yaw") and path.orientation is None:
         raise InputError(
-            f"path.orientation.task = {task}: the path has no orientation; {_GIVE_ORIENTATION}"
+            f"path.orientation.task = {task}: the path has no orientation; "
+            f"{_give_orientation(path)}"
         )
     if parameters.orientation.jacobian == "analytic" and path.orientation is None:
         raise InputError(
             f"path.orientation.jacobian = analytic: the path has no orientation; "
-            f"{_GIVE_ORIENTATION}"
+            f"{_give_orientation(path)}"
         )
     path.require_smoothness(smoothness, f"the law '{law}'")
     return path
@@ -117,7 +127,7 @@ def require_orientation(path: Path, task: str, num_joints: int) -> None:
             ways.append("for a position only write path.orientation.task: none")
         raise InputError("; ".join([said, *ways]))
     if num_joints > 3 and path.orientation is None and task != "none":
-        ways = [_GIVE_ORIENTATION, "if none is meant, write path.orientation.task: none"]
+        ways = [_give_orientation(path), "if none is meant, write path.orientation.task: none"]
         if num_joints != 6:
             hold = f"hold {num_joints - 3} of them: robot.fixed_joints: {{NAME: VALUE}}"
             ways[-1] += f", or {hold}"
@@ -132,7 +142,10 @@ def _through_waypoints(
     progress: Progress | None,
 ) -> Path:
     keyframes = parameters.orientation.keyframes
-    table = read_waypoints(folder / shape.file, progress)
+    table = read_waypoints(folder / shape.file, progress, cast(Unit, shape.unit))
+    if table.yaw_alone:
+        table = _with_tilt(table, parameters.orientation, shape.file)
+        keyframes = []
     if keyframes and table.quaternions is not None:
         raise InputError(
             f"path.orientation.keyframes: {len(keyframes)} given, and {shape.file} has columns "
@@ -154,6 +167,9 @@ def _through_waypoints(
         )
     except InputError as error:
         hint = far_waypoints(table.positions)
+        if hint is None and len(table.positions) == 2:
+            start, end = (np.round(point, 6).tolist() for point in table.positions)
+            hint = f"for a straight line write path.shape: !Line {{start: {start}, end: {end}}}"
         if hint is None and 2 < len(table.positions) < smoothness_made + 2:
             hint = (
                 f"add waypoints to {shape.file}, or write path.shape.corner_distance (m) for "
@@ -162,11 +178,37 @@ def _through_waypoints(
         # a path of straight lines says itself where it turns
         if hint is None and not (shape.corner_distance or shape.tolerance):
             hint = turning_back(table.positions)
-        raise InputError("; ".join(filter(None, [str(error), hint]))) from None
+        said = str(error)
+        # keys name themselves
+        place = "" if said.startswith("path.") else f"{shape.file}: "
+        raise InputError("; ".join(filter(None, [f"{place}{said}", hint]))) from None
     if not keyframes:
         return path
     orientation = _orientation(parameters.orientation, path.position, smoothness)
-    return Path(path.position, orientation, waypoints=path.waypoints)
+    return Path(path.position, orientation, waypoints=path.waypoints, notes=path.notes)
+
+
+def _with_tilt(
+    table: WaypointTable, orientation: OrientationParameters, file: str
+) -> WaypointTable:
+    """Return waypoints whose turn alone is given, with the tilt that a keyframe gives."""
+    if orientation.task not in ("yaw", "none"):
+        raise InputError(
+            f"{file}: column yaw alone, with path.orientation.task = {orientation.task}; roll and "
+            "pitch besides, or path.orientation.task: yaw, are required"
+        )
+    if len(orientation.keyframes) > 1:
+        raise InputError(
+            f"path.orientation.keyframes: {len(orientation.keyframes)} given, and {file} has a "
+            "column of yaw; at most one, the tool's tilt, is allowed"
+        )
+    assert table.quaternions is not None
+    half = np.arctan2(table.quaternions[:, 3], table.quaternions[:, 0])
+    axis = rotation_to_axis(orientation.yaw_axis)[:, 0]
+    turns = quaternion_to_matrix(rotation_vector_to_quaternion(2.0 * half[:, None] * axis))
+    angles = [keyframe.angles_deg for keyframe in orientation.keyframes] or [[0.0, 0.0, 0.0]]
+    tilt = quaternion_to_matrix(EULER_TO_QUATERNION[orientation.convention](np.deg2rad(angles))[0])
+    return replace(table, quaternions=matrix_to_quaternion(turns @ tilt), yaw_alone=False)
 
 
 def _position(shape: BentLemniscate | Circle | Line) -> Curve:

@@ -1,6 +1,7 @@
 """The path of a scenario, where it lies on the scenario's surface."""
 
 from pathlib import Path as FilePath
+from typing import cast
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from diagrams.tasks.surface import given_quaternion, make_surface, normal_offset
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Curve, OrientationCurve, Path, read_waypoints
+from pfsc_drake.geometry.files.unit import Unit
 from pfsc_drake.geometry.path_on_surface import (
     curve_through,
     normal_orientation,
@@ -74,17 +76,21 @@ def make_path_on_surface(
             "write thetas: [[theta_1, theta_2], ..] or file: NAME"
         )
     try:
-        surface = make_surface(parameters.shape, law, folder, progress).surface
+        made = make_surface(parameters.shape, law, folder, progress)
     except InputError as error:
         raise InputError(f"surface.shape: {error}") from None
+    surface, notes = made.surface, made.notes
     thetas = np.array(shape.thetas)
     try:
         if shape.file:
-            positions = read_waypoints(folder / shape.file, progress).positions
-            thetas = project_waypoints(surface, positions, shape.max_distance, closed=shape.closed)
+            table = read_waypoints(folder / shape.file, progress, cast(Unit, shape.unit))
+            notes = (*notes, *table.notes)
+            thetas = project_waypoints(
+                surface, table.positions, shape.max_distance, closed=shape.closed
+            )
         curve = curve_through(surface, thetas, smoothness=smoothness, closed=shape.closed)
         orientation = _orientation(parameters.orientation, surface, curve, smoothness)
-        path = path_on_surface(surface, curve, orientation)
+        path = path_on_surface(surface, curve, orientation, notes)
     except InputError as error:
         raise InputError(f"path.shape: {error}") from None
     path.require_smoothness(smoothness, f"the law '{law}'")

@@ -1,6 +1,6 @@
 """Surfaces of a scenario: from shapes and from files."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any, Literal, cast
 
@@ -27,13 +27,14 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import interpolate
+from pfsc_drake.geometry.files.unit import Unit
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION
 from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, surface_of_revolution
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
-from pfsc_drake.geometry.surfaces.point_file import Unit, read_profile, read_surface_points
+from pfsc_drake.geometry.surfaces.point_file import read_profile, read_surface_file
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered
 from pfsc_drake.geometry.surfaces.shapes import (
     Pair,
@@ -56,10 +57,12 @@ class MadeSurface:
     Attributes:
         surface: The surface.
         fit: Where the points stand, or None.
+        notes: Sentences on what of a file was ignored.
     """
 
     surface: Surface
     fit: Residuals | None = None
+    notes: tuple[str, ...] = ()
 
 
 def make_surface(
@@ -200,6 +203,8 @@ def _pair(values: object) -> Pair:
     return float(first), float(last)
 
 
+# times the distance of points, from which on a place without any is a hole
+_HOLE = 2.0
 # how many times further apart neighbours are where a row ends unseen
 _JUMP = 3.0
 
@@ -223,10 +228,12 @@ def surface_from_file(
     if isinstance(shape, Fitted):
         file = _file_of(shape, folder)
         tell(0.0, f"reading {file.name}")
-        points = read_surface_points(file, cast(Unit, shape.unit))
+        points, notes = read_surface_file(file, cast(Unit, shape.unit))
         placed = points @ shape.rotation.T + shape.origin
         tell(0.0, f"fitting a surface to {len(points)} points")
-        return _near_grid(shape, placed, made) if shape.grid else _scattered(shape, placed, made)
+        fitted = _near_grid if shape.grid else _scattered
+        found = fitted(shape, placed, made)
+        return replace(found, notes=(*notes, *found.notes))
     rotation = shape.rotation
     profile = profile_from_file(shape, smoothness, folder)
     if isinstance(shape, Revolved):
@@ -330,4 +337,12 @@ def _scattered(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurfac
         trim=shape.trim,
     )
     fit = fit_scattered(points, options)
-    return MadeSurface(fit.surface, fit.residuals)
+    notes: tuple[str, ...] = ()
+    if fit.hole > _HOLE * fit.spacing:
+        place = ", ".join(f"{value:.4g}" for value in fit.hole_at)
+        notes = (
+            f"{shape.file}: no point within {1e3 * fit.hole:.3g} mm of [{place}] m, others are "
+            f"{1e3 * fit.spacing:.3g} mm apart: the surface bridges that hole; largest_hole (m) "
+            "refuses it",
+        )
+    return MadeSurface(fit.surface, fit.residuals, notes)

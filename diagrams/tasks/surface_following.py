@@ -84,7 +84,7 @@ class SurfaceTask(Task):
             self.surface, self.relative_degree, given_quaternion(parameters.orientation)
         )
         self.shape: SurfaceReport = surface_report(self.surface)
-        self.warnings: list[str] = []
+        self.warnings = list(made.notes)
         self.motion = _motion(reference)
         self._start = self._find_start()
         self.warnings += self._euler_warnings()

@@ -137,7 +137,7 @@ def plan_waiting(
     try:
         step, course = planner.course(COURSE_STEP, approach.reference(task, law, start))
     except InputError as error:
-        raise InputError(f"obstacles: the course of the reference is {error}") from None
+        raise InputError(f"obstacles: the reference cannot be followed: {error}") from None
     allowed_demand = planner.allowed(course, watch.reserve)
     joints = JointCourse(step, course, planner.demand, allowed_demand)
     order = law.linearization.relative_degree

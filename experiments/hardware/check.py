@@ -1,5 +1,6 @@
 """What is checked of a robot before anything moves."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ from pfsc_drake.errors import InputError
 
 AT_REST = 0.01  # rad/s or m/s
 AT_START = 0.02  # rad or m
-_LISTENED = 0.5  # s
+FOREIGN = "another sender commands the robot"
+_LISTENED, _FOREIGN = 0.5, 0.1  # s
 
 
 def check_first(status: RobotStatus, mode: ControlMode, start: np.ndarray) -> None:
@@ -80,6 +82,26 @@ def check_joints(status: RobotStatus, count: int) -> None:
     """
     if len(status.q) != count:
         raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {count}")
+
+
+def check_alone(end: ControllerEnd) -> None:
+    """Refuse a robot that another sender commands.
+
+    Args:
+        end: The link.
+
+    Raises:
+        InputError: If commands are heard within 0.1 s that were not sent from here.
+    """
+    end.receive(0.0)  # what came while nobody listened
+    end.foreign, until = 0, time.monotonic() + _FOREIGN
+    while (left := until - time.monotonic()) > 0.0:
+        end.receive(left)
+    if end.foreign:
+        raise InputError(
+            f"{FOREIGN}: {end.foreign} commands on {end.dialect.command_channel} within "
+            f"{_FOREIGN:g} s; end the other sender first"
+        )
 
 
 def listen(end: ControllerEnd, period: float) -> RobotStatus:

@@ -16,7 +16,7 @@ from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.scenario.schema import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
-from experiments.hardware.check import check_ready, listen
+from experiments.hardware.check import FOREIGN, check_alone, check_ready, listen
 from experiments.hardware.drive import Drive
 from experiments.hardware.drive_options import DriveOptions, command_mode
 from experiments.hardware.native_project import PRIORITY, check_native, write_native
@@ -35,7 +35,7 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.yaml.reading import resolve_files
 from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.folder import check_folder, open_results
-from reporting.processes import noticed_interruption
+from reporting.interruption import noticed_interruption
 from reporting.progress import ProgressListener
 
 _FIRST_STATUS = 5.0  # s
@@ -118,7 +118,8 @@ def check_scenario(
     mode = command_mode(station)
     check_mode(mode, end.dialect.modes, end.dialect.name)
     check_ready(status, mode, believed.dimension)
-    with noticed_interruption() as interrupted, real_time_priority():
+    check_alone(end)
+    with steady_clock(), noticed_interruption() as interrupted, real_time_priority():
         moved = move_slowly(end, believed, status, degrees, mode, period, interrupted, progress)
     # friction bears what it likes of a load at rest, where something moved instead
     at_rest = status.torque * (np.nan if len(moved.q) else 1.0)
@@ -186,6 +187,7 @@ def drive_scenario(
             f"no status of a robot on {end.dialect.status_channel} within {_FIRST_STATUS:g} s; "
             "is its driver running, on the same --lcm and --driver?"
         )
+    check_alone(end)
     first = drive.begin(status)
     if dry_run is not None:
         dry_run(FirstCommand(drive.mode.name or "", first))
@@ -204,6 +206,9 @@ def drive_scenario(
         if project is None or address is None:
             with steady_clock(), real_time_priority():
                 result = run_drive(drive, end, options, duration, interrupted, progress, asked)
+            if end.foreign:
+                count = f"{end.foreign} commands on {end.dialect.command_channel}"
+                prepared.warnings.append(f"{FOREIGN}: {count} were not sent by this controller")
         else:
             operator = Operator(
                 RequestEnd(DrakeLcm(url)), asked, drive.override, drive.fastest_pace
@@ -262,6 +267,8 @@ def run_drive(
             drive.heed(request)
         if interrupted():
             drive.stop("interrupted")
+        if end.foreign:
+            drive.stop(FOREIGN)
         if status is None:
             drive.lose(f"no status of the robot for {1e3 * options.silence:.0f} ms")
             break

@@ -6,7 +6,7 @@ import sys
 import termios
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Pause, Request
 
@@ -70,4 +70,5 @@ def pressed_keys() -> Iterator[Callable[[], str]]:
         tty.setcbreak(descriptor)
         yield read
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # of a terminal that has closed
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

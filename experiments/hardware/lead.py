@@ -14,6 +14,7 @@ from diagrams.signal_log import add_log
 from diagrams.station_parts import make_task
 from diagrams.surroundings.channel_end import ChannelEnd
 from diagrams.surroundings.leader import Leading, add_leader
+from experiments.finished_run import steady_clock
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.control.teleoperation.port import RECORD
@@ -83,11 +84,12 @@ def lead_scenario(
     tell("leading; waiting for a follower")
     simulator.Initialize()
     heard = False
-    for time in np.arange(_LOOK, lasts + _LOOK / 2.0, _LOOK):
-        simulator.AdvanceTo(min(float(time), lasts))
-        if end.received and not heard:
-            heard = True
-            tell(f"t = {time:.1f} s: a follower is there")
+    with steady_clock():
+        for time in np.arange(_LOOK, lasts + _LOOK / 2.0, _LOOK):
+            simulator.AdvanceTo(min(float(time), lasts))
+            if end.received and not heard:
+                heard = True
+                tell(f"t = {time:.1f} s: a follower is there")
     _, signals = log.read(simulator.get_context())
     record = signals["leader_record"]
     return Led(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.hardware.check import FOREIGN
 from pfsc_drake.errors import InputError
 
 _MAGIC = b"PFSCDRV1"
@@ -22,6 +23,7 @@ class Event(enum.IntFlag):
     ALONE = 2
     UNRECORDED = 4
     ASKED = 8
+    FOREIGN = 16
 
 
 # why the controller stops then
@@ -30,6 +32,7 @@ STOPS = {
     Event.ALONE: "who started the controller is gone",
     Event.UNRECORDED: "its record could not be written",
     Event.ASKED: "asked to stop",
+    Event.FOREIGN: FOREIGN,
 }
 
 

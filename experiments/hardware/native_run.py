@@ -120,13 +120,15 @@ def run_native(
     record.unlink(missing_ok=True)
     bus = [address.address, str(address.port), str(address.ttl)]
     words = [*bus, repr(duration), str(record.resolve()), repr(operator.override)]
-    # its standard input is open for as long as this process is there
+    # its standard input is open for as long as this process is there, and a terminal interrupts
+    # this process alone, which says then what the loop is to do
     with subprocess.Popen(
         [str(project.program.resolve()), *words],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         bufsize=0,
+        process_group=0,
     ) as loop:
         try:
             said = _watch(loop, interrupted, progress, operator)
@@ -157,7 +159,7 @@ def _watch(
         while True:
             if interrupted() and not told:
                 told = True
-                loop.send_signal(signal.SIGINT)
+                loop.send_signal(signal.SIGTERM)
             asked = operator.lines()
             if asked:
                 with suppress(BrokenPipeError):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.lcm import DrakeLcm
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
@@ -15,11 +16,12 @@ from experiments.simulation import configure
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import DriverOptions, DriverRules
 from pfsc_drake.drivers.link import RobotEnd
-from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotStatus
+from pfsc_drake.drivers.messages import ControlMode, Dialect, RobotCommand, RobotStatus
 from pfsc_drake.physics.velocity_servo import joint_inertia
 from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6
+_REHEARSED = 20  # ticks
 _MOST_LATE = 10_000  # ticks by which commands come later
 
 
@@ -128,6 +130,24 @@ class SimulatedRobot:
 
     def _is_lost(self) -> bool:
         return self._transport.lose > 0.0 and self._random.random() < self._transport.lose
+
+
+def rehearse(
+    station: RobotStation, settings: Scenario, dialect: Dialect, options: DriverOptions
+) -> None:
+    """Make the first ticks of a robot while nobody waits: they take longer than its period.
+
+    Args:
+        station: The robot.
+        settings: Its scenario.
+        dialect: Its messages, which go nowhere.
+        options: How the driver treats commands.
+    """
+    end = RobotEnd(DrakeLcm("memq://"), dialect)
+    robot = SimulatedRobot(station, settings, end, options, Transport())
+    for _ in range(_REHEARSED):
+        robot.tell()
+        robot.advance()
 
 
 def run_robot(

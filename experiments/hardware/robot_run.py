@@ -4,22 +4,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robot_station import RobotStation, build_robot_station
 from diagrams.robots.arm import Arm
 from diagrams.scenario import RobotParameters, Scenario
 from diagrams.scenario.simulation import AUTO
+from experiments.finished_run import steady_clock
 from experiments.hardware.driven_run import real_time_priority
-from experiments.hardware.robot import SimulatedRobot, Transport, run_robot
+from experiments.hardware.robot import SimulatedRobot, Transport, rehearse, run_robot
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.drivers.driver_rules import DriverOptions, check_mode
 from pfsc_drake.drivers.link import RobotEnd
+from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
 from pfsc_drake.yaml.typed import load_typed
-from reporting.processes import noticed_interruption
+from reporting.interruption import noticed_interruption
 
 # for a plant that is to keep up with the clock
 _SCHEME = "runge_kutta3"
@@ -56,10 +57,10 @@ def run_robot_scenario(
             settings.simulation.integrator = _SCHEME
         station = build_robot_station(settings, folder)
     check_mode(station.mode, end.dialect.modes, end.dialect.name)
+    rehearse(station, settings, end.dialect, options)
     robot = SimulatedRobot(station, settings, end, options, transport)
     view = _View(station, settings.robot, folder, tell) if drawn else None
     q = np.rad2deg(robot.status().q)
-    tell(f"{len(q)} joints at {np.round(q, 2).tolist()} deg, {station.mode.name} mode")
     ended = None
 
     def watch(time: float) -> None:
@@ -70,7 +71,8 @@ def run_robot_scenario(
             ended = robot.rules.ended
             tell(f"t = {time:.1f} s: the driver has ended: {ended}; the joints are damped")
 
-    with noticed_interruption() as interrupted, real_time_priority() as allowed:
+    with steady_clock(), noticed_interruption() as interrupted, real_time_priority() as allowed:
+        tell(f"{len(q)} joints at {np.round(q, 2).tolist()} deg, {station.mode.name} mode")
         if not allowed:
             tell("warning: no real-time priority here; ticks may be late")
         share = run_robot(robot, interrupted, watch, duration)
@@ -91,7 +93,7 @@ class _View:
         tell: Callable[[str], None],
     ) -> None:
         assert isinstance(station.part, Arm)
-        meshcat = Meshcat(MeshcatParams(host="localhost"))
+        meshcat = hidden_meshcat()
         drawing = draw_robot(station.part.model, station.part.tool, parameters, folder)
         self._robot = RobotVisualizer(drawing.plant, drawing.parts, meshcat, 1.0)
         self._context = self._robot.CreateDefaultContext()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from experiments.hardware.check import FOREIGN
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
@@ -176,6 +177,8 @@ def move_slowly(
             break
         if interrupted():
             complaint = "interrupted"
+        elif end.foreign:
+            complaint = FOREIGN
         elif status.robot_mode is not RobotMode.MOVE:
             complaint = f"the robot went into mode {status.robot_mode.name}"
         elif not (np.isfinite(status.q).all() and np.isfinite(status.v).all()):

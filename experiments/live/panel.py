@@ -1,20 +1,19 @@
 """What a person sees and sets in a live session: controls, and a scene that only draws."""
 
 import enum
-import secrets
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.geometry import Meshcat
 
 from diagrams.live_view import LiveFrame, LiveView
 from diagrams.surroundings.operator import PULL, REGIONS, REQUEST, idle_controls
 from experiments.live.controls import Slider, TunedParameter
 from experiments.live.pages import Pages
-from experiments.live.server import HOST
 from pfsc_drake.control.compliance.tuned_impedance import requests_of
 from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
 
 _DEAD_ZONE = 0.12  # of a stick
 _FARTHEST = 0.3  # m, of the place to hold at from where the hand took hold
@@ -285,12 +284,3 @@ class Scene:
         self._tell("the scene was ended from outside, and begins anew")
         with suppress(RuntimeError):  # that it is ended at once, too, the next frame finds
             self._begin(frame)
-
-
-def hidden_meshcat() -> Meshcat:
-    """Return a Meshcat at an address of this machine that cannot be guessed, if there are many."""
-    own = ".".join(["127", *(str(secrets.choice(range(1, 255))) for _ in range(3))])
-    try:
-        return Meshcat(MeshcatParams(host=own, port=0))
-    except RuntimeError:
-        return Meshcat(MeshcatParams(host=HOST, port=0))

@@ -124,7 +124,7 @@ def _handler(
 
         def do_POST(self) -> None:
             # what is not read must not be taken for the next request
-            self.close_connection = True
+            is_last, self.close_connection = self.close_connection, True
             if self._is_a_stranger(self.headers.get("Origin", "")):
                 return
             size = self.headers.get("Content-Length", "")
@@ -138,7 +138,7 @@ def _handler(
                 self._answer(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, text=f"allowed: {_LONGEST} bytes")
             else:
                 content = self.rfile.read(int(size))
-                self.close_connection = False
+                self.close_connection = is_last
                 self._hear(content)
 
         def _hear(self, content: bytes) -> None:

@@ -1,6 +1,5 @@
 """From a scenario to a live session, and how it ended."""
 
-import signal
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +15,8 @@ from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.operator_hand import LiveHandParameters
 from pfsc_drake.yaml.typed import load_typed
-from reporting.processes import noticed_interruption
+from reporting.interruption import noticed_interruption
 
-# s, of one take
-DURATION = 600.0
 # what a written hand and a live one have in common
 _HAND = ("stiffness", "damping", "rotational_damping", "force_limit", "torque_limit")
 
@@ -57,7 +54,8 @@ def run_live(
         scenario: The scenario as read; its written hand, if any, gives way to the person's.
         out: Folder in which takes get folders of their own.
         port: Port of the page; 0 for any that is free.
-        duration: Simulated time after which the session ends [s]; by default DURATION.
+        duration: Simulated time after which the session ends [s]; by default
+            LONGEST_SESSION or what the memory allows.
         figures: Whether takes get figures.
         recording: Whether takes get a recording.
         tell: Told in words what is prepared, happens, and is written.
@@ -74,16 +72,13 @@ def run_live(
     status, pages = LiveStatus(scenario.name), Pages()
     server = PageServer(port, lambda: status.content() | {"lead": pages.leader}, pages.hear)
     with closing(server):
-        prepared = prepare(
-            guided, duration or DURATION, recording=True, progress=progress, live=True
-        )
+        prepared = prepare(guided, duration, recording=True, progress=progress, live=True)
         output = Output(folders, figures=figures, recording=recording)
         session = LiveSession(prepared, scenario.name, pages, status, output, tell)
         for warning in prepared.warnings:
             tell(f"warning: {warning}")
         tell(f"open {server.url}")
-        # a terminal that closes, too, leaves time to keep what was done
-        with noticed_interruption(signal.SIGTERM, signal.SIGHUP) as interrupted:
+        with noticed_interruption() as interrupted:
             session.run(interrupted, progress)
             return LiveOutcome(session.kept, session.fault, interrupted(), session.end)
 

@@ -30,7 +30,7 @@ from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Pause, Request
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 from pfsc_drake.yaml.typed import load_typed
-from reporting.processes import noticed_interruption
+from reporting.interruption import noticed_interruption
 
 _FRAME = 0.04  # s
 _FIRST = 5.0  # s

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pfsc_drake.errors import InputError, nearest_file, suggestion
 from pfsc_drake.yaml.reading import find_status
+from reporting.hdf5_reading import opened
 from reporting.registry import SIGNALS, KnownSignal
 
 FloatArray = NDArray[np.float64]
@@ -167,16 +168,12 @@ class RunLog:
         if status is None or not stat.S_ISREG(status.st_mode):
             hint = nearest_file(path) or nearest_file(path.parent)
             raise InputError(f"{path}: no such file; allowed: the log of a run (HDF5){hint}")
-        try:
-            with h5py.File(path, "r") as file:
-                signals = {
-                    name: _read_signal(dataset) for name, dataset in file.items() if name != "t"
-                }
-                attributes = {name: str(value) for name, value in file.attrs.items()}
-                return cls(file["t"][:], signals, attributes)
-        except (OSError, KeyError, ValueError) as error:
-            reason = " ".join(str(error).split())
-            raise InputError(f"{path}: not a readable run log (HDF5 with 't'): {reason}") from None
+        with opened(path, "run log (HDF5 with 't')") as content:
+            datasets = dict(content.datasets())
+            time = datasets.pop("t")[:]
+            signals = {name: _read_signal(dataset) for name, dataset in datasets.items()}
+            attributes = {name: str(value) for name, value in content.file.attrs.items()}
+            return cls(time, signals, attributes)
 
     def _check(self, name: str, signal: Signal) -> None:
         """Refuses a signal whose number of samples is not that of the time axis."""

@@ -17,7 +17,8 @@ from experiments.scenario_file import ScenarioFile
 from experiments.sweep.worker import DIED, FAILED, RunRow, RunTask, program_revision, run_task
 from pfsc_drake.errors import InputError, shortened
 from reporting import processes
-from reporting.processes import local_cluster, noticed_interruption
+from reporting.interruption import noticed_interruption
+from reporting.processes import local_cluster
 from reporting.terminal import one_line
 
 if TYPE_CHECKING:

@@ -35,9 +35,9 @@ from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import ResultsFolder, check_folder, open_results
+from reporting.interruption import noticed_interruption
 from reporting.metrics import Metrics
 from reporting.page import report_page, write_report
-from reporting.processes import noticed_interruption
 from reporting.progress import CountDisplay
 from reporting.provenance import standard_attributes
 

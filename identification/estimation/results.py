@@ -40,6 +40,7 @@ from identification.model.base import BaseParameters
 from identification.options import write_bytes
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import read_regular_file
+from reporting.hdf5_reading import opened
 
 FILE_NAME = "identification.h5"
 _MOTION = {"q": "q", "v": "v", "a": "a", "torque_variance": "tau", "mean_torque_variance": "tau"}
@@ -107,15 +108,10 @@ def load_estimate(path: str | Path) -> StoredIdentification:
     Raises:
         InputError: If the file cannot be read or is not such a file.
     """
-    content = BytesIO(read_regular_file(path, "HDF5"))
-    try:
-        with h5py.File(content, "r") as file:
-            return _read(file)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except (OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path}: no readable {FILE_NAME}: {reason}") from None
+    read_regular_file(path, "HDF5")
+    with opened(Path(path), FILE_NAME) as content:
+        content.check()
+        return _read(content.file)
 
 
 def _write(file: h5py.File, estimate: Estimate) -> None:

@@ -29,6 +29,7 @@ from identification.measurement.synchronization import check_velocities
 from identification.options import write_bytes
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers, read_regular_file, unreadable
+from reporting.hdf5_reading import opened
 
 _HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 _PERIOD = re.compile(r"#\s*period\s*\[s\]\s*=\s*(\S+)\s*")
@@ -156,21 +157,17 @@ def _number(value: Any, where: str) -> float:
 
 def _read_hdf5(path: Path) -> Raw:
     read_regular_file(path, "HDF5")
-    try:
-        with h5py.File(path, "r") as file:
-            period = file.attrs.get("period")
-            signals = [
-                RawSignal(
-                    name,
-                    _numbers(dataset[()], f"{path}, {name}"),
-                    _words(dataset.attrs.get("unit")),
-                    _words(dataset.attrs.get("labels")),
-                )
-                for name, dataset in file.items()
-                if isinstance(dataset, h5py.Dataset)
-            ]
-    except OSError:
-        raise unreadable(path, "HDF5", "not an HDF5 file") from None
+    with opened(path, "HDF5 file") as content:
+        period = content.file.attrs.get("period")
+        signals = [
+            RawSignal(
+                name,
+                _numbers(dataset[()], f"'{name}'"),
+                _words(dataset.attrs.get("unit")),
+                _words(dataset.attrs.get("labels")),
+            )
+            for name, dataset in content.datasets()
+        ]
     return signals, None if period is None else _number(period, f"{path}, period")
 
 

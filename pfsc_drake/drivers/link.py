@@ -27,6 +27,8 @@ from pfsc_drake.drivers.remote_values import (
 
 # a queue hands over some of what has come; more rounds are made while there is more
 _MOST_ROUNDS = 100
+# commands that are told from those of others, as they come back from the bus
+_RECENT = 1000
 # what decoding something else raises; it is as good as lost
 _UNREADABLE = (ValueError, AttributeError, IndexError, struct.error)
 
@@ -99,13 +101,16 @@ class ControllerEnd(_End, RequestEnd):
 
     Attributes:
         wrench: What the force sensor told last, shape (6,) [N, Nm], or None.
+        foreign: Number of commands of other senders that were heard.
     """
 
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
         _End.__init__(self, lcm, dialect)
         RequestEnd.__init__(self, lcm)
         self.wrench: np.ndarray | None = None
+        self.foreign, self._sent = 0, dict[bytes, None]()
         self._listen(dialect.status_channel)
+        lcm.Subscribe(dialect.command_channel, self._compare)
         lcm.Subscribe(FORCE_TORQUE_CHANNEL, self._keep_wrench)
 
     def receive(self, timeout: float) -> RobotStatus | None:
@@ -132,7 +137,15 @@ class ControllerEnd(_End, RequestEnd):
         Args:
             command: The command.
         """
-        self.lcm.Publish(self.dialect.command_channel, self.dialect.encode_command(command))
+        data = self.dialect.encode_command(command)
+        self._sent[data] = None
+        if len(self._sent) > _RECENT:
+            del self._sent[next(iter(self._sent))]
+        self.lcm.Publish(self.dialect.command_channel, data)
+
+    def _compare(self, data: bytes) -> None:
+        """Count a command on the bus that is none of those sent from here."""
+        self.foreign += bytes(data) not in self._sent
 
     def _keep_wrench(self, data: bytes) -> None:
         with suppress(*_UNREADABLE):

@@ -167,7 +167,7 @@ def _joint_speed(scene: FaultScene) -> str:
     q, posture = _posture(scene)
     nearly = posture.rcond < _NEARLY and i in posture.free_joints
     return f"joint {i + 1} '{robot.names[i]}' moves at {found}/s of {limit}/s {_place(scene)}" + (
-        f"; {_singularity(scene, q, posture, 'nearly singular')}" if nearly else ""
+        f"; {describe_singularity(scene.robot, q, posture, 'nearly singular')}" if nearly else ""
     )
 
 
@@ -225,7 +225,7 @@ def _singular(scene: FaultScene) -> str:
     if _is_map_singular(A, posture):
         bend = _bend(scene)
         return f"{Fault.SINGULAR.explanation} {_place(scene)}: {_map_state(scene)}{beside}{bend}"
-    return _singularity(scene, q, posture, f"singular {_place(scene)}") + beside
+    return describe_singularity(scene.robot, q, posture, f"singular {_place(scene)}") + beside
 
 
 def _posture(scene: FaultScene) -> tuple[np.ndarray, SingularPosture]:
@@ -243,14 +243,23 @@ def _posture(scene: FaultScene) -> tuple[np.ndarray, SingularPosture]:
     return q, posture
 
 
-def _singularity(scene: FaultScene, q: np.ndarray, posture: SingularPosture, how: str) -> str:
-    """Return what of the robot is singular, through which joints, and which can move."""
+def describe_singularity(
+    robot: RobotModel, q: np.ndarray, posture: SingularPosture, how: str
+) -> str:
+    """Return which part of a robot is singular, through which joints, and which can move.
+
+    Args:
+        robot: The robot.
+        q: Joint coordinates, shape (N,).
+        posture: How close to singular they are.
+        how: How and where, after the part's name.
+    """
     name = None
-    if isinstance(scene.robot, SerialChain):
-        name = singularity_name(scene.robot, q, posture)
+    if isinstance(robot, SerialChain):
+        name = singularity_name(robot, q, posture)
     free = listed(f"q_{i + 1}" for i in posture.free_joints)
     return (
-        f"{name or 'robot'} {how}: {posture_text(scene.robot, q, posture.causing_joints)} "
+        f"{name or 'robot'} {how}: {posture_text(robot, q, posture.causing_joints)} "
         f"({free} can move without the tool)"
     )
 

@@ -12,6 +12,7 @@ from pfsc_drake.control.compliance.tuned_impedance import (
 )
 from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.linearization import FASTEST_DAMPING
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
@@ -27,9 +28,6 @@ from pfsc_drake.yaml.typed import spread
 _BORNE_ERROR = 0.05
 # rad per sampling interval, up to which the exact elastic law keeps its accuracy
 _FASTEST_RESONANCE = 1.0
-# K_s epsilon D_b T_s / D_M, up to which the damping (3.71) only damps; sampled, it is unstable
-# from 2 on. Six axes of pfc_comau_6r leave the path by 0.41 mm at 1.56, by 0.06 mm at 0.3
-_FASTEST_DAMPING = 0.3
 # m per m/s^2, from which on joints are soft for laws that take them for stiff. Of the arms of
 # `experiments study`, the errors that linear theory tells as 5, 0.36 and 0.08 are 1.1, 0.2 and
 # 0.07 mm at accelerations up to 2 m/s^2; where it tells that the loop is unstable, they are 90 mm
@@ -71,7 +69,7 @@ def _fast_resonance(
     if resonance * period <= _FASTEST_RESONANCE:
         return []
     return [
-        f"the joints resonate at up to {resonance / (2.0 * np.pi):.0f} Hz, "
+        f"the joints resonate at up to {resonance / (2.0 * np.pi):.3g} Hz, "
         f"{resonance * period:.2f} rad per sampling interval; above "
         f"{_FASTEST_RESONANCE:g} rad the law 'elastic' loses accuracy and then "
         "oscillates: sample faster, or take the law 'visco_elastic' or 'singular_perturbation'"
@@ -109,10 +107,10 @@ def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[s
     # rigid joints among elastic ones have nothing to damp
     stiffness = np.where(robot.elastic_joints, robot.K_s, 0.0)
     rate = float(np.max(stiffness * damping * parameters.sampling_time / robot.D_M))
-    if rate <= _FASTEST_DAMPING * (1.0 + 1e-9):
+    if rate <= FASTEST_DAMPING * (1.0 + 1e-9):
         return []
     return [
-        f"K_s epsilon D_b T_s / D_M is up to {rate:.2f}; above {_FASTEST_DAMPING:g} the "
+        f"K_s epsilon D_b T_s / D_M is up to {rate:.2f}; above {FASTEST_DAMPING:g} the "
         "damping of the joint torques takes the tool off the path, and from 2 on, being sampled, "
         "it oscillates: lower controller.boundary_layer_damping or sample faster"
     ]
@@ -143,13 +141,13 @@ def _soft_joints(
     instead = "take the law 'elastic' or 'visco_elastic'"
     if np.isinf(softness):
         return [
-            f"the joints resonate at {resonance:.0f} Hz, and the law '{parameters.law}' with "
+            f"the joints resonate at {resonance:.3g} Hz, and the law '{parameters.law}' with "
             f"these gains is unstable on joints that soft: {instead}, or slower gains"
         ]
     if softness <= _LARGEST_SOFTNESS:
         return []
     return [
-        f"the joints resonate at {resonance:.0f} Hz; the law '{parameters.law}' {what}, by up to "
+        f"the joints resonate at {resonance:.3g} Hz; the law '{parameters.law}' {what}, by up to "
         f"{1e3 * softness:.2g} mm for each m/s^2 of its acceleration: {instead}"
     ]
 

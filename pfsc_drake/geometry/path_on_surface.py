@@ -119,7 +119,10 @@ class SurfaceNormalFrame:
 
 
 def path_on_surface(
-    surface: Surface, parameters: Curve, orientation: OrientationCurve | None = None
+    surface: Surface,
+    parameters: Curve,
+    orientation: OrientationCurve | None = None,
+    notes: tuple[str, ...] = (),
 ) -> Path:
     """Return a path on a surface whose transversal coordinates are normal and sideways.
 
@@ -129,12 +132,13 @@ def path_on_surface(
         surface: Surface of class C^2 or better.
         parameters: Curve in its parameters, of dimension 2.
         orientation: Quaternions over the same parameter, or None.
+        notes: Sentences on what of a file was left out.
 
     Raises:
         InputError: The curve leaves the surface, is no curve in its parameters, or not regular.
     """
     curve = CurveOnSurface(surface, parameters)
-    return Path(curve, orientation, frame=SurfaceNormalFrame(curve))
+    return Path(curve, orientation, frame=SurfaceNormalFrame(curve), notes=notes)
 
 
 def _with_seams(surface: Surface, parameters: Curve) -> np.ndarray:
@@ -205,11 +209,11 @@ def project_waypoints(
         try:
             foot = projector.project(position)
         except InputError as error:
-            raise InputError(f"waypoint {row} (from 0): {error}") from None
+            raise InputError(f"waypoint {row + 1}: {error}") from None
         if foot.distance > farthest:
             beside = ", beside its border" if foot.at_border else ""
             raise InputError(
-                f"waypoint {row} (from 0): {position.tolist()} m is {1e3 * foot.distance:.3g} mm"
+                f"waypoint {row + 1}: {position.tolist()} m is {1e3 * foot.distance:.3g} mm"
                 f" from the surface{beside}; at most {1e3 * farthest:.3g} mm is allowed"
             )
         thetas[row] = foot.theta

@@ -97,6 +97,20 @@ def euler_margin(matrix: ArrayLike, convention: str) -> np.ndarray:
     return np.pi / 2.0 - np.abs(matrix_to_zyz(matrix)[..., 1] - np.pi / 2.0)
 
 
+def rotation_vector_to_quaternion(vector: ArrayLike) -> np.ndarray:
+    """Quaternion (w, x, y, z) of a rotation vector, the axis times the angle.
+
+    Args:
+        vector: [..., 3], rad.
+
+    Returns:
+        [..., 4].
+    """
+    v = np.asarray(vector, dtype=float)
+    half = np.linalg.norm(v, axis=-1, keepdims=True) / 2.0
+    return np.concatenate([np.cos(half), np.sinc(half / np.pi) * v / 2.0], axis=-1)
+
+
 def matrix_to_quaternion(matrix: ArrayLike) -> np.ndarray:
     """Unit quaternions of rotation matrices.
 

@@ -193,17 +193,19 @@ def tool_motion_function(robot: RobotModel) -> ca.Function:
 def joint_resonances(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
     """Return the undamped resonances of motors against links, see (3.69).
 
-    Their squares are the eigenvalues of ``K_s (D_E^-1(q_J) + D_M^-1)``.
+    Their squares are the eigenvalues of ``K_s (D_E^-1(q_J) + D_M^-1)`` over the elastic joints;
+    the motors of rigid ones move with the links.
 
     Args:
         robot: A robot with elastic joints.
         q_J: Joint coordinates, shape (N,).
 
     Returns:
-        Angular frequencies in increasing order [rad/s], shape (N,).
+        Angular frequencies in increasing order [rad/s], one for each elastic joint.
     """
-    D_E = np.array(mass_function(robot)(q_J))
-    compliance = np.linalg.inv(D_E) + np.diag(1.0 / robot.D_M)
+    elastic = robot.elastic_joints
+    D_E = np.array(mass_function(robot)(q_J)) + np.diag(np.where(elastic, 0.0, robot.D_M))
+    compliance = np.linalg.inv(D_E)[np.ix_(elastic, elastic)] + np.diag(1.0 / robot.D_M[elastic])
     # K^1/2 C K^1/2 has the eigenvalues of K C and is symmetric
-    root = np.sqrt(robot.K_s)
+    root = np.sqrt(robot.K_s[elastic])
     return np.sqrt(np.linalg.eigvalsh(root[:, None] * compliance * root))

@@ -112,6 +112,8 @@ def _resolved(name: str, folder: Path) -> str:
 TAG_KEY = "_tag"
 MAX_NODES = 100_000
 MAX_DEPTH = 100
+_LONGEST_NUMBER = 100  # characters, of one to the base of 60
+_NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
 class _Loader(yaml.SafeLoader):
@@ -184,6 +186,7 @@ def parse_yaml(text: str, source: str) -> Any:
             aliases are copies, or holds characters that no name of a file can have; one line.
     """
     try:
+        _refuse_depth(text, source)
         loader, node = _composed(text)
         if node is not None:
             _NodeCheck(source).check(node)
@@ -211,6 +214,26 @@ def _composed(text: str) -> tuple[Any, yaml.Node | None]:
     except (yaml.YAMLError, ValueError):
         loader = _Loader(text)
         return loader, loader.get_single_node()
+
+
+def _refuse_depth(text: str, source: str) -> None:
+    """Count levels without building anything: libyaml builds in recursion.
+
+    Raises:
+        InputError: If there are more than MAX_DEPTH.
+    """
+    depth, line = 0, None
+    try:
+        for event in yaml.parse(text, Loader=_QuickLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > MAX_DEPTH:
+                line = event.start_mark.line + 1
+                break
+    except (yaml.YAMLError, ValueError):
+        return  # is explained by what builds it
+    if line is not None:
+        raise InputError(f"{source}: line {line}: {_TOO_DEEP}")
 
 
 def dump_yaml(data: Any) -> str:
@@ -276,6 +299,9 @@ class _NodeCheck:
         if any(character == "\0" or "\ud800" <= character <= "\udfff" for character in node.value):
             text = shortened(ascii(node.value))
             self._refuse(node, f"{text} holds a NUL or half a character; allowed: text")
+        if node.tag in _NUMBER_TAGS and ":" in node.value and len(node.value) > _LONGEST_NUMBER:
+            length = len(node.value)
+            self._refuse(node, f"a number of {length} characters; allowed: up to {_LONGEST_NUMBER}")
 
     def _refuse(self, node: yaml.Node, reason: str) -> NoReturn:
         raise InputError(f"{self._source}: line {node.start_mark.line + 1}: {reason}")

@@ -123,7 +123,7 @@ class _Checker:
             here = (*place, name)
             if name not in fields:
                 allowed = ", ".join(fields) or "no keys"
-                hint = did_you_mean(name, fields)
+                hint = _decimal_comma(value, name) or did_you_mean(name, fields)
                 what = f"unknown key '{spelled((*place, str(name)))}' = {_shown(item)}"
                 self._add(here, f"{what}: {hint}allowed: {allowed}")
             elif "words" in fields[name].metadata and isinstance(item, list):
@@ -205,6 +205,18 @@ class _Checker:
     def _add(self, place: Place, message: str) -> None:
         if len(self.misfits) < _MOST_MISFITS:
             self.misfits.append(Misfit(place, message))
+
+
+def _decimal_comma(mapping: dict[Any, Any], name: Any) -> str:
+    """Return what to write for ``{velocity: 0,3}``, where YAML reads a key 3 without value."""
+    names = list(mapping)
+    place = names.index(name)
+    if type(name) is not int or mapping[name] is not None or not place:
+        return ""
+    before = names[place - 1]
+    if type(mapping[before]) is not int:
+        return ""
+    return f"a decimal comma? write {before}: {mapping[before]}.{name} "
 
 
 def spelled(place: Place) -> str:

@@ -36,7 +36,7 @@ def test_joints_too_soft_for_the_law(scenario):
         scenario.controller.law = law
         (warning,) = warnings(scenario)
         assert "mm for each m/s^2" in warning
-        assert "resonate at 15 Hz" in warning
+        assert "resonate at 14.5 Hz" in warning
         assert "'elastic' or 'visco_elastic'" in warning
 
 

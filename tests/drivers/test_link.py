@@ -57,6 +57,22 @@ def test_the_newest_command_is_heard_once(ends):
     assert robot.hear() is None
 
 
+def test_commands_of_other_senders_are_counted(ends):
+    _, controller = ends
+    for utime in (1000, 2000):
+        controller.send(command(utime))
+    controller.receive(0.0)
+    assert controller.foreign == 0
+    other = controller.dialect.encode_command(command(2001))
+    for _ in range(3):
+        controller.lcm.Publish(controller.dialect.command_channel, other)
+    controller.receive(0.0)
+    assert controller.foreign == 3
+    controller.lcm.Publish(controller.dialect.command_channel, b"no command at all")
+    controller.receive(0.0)
+    assert controller.foreign == 4
+
+
 def test_a_wrench_comes_with_its_status_and_stays(ends):
     robot, controller = ends
     robot.tell(status(1000), WRENCH)

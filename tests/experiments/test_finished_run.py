@@ -1,8 +1,11 @@
 """From when on a run is judged."""
 
+from unittest.mock import MagicMock
+
 import numpy as np
 import pytest
 
+from experiments import finished_run
 from experiments.finished_run import converged_after
 from experiments.results.run_log import RunLog
 from tests.scenarios import shipped_scenario
@@ -26,3 +29,26 @@ def test_a_tool_that_waits_comes_to_its_path_later():
     log = RunLog(time)
     log.add("time_lost", np.maximum(time - 0.1, 0.0))
     assert converged_after(settings, log) == np.inf
+
+
+def test_a_meshcat_that_is_ended_from_outside_is_replaced(monkeypatch):
+    meshcats, ends = [], 2
+
+    def record(diagram, meshcat, duration, period):
+        meshcats.append(meshcat)
+        if len(meshcats) <= ends:
+            raise RuntimeError("the Meshcat thread has ended")
+        return "page"
+
+    monkeypatch.setattr(finished_run, "hidden_meshcat", object)
+    monkeypatch.setattr(finished_run, "build_station_replay", lambda *arguments: None)
+    monkeypatch.setattr(finished_run, "record", record)
+    prepared = MagicMock(station=MagicMock(mounting=None))
+    motion = MagicMock(times=[0.0, 1.0])
+    assert finished_run._recording(prepared, motion) == "page"
+    assert len(set(map(id, meshcats))) == 3
+    meshcats.clear()
+    ends = 3
+    with pytest.raises(RuntimeError, match="has ended"):
+        finished_run._recording(prepared, motion)
+    assert len(meshcats) == 3

@@ -1,5 +1,7 @@
 """Laws made from what a scenario says."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -184,4 +186,24 @@ def test_boundary_layer_damping_suits_the_robot(load_arm, damping):
     make(parameters, chain)
     parameters.boundary_layer_damping = damping
     with pytest.raises(InputError, match=r"boundary_layer_damping.*3 positive"):
+        make(parameters, chain)
+
+
+def test_boundary_layer_damping_that_is_offered_is_taken(load_arm):
+    poles = by_poles(-30.0, -30.0)
+    parameters = controller("singular_perturbation", poles, poles)
+    chain = load_arm("comau_racer_1_4_elastic_3r").chain
+    for period in (0.0, 1e-3, 0.02):
+        parameters.sampling_time = period
+        parameters.boundary_layer_damping = []
+        with pytest.raises(InputError, match=r"3 positive values \[s\], perhaps") as caught:
+            make(parameters, chain)
+        offered = [
+            float(x) for x in re.findall(r"perhaps \[(.*)\]", str(caught.value))[0].split(",")
+        ]
+        expected = np.sqrt(2.0 * chain.D_M / chain.K_s)
+        if period:
+            expected = np.minimum(expected, 0.3 * chain.D_M / (chain.K_s * period))
+        np.testing.assert_allclose(offered, expected, rtol=0.06)
+        parameters.boundary_layer_damping = offered
         make(parameters, chain)

@@ -60,14 +60,14 @@ def test_points_near_the_surface_are_put_on_it():
     lap = thetas[0, 0] - angle[0]
     assert abs(lap / (2.0 * math.pi) - round(lap / (2.0 * math.pi))) < 1e-12
     np.testing.assert_allclose(thetas - [lap, 0.0], np.stack([angle, height], axis=1), atol=1e-9)
-    with pytest.raises(InputError, match=r"waypoint 0 .* 0\.4 mm .* at most 0\.3 mm"):
+    with pytest.raises(InputError, match=r"waypoint 1:.* 0\.4 mm .* at most 0\.3 mm"):
         project_waypoints(TUBE, beside, 0.3e-3, closed=False)
     ring = on_tube(np.arange(12) * math.pi / 6, np.zeros(12))
     with pytest.raises(InputError, match=r"round the surface in theta_1.*leave it open"):
         project_waypoints(TUBE, ring, 1e-3, closed=True)
     with pytest.raises(InputError, match="50 mm from the surface, beside its border"):
         project_waypoints(TUBE, [on_tube(0.1, 0.55)], 1e-3, closed=False)
-    with pytest.raises(InputError, match=r"waypoint 0 .*no closest point"):
+    with pytest.raises(InputError, match=r"waypoint 1:.*no closest point"):
         project_waypoints(TUBE, [[0.0, 0.0, 0.1]], 1.0, closed=False)
 
 

@@ -15,6 +15,7 @@ from reporting.style import (
     place_legend,
     shade,
 )
+from tests.shades import shades, spans
 
 
 def overlap(labels, title):
@@ -53,11 +54,24 @@ def test_shades_where_something_holds():
     where = np.isin(np.arange(11), [0, 1, 5, 10])
     shade(panels, time, where, "holds", "red")
     for panel in panels:
-        to_data = panel.transData.inverted()
-        spans = [to_data.transform(patch.get_extents())[:, 0] for patch in panel.patches]
-        np.testing.assert_allclose(spans, [[0.0, 0.2], [0.5, 0.6], [1.0, 1.0]], atol=1e-12)
+        assert len(shades(panel)) == 1
+        drawn = spans(panel)
+        np.testing.assert_allclose(drawn, [[0.0, 0.2], [0.5, 0.6], [1.0, 1.0]], atol=1e-12)
     assert panels[0].get_legend_handles_labels()[1] == ["holds"]
     assert panels[1].get_legend_handles_labels()[1] == []
+
+
+def test_what_flickers_is_one_shade():
+    """A sample in two, for a long time, but with one gap that can be seen."""
+    _, (panel,) = make_panels(1)
+    time = np.arange(200_001) * 1e-3
+    where = np.arange(len(time)) % 2 == 0
+    where[100_000:101_000] = False
+    shade([panel], time, where, "flickers", "red")
+    np.testing.assert_allclose(spans(panel), [[0.0, 99.999], [101.0, 200.0]], atol=1e-9)
+    where[:] = False
+    shade([panel], time, where, "never", "red")
+    assert len(shades(panel)) == 1
 
 
 def test_units_that_fit():

@@ -52,3 +52,27 @@ def test_six_axes_oscillate_as_drake_says():
     squares = -np.linalg.eigvals(np.column_stack(columns)).real
     expected = np.sqrt(np.sort(squares)[6:])
     assert np.allclose(joint_resonances(chain, q), expected, rtol=1e-6)
+
+
+def test_a_rigid_joint_carries_its_rotor():
+    """Two slides in line, the first rigid: its rotor, links and the elastic one's rotor."""
+
+    def slide(mass, rotor, stiffness):
+        return ChainLink(
+            name="slide",
+            kind="prismatic",
+            R_PF=np.eye(3),
+            p_PF=np.zeros(3),
+            axis=np.array([0.0, 0.0, 1.0]),
+            mass=mass,
+            p_LC=np.zeros(3),
+            I_C=np.eye(3),
+            reflected_inertia=rotor,
+            stiffness=stiffness,
+        )
+
+    chain = SerialChain((slide(4.0, 7.0, np.inf), slide(2.0, 3.0, 120.0)))
+    # x the rigid slide, y the elastic one against it: masses of (x, y) where x moves both
+    M = np.array([[4.0 + 7.0 + 2.0, 2.0], [2.0, 2.0]])
+    expected = np.sqrt(120.0 * (np.linalg.inv(M)[1, 1] + 1.0 / 3.0))
+    np.testing.assert_allclose(joint_resonances(chain, np.zeros(2)), [expected])

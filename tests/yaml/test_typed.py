@@ -400,3 +400,14 @@ def test_a_union_of_a_class_and_its_subclass_is_a_fault_of_the_program() -> None
     # Drake reads !Circle as a Spiral here, because the default is one and thereby a Circle
     with pytest.raises(NotImplementedError, match="Spiral is a subclass"):
         load_typed(Ambiguous, {"path": {"radius": 0.2, "_tag": "!Circle"}}, "x")
+
+
+def test_a_decimal_comma_is_named():
+    """YAML reads {radius: 0,3} as a key 3 without a value."""
+    with pytest.raises(
+        InputError, match=r"unknown key '3' = empty .*: a decimal comma\? write radius: 0\.3 "
+    ):
+        load_typed(Circle, parse_yaml("{radius: 0,3}", "here"), "here")
+    with pytest.raises(InputError) as caught:
+        load_typed(Circle, parse_yaml("{radius: 0.1, 3: 4}", "here"), "here")
+    assert "comma" not in str(caught.value)

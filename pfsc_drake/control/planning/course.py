@@ -27,6 +27,20 @@ _AT_REST = 1e-9
 Projection = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
+class CourseError(InputError):
+    """Joints cannot follow a reference.
+
+    Attributes:
+        course: Joint coordinates up to where they cannot, shape (samples, N).
+        rcond: Reciprocal condition number of a singular decoupling matrix there, or None where the
+            place is not found.
+    """
+
+    def __init__(self, message: str, rcond: float | None = None) -> None:
+        super().__init__(message)
+        self.course, self.rcond = np.zeros((0, 0)), rcond
+
+
 @dataclass(frozen=True)
 class CourseStart:
     """Where a course begins.
@@ -102,7 +116,7 @@ class CourseFinder:
                 (samples, 12 (r + 1)), see :func:`frame_jets`.
 
         Raises:
-            InputError: If a place cannot be found, or is singular.
+            CourseError: If a place cannot be found, or is singular.
         """
         course = np.zeros((len(times), self._order + 1, self._n))
         q, memory = np.zeros((self._order + 1, self._n)), start.memory
@@ -117,9 +131,41 @@ class CourseFinder:
                 if still:
                     q[1:] = 0.0
                 frame = None if frames is None else frames[i]
-                memory = self._correct(q, None if still else q_0, reference[i], memory, frame)
+                led = None if still else q_0
+                try:
+                    memory = self._correct(q, led, reference[i], memory, frame)
+                except CourseError as error:
+                    error.course = np.vstack([course[:i, 0], q[0]])
+                    raise
             course[i] = q
         return course
+
+    @once_per_content(30)
+    def condition(
+        self,
+        start: CourseStart,
+        course: np.ndarray,
+        reference: np.ndarray,
+        frames: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Return the reciprocal condition number of the decoupling matrix, shape (samples,).
+
+        Args:
+            start: Where the course began.
+            course: A course, from :meth:`find`.
+            reference: That of the virtual output.
+            frames: As of the course.
+        """
+        found, memory = np.zeros(len(course)), start.memory
+        arguments, results = self._correction.arguments, self._correction.results
+        for i, (q, wanted) in enumerate(zip(course, reference, strict=True)):
+            frame = None if frames is None else frames[i]
+            arguments["derivatives"][:], arguments["wanted"][:] = q.ravel(), wanted.ravel()
+            arguments["manifold_point"][:] = point = self._place(q[0], memory, frame)
+            memory = point[self._memory].copy()
+            self._correction.evaluate()
+            found[i] = results["rcond"][0]
+        return found
 
     @once_per_content(30)
     def bare(self, start: CourseStart, course: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -194,7 +240,7 @@ class CourseFinder:
             self._correction.evaluate()
             if not results["usable"][0]:
                 rcond = results["rcond"][0]
-                raise InputError(f"singular, reciprocal condition number {rcond:.2g}")
+                raise CourseError(f"singular, reciprocal condition number {rcond:.2g}", rcond)
             step = results["led"] if led else steps[k]
             q[k] += step
             return step
@@ -204,7 +250,7 @@ class CourseFinder:
             if not np.max(np.abs(correct(0))) > _FOUND:
                 break
         else:
-            raise InputError("not reached")
+            raise CourseError("not reached")
         for k in range(1, self._order):
             correct(k)
         q[self._order] = 0.0

@@ -163,7 +163,7 @@ def check_neighbours(quaternions: np.ndarray) -> np.ndarray:
     if far.size:
         row = int(far[0])
         raise InputError(
-            f"orientation: keyframes {row} and {row + 1} (from 0) are"
+            f"orientations {row + 1} and {row + 2} are"
             f" {math.degrees(angles[row]):.1f} deg apart; at most"
             f" {math.degrees(_MAX_NEIGHBOUR_ANGLE):.0f} deg is allowed"
         )
@@ -180,7 +180,6 @@ def _normalize(q: np.ndarray) -> np.ndarray:
     if np.any(bad):
         row = int(np.argmax(bad))
         raise InputError(
-            f"quaternions: row {row} (from 0) is {q[row].tolist()};"
-            " finite values, not all zero, are required"
+            f"quaternion {row + 1}: {q[row].tolist()}; finite values, not all zero, are required"
         )
     return q / norm[:, None]

@@ -88,7 +88,7 @@ def close_polygon(points: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndar
     if np.any(chords <= tiny):
         row = int(np.argmax(chords <= tiny))
         raise InputError(
-            f"waypoints: rows {row} and {row + 1} (from 0) coincide at {points[row].tolist()};"
+            f"waypoints: {row + 1} and {row + 2} coincide at {points[row].tolist()};"
             " neighbours must differ"
         )
     return points, chords
@@ -308,7 +308,7 @@ def check_parameters(parameters: ArrayLike, count: int) -> np.ndarray:
     if np.any(bad):
         row = int(np.argmax(bad))
         raise InputError(
-            f"parameters {row} and {row + 1}: {values[row]:.9g} and {values[row + 1]:.9g};"
+            f"parameters {row + 1} and {row + 2}: {values[row]:.9g} and {values[row + 1]:.9g};"
             " they must be finite and strictly increase"
         )
     return values
@@ -320,7 +320,5 @@ def _check_waypoints(waypoints: ArrayLike) -> np.ndarray:
         raise InputError(f"waypoints: shape {points.shape}; [2 or more, dimension] is required")
     if not np.all(np.isfinite(points)):
         row = int(np.argwhere(~np.isfinite(points))[0, 0])
-        raise InputError(
-            f"waypoints: row {row} (from 0) is {points[row].tolist()}; finite values are required"
-        )
+        raise InputError(f"waypoint {row + 1}: {points[row].tolist()}; finite values are required")
     return points

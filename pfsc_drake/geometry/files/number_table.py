@@ -2,14 +2,21 @@
 
 import re
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
 
 from pfsc_drake.checks import NUMBER
-from pfsc_drake.errors import InputError, in_one_line, nearest_file, shortened, suggestion
+from pfsc_drake.errors import (
+    InputError,
+    did_you_mean,
+    in_one_line,
+    nearest_file,
+    shortened,
+    suggestion,
+)
 from pfsc_drake.geometry.progress import Progress
 
 _MAX_BYTES = 1 << 28
@@ -56,6 +63,12 @@ def unreadable(name: str | FilePath, kind: str, reason: str | None = None) -> In
 MAX_ROWS = 1_000_000
 _ROWS_PER_REPORT = 50_000
 _LARGEST = 1e12
+# in the order in which they are looked for in the names of columns; white space is the last
+_SEPARATORS = (";", "\t", "|", ",")
+_G_CODE = re.compile(r"(N\d+\s*)?G\d{1,3}(\.\d)?(\s.*)?")
+_G_CODE_BEGINS = 20  # lines
+# How near to a known name, and of how many letters, a name is a slip of the pen.
+_SLIP, _SHORTEST_SLIP = 0.75, 4
 
 
 class NumberTable(NamedTuple):
@@ -65,11 +78,29 @@ class NumberTable(NamedTuple):
         lines: Where in the file the rows stand, [n].
         header: Names of the columns, [m].
         rows: [n, m].
+        ignored: Names of further columns.
     """
 
     lines: list[int]
     header: list[str]
     rows: np.ndarray
+    ignored: list[str]
+
+    def notes(self, name: str) -> tuple[str, ...]:
+        """Sentences on what was not read.
+
+        Args:
+            name: Name of the file.
+        """
+        if not self.ignored:
+            return ()
+        columns = ", ".join(f"'{quote(label)}'" for label in self.ignored[:_MOST_NAMED])
+        more = ", .." if len(self.ignored) > _MOST_NAMED else ""
+        plural = "s" * (len(self.ignored) > 1)
+        return (f"{name}: column{plural} {columns}{more} ignored",)
+
+
+_MOST_NAMED = 6
 
 
 def read_numbers(
@@ -77,35 +108,48 @@ def read_numbers(
     what: str,
     check_header: Callable[[str, list[str]], None],
     progress: Progress | None = None,
+    known: Collection[str] | None = None,
 ) -> NumberTable:
     """Read a CSV file.
 
-    The first line that is neither empty nor a comment (#) names the columns.
+    The first line that is neither empty nor a comment (#) names the columns. Semicolons, tabs,
+    bars, commas or white space separate them; where it is no comma, numbers may have a decimal
+    comma.
 
     Args:
         name: Name of a regular file of at most 256 MiB and 1,000,000 rows.
         what: What rows are, for messages, as "waypoints".
         check_header: Refuses names of columns; told where they stand and the names.
         progress: Told the fraction read and what is done.
+        known: Columns that are read, of those that pass `check_header`; all by default.
 
     Raises:
-        InputError: The file cannot be read or is too large, has no rows or rows of different
-            lengths, or a value is not a number.
+        InputError: The file cannot be read or is too large, is G-code, has no rows or rows of
+            different lengths, or a value is not a number.
     """
     header: list[str] = []
+    columns: list[int] = []
+    separator: str | None = ","
     lines: list[int] = []
     rows: list[list[float]] = []
     for line, content, fraction in _contents(name):
-        cells = [cell.strip() for cell in content.split(",")]
         if not header:
-            header = cells
+            separator = next((mark for mark in _SEPARATORS if mark in content), None)
+            header = [cell.strip("\"'") for cell in _cells(content, separator)]
             check_header(f"{name}, line {line}", header)
+            columns = [i for i, label in enumerate(header) if known is None or label in known]
             continue
+        cells = _cells(content, separator)
         if len(cells) != len(header):
+            hint = ""
+            if separator == "," and len(cells) == 2 * len(header):
+                hint = "; numbers with a decimal comma need columns separated by semicolons"
             raise InputError(
-                f"{name}, line {line}: {len(cells)} values; {len(header)} are required"
+                f"{name}, line {line}: {len(cells)} values; {len(header)} are required{hint}"
             )
-        rows.append([_number(name, line, *item) for item in zip(header, cells, strict=True)])
+        if separator != ",":
+            cells = [cell.replace(",", ".") for cell in cells]
+        rows.append([_number(name, line, header[i], cells[i]) for i in columns])
         lines.append(line)
         if len(rows) > MAX_ROWS:
             raise InputError(
@@ -115,7 +159,21 @@ def read_numbers(
             progress(fraction, f"reading the {what}")
     if not rows:
         raise InputError(f"{name}: no {what}; a line with column names and data are required")
-    return NumberTable(lines, header, np.array(rows))
+    ignored = [label for i, label in enumerate(header) if i not in columns]
+    return NumberTable(lines, [header[i] for i in columns], np.array(rows), ignored)
+
+
+def _cells(content: str, separator: str | None) -> list[str]:
+    return [cell.strip() for cell in content.split(separator)]
+
+
+def _refuse_g_code(name: str, rows: list[str]) -> None:
+    for line, content in enumerate(rows[:_G_CODE_BEGINS], start=1):
+        if _G_CODE.fullmatch(content.strip()):
+            raise InputError(
+                f"{name}, line {line}: '{quote(content.strip())}' is G-code, which is not read; a"
+                " CSV file of points is required, whose first line names the columns"
+            )
 
 
 def read_columns(name: str, what: str, columns: list[str]) -> tuple[list[int], np.ndarray]:
@@ -138,7 +196,14 @@ def read_columns(name: str, what: str, columns: list[str]) -> tuple[list[int], n
     return table.lines, table.rows[:, [table.header.index(label) for label in columns]]
 
 
-def check_columns(place: str, header: list[str], known: list[str], required: list[str]) -> None:
+def check_columns(
+    place: str,
+    header: list[str],
+    known: list[str],
+    required: list[str],
+    *,
+    others: bool = False,
+) -> None:
     """Refuse columns that are unknown, there twice, or missing.
 
     Args:
@@ -146,6 +211,7 @@ def check_columns(place: str, header: list[str], known: list[str], required: lis
         header: Names of columns.
         known: Names that are allowed.
         required: Names that must be there.
+        others: Whether unknown names are allowed that are neither numbers nor nearly known.
 
     Raises:
         InputError: If a column is unknown, there twice, or missing.
@@ -153,9 +219,9 @@ def check_columns(place: str, header: list[str], known: list[str], required: lis
     problems = []
     for label in dict.fromkeys(header):
         if label not in known:
+            if others and not _looks_known(label, known):
+                continue
             hint = suggestion(label, known)
-            if re.search("[;\t]", label):
-                hint = "; separate columns by commas"
             if NUMBER.fullmatch(label):
                 hint = "; the first line names the columns"
             allowed = f"{', '.join(known)}{hint}"
@@ -169,9 +235,20 @@ def check_columns(place: str, header: list[str], known: list[str], required: lis
         missing = [f"'{label}'" for label in required if label not in header]
         verb = "is missing; it is required" if len(missing) == 1 else "are missing; required"
         if missing:
-            problems.append(f"column{'s' * (len(missing) > 1)} {', '.join(missing)} {verb}")
+            further = ", ".join(f"'{quote(label)}'" for label in header if label not in known)
+            there = f"; further columns are {further}" if further else ""
+            problems.append(f"column{'s' * (len(missing) > 1)} {', '.join(missing)} {verb}{there}")
     if problems:
         raise InputError(f"{place}: {in_one_line(problems)}")
+
+
+def _looks_known(label: str, known: list[str]) -> bool:
+    """Whether a name may be meant as one of the known ones, or is none at all."""
+    if not label or NUMBER.fullmatch(label.replace(",", ".")):
+        return True
+    if label.lower() in (name.lower() for name in known):
+        return True
+    return len(label) >= _SHORTEST_SLIP and bool(did_you_mean(label, known, _SLIP))
 
 
 def quote(text: str, longest: int = 40) -> str:
@@ -187,6 +264,7 @@ def _contents(name: str) -> Iterator[tuple[int, str, float]]:
     except UnicodeDecodeError as error:
         raise unreadable(name, "CSV") from error
     rows = text.splitlines()
+    _refuse_g_code(name, rows)
     for line, content in enumerate(rows, start=1):
         content = content.partition("#")[0].strip()
         if content:

@@ -43,6 +43,7 @@ class Path:
         initial_normal: e_perp at the begin of the path, [3], see `ParallelTransportFrame`.
         frame: Frame along the path; one of parallel transport by default.
         waypoints: What the path was made of, if it was.
+        notes: Sentences on what of a file was left out.
 
     Attributes:
         position: The curve sigma_t.
@@ -50,6 +51,7 @@ class Path:
         arc_length: Arc length of `position`.
         frame: Frame along `position`.
         waypoints: What the path was made of, or None.
+        notes: Sentences on what of a file was left out.
 
     Raises:
         InputError: the position is not a regular curve in R^3, or the orientation does not
@@ -64,6 +66,7 @@ class Path:
         initial_normal: ArrayLike | None = None,
         frame: Frame | None = None,
         waypoints: PathWaypoints | None = None,
+        notes: tuple[str, ...] = (),
     ) -> None:
         if position.dimension != 3:
             raise InputError(f"path: curve of dimension {position.dimension}; 3 is required")
@@ -73,6 +76,7 @@ class Path:
         self.position = position
         self.orientation = orientation
         self.waypoints = waypoints
+        self.notes = notes
         self.arc_length = ArcLength(position)
         self.frame = frame or ParallelTransportFrame(position, initial_normal)
         self._evaluators: dict[int, PathEvaluator] = {}

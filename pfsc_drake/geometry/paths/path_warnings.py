@@ -9,6 +9,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.smoothing import noise_level
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 from pfsc_drake.geometry.paths.shape_report import ShapeReport
+from pfsc_drake.geometry.paths.smoothing import allows_tolerance
 from pfsc_drake.geometry.rotation import euler_margin
 
 # m: robots' paths are shorter, and distances below count for nothing
@@ -40,7 +41,7 @@ def path_warnings(path: Path, shape: ShapeReport, keys: str = "path.shape.") -> 
         shape: Its numbers, see :func:`shape_report`.
         keys: What stands before the names of options that would help.
     """
-    found = [_fast_turn(path, shape)]
+    found = [*path.notes, _fast_turn(path, shape)]
     if path.waypoints is not None:
         found += [
             far_waypoints(path.waypoints.positions),
@@ -137,7 +138,7 @@ def far_waypoints(positions: np.ndarray) -> str | None:
     farthest = float(np.abs(positions).max())
     if farthest <= _LARGE:
         return None
-    return f"waypoints lie up to {farthest:.4g} m from the origin; their unit is m, not mm"
+    return f"waypoints lie up to {farthest:.4g} m from the origin; if they are in mm write unit: mm"
 
 
 def _nearly_closed(path: Path, waypoints: PathWaypoints, keys: str) -> str | None:
@@ -173,12 +174,15 @@ def _noise(path: Path, shape: ShapeReport, keys: str) -> str | None:
     if np.linalg.norm(turns, axis=1).max() > _CORNER and similar > _TO_AND_FRO:
         return None
     noise = _TIMES_NOISE * noise_level(waypoints.parameters, waypoints.positions, across=True)
-    return (
+    tolerance = _round_up(noise)
+    said = (
         f"the path bends to and fro from waypoint to waypoint, with a radius of down to "
         f"{_length(shape.smallest_radius)} at eta = {shape.smallest_radius_at:.4g} m, as paths "
-        f"through noisy points do: write {keys}tolerance (m), perhaps "
-        f"{_round_up(noise):g}"
+        f"through noisy points do: "
     )
+    if allows_tolerance(waypoints.positions, tolerance, path.closed):
+        return f"{said}write {keys}tolerance (m), perhaps {tolerance:g}"
+    return f"{said}the way is too short for their scatter: add waypoints, or measure them anew"
 
 
 def _swing(shape: ShapeReport, keys: str) -> str | None:

@@ -1,6 +1,7 @@
 """Smooth paths through noisy waypoints."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -75,7 +76,13 @@ def smooth_positions(
             progress((done + 1.0) / (_ROUNDS + 1.0), "smoothing the waypoints")
         theta, end = _arc_lengths(found.curve, _feet(found.curve, theta, points))
         found = fit(theta, end)
-    _require_near(found, "path.shape.tolerance", tolerance, 1.0, "m")
+    _require_near(
+        found,
+        "path.shape.tolerance",
+        tolerance,
+        (1.0, "m"),
+        lambda enough: allows_tolerance(points, enough, closed),
+    )
     return found.curve, theta
 
 
@@ -125,11 +132,36 @@ def smooth_orientation(
         noise=2.0 * noise_level(theta, q, across=False),
         deviation=angles,
     )
-    _require_near(found, "path.shape.tolerance_deg", tolerance, 180.0 / math.pi, "deg")
+    unit = (180.0 / math.pi, "deg")
+    largest = 90.0  # deg, of the key
+    _require_near(found, "path.shape.tolerance_deg", tolerance, unit, lambda a: a <= largest)
     return OrientationCurve(found.curve)
 
 
-def _require_near(found: SmoothFit, key: str, tolerance: float, scale: float, unit: str) -> None:
+def allows_tolerance(points: np.ndarray, tolerance: float, closed: bool) -> bool:
+    """Whether points reach far enough for a path that may miss them by a tolerance.
+
+    Args:
+        points: [n, 3], m.
+        tolerance: m.
+        closed: True for a closed path.
+    """
+    try:
+        _accumulate_strides(points, _STRIDE * tolerance, closed)
+    except InputError:
+        return False
+    return True
+
+
+def _require_near(
+    found: SmoothFit,
+    key: str,
+    tolerance: float,
+    unit_of: tuple[float, str],
+    is_allowed: Callable[[float], bool],
+) -> None:
+    """Refuse a curve that is not near enough, with a tolerance that would do if there is one."""
+    scale, unit = unit_of
     worst = int(np.argmax(found.deviations))
     if found.deviations[worst] > tolerance:
         enough = max(found.attainable, tolerance) * scale
@@ -138,8 +170,8 @@ def _require_near(found: SmoothFit, key: str, tolerance: float, scale: float, un
         raise InputError(
             f"{key} = {tolerance * scale:g} {unit}: the waypoints scatter more about every smooth"
             f" curve, which misses number {worst + 1} by"
-            f" {found.deviations[worst] * scale:.3g} {unit}: allow {enough:g} {unit}, or take"
-            " that point out"
+            f" {found.deviations[worst] * scale:.3g} {unit}:"
+            f" {f'allow {enough:g} {unit}, or ' if is_allowed(enough) else ''}take that point out"
         )
 
 

@@ -21,11 +21,16 @@ from pfsc_drake.geometry.curves.spline import (
     close_polygon,
     interpolate,
 )
-from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
+from pfsc_drake.geometry.files.number_table import NumberTable, check_columns, read_numbers
+from pfsc_drake.geometry.files.unit import Unit, metres
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 from pfsc_drake.geometry.paths.smoothing import smooth_orientation, smooth_positions
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION, matrix_to_quaternion
+from pfsc_drake.geometry.rotation import (
+    EULER_TO_QUATERNION,
+    matrix_to_quaternion,
+    rotation_vector_to_quaternion,
+)
 
 # rad; two turns
 _LARGEST_ANGLE = 4.0 * np.pi
@@ -38,9 +43,15 @@ _ORIENTATIONS = {
     "zyz": ("zyz_1", "zyz_2", "zyz_3"),
     "zyx_deg": ("zyx_deg_1", "zyx_deg_2", "zyx_deg_3"),
     "zyz_deg": ("zyz_deg_1", "zyz_deg_2", "zyz_deg_3"),
+    "rpy": ("roll", "pitch", "yaw"),
+    "rpy_deg": ("roll_deg", "pitch_deg", "yaw_deg"),
+    "rotation_vector": ("rx", "ry", "rz"),
     "quaternion": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
 }
+# The last of roll, pitch, yaw may stand alone.
+_YAW_ALONE = {"rpy": "yaw", "rpy_deg": "yaw_deg"}
+_KNOWN = [*_POSITION, _PARAMETER, *(label for group in _ORIENTATIONS.values() for label in group)]
 
 
 @dataclass(frozen=True)
@@ -51,24 +62,34 @@ class WaypointTable:
         positions: [n, 3], m.
         quaternions: (w, x, y, z), [n, 4], or None without orientation.
         parameters: theta [n], strictly increasing, or None to choose them by distance.
+        yaw_alone: Whether the orientation is a turn about z alone, tilts being unknown.
+        notes: Sentences on what of a file was left out.
     """
 
     positions: np.ndarray
     quaternions: np.ndarray | None = None
     parameters: np.ndarray | None = None
+    yaw_alone: bool = False
+    notes: tuple[str, ...] = ()
 
 
-def read_waypoints(csv_path: str | FilePath, progress: Progress | None = None) -> WaypointTable:
+def read_waypoints(
+    csv_path: str | FilePath, progress: Progress | None = None, unit: Unit = "m"
+) -> WaypointTable:
     """Read waypoints from a CSV file.
 
     The first line that is neither empty nor a comment (#) names the columns, in any order:
-    `x, y, z` [m], at most 1e4; optionally one group of `zyx_1, zyx_2, zyx_3` [rad], (2.7),
-    `zyz_1, zyz_2, zyz_3` [rad], (2.6), the same in degrees as `zyx_deg_1, ...` or
-    `zyz_deg_1, ...`, `qw, qx, qy, qz`, or `r11, r12, ..., r33`; and optionally `theta`.
+    `x, y, z`, at most 1e4 m; optionally one group of `zyx_1, zyx_2, zyx_3` [rad], (2.7),
+    `zyz_1, zyz_2, zyz_3` [rad], (2.6), `roll, pitch, yaw` [rad], about the fixed axes x, y, z, the
+    same in degrees as `zyx_deg_1, ...`, `zyz_deg_1, ...` or `roll_deg, ...`, `yaw` or `yaw_deg`
+    alone, the rotation vector `rx, ry, rz` [rad], `qw, qx, qy, qz`, or `r11, r12, ..., r33`; and
+    optionally `theta`. Further columns are ignored. Without `theta` rows that equal the one before
+    are left out, as recorders write them where a tool rests.
 
     Args:
         csv_path: File name, of a regular file of at most 256 MiB and 1,000,000 waypoints.
         progress: Told the fraction read and what is done.
+        unit: Unit of `x, y, z`.
 
     Returns:
         The table.
@@ -77,10 +98,13 @@ def read_waypoints(csv_path: str | FilePath, progress: Progress | None = None) -
         InputError: the file cannot be read or is too large, a column is unknown or missing,
             or a value is not a number, too large, not increasing (theta) or not an orientation.
     """
-    name = str(csv_path)
-    lines, header, rows = read_numbers(name, "waypoints", _check_header, progress)
-    column = {label: rows[:, index] for index, label in enumerate(header)}
-    positions = np.stack([column[label] for label in _POSITION], axis=1)
+    name, scale = str(csv_path), metres(unit)
+    table, equal = _without_repeats(
+        name, read_numbers(name, "waypoints", _check_header, progress, _KNOWN)
+    )
+    lines, rows = table.lines, table.rows
+    column = {label: rows[:, index] for index, label in enumerate(table.header)}
+    positions = scale * np.stack([column[label] for label in _POSITION], axis=1)
     far = np.argwhere(np.abs(positions) > FARTHEST)
     if far.size:
         row, axis = far[0]
@@ -97,12 +121,29 @@ def read_waypoints(csv_path: str | FilePath, progress: Progress | None = None) -
                 f"{name}, line {lines[row]}, column theta: {parameters[row]:.9g}; more than the"
                 f" {parameters[row - 1]:.9g} of the line before is required"
             )
-    quaternions = None
+    quaternions, yaw_alone = None, False
     for kind, labels in _ORIENTATIONS.items():
-        if labels[0] in column:
-            values = np.stack([column[label] for label in labels], axis=1)
+        if labels[-1] in column:
+            yaw_alone = labels[0] not in column
+            values = np.stack([column.get(label, np.zeros(len(rows))) for label in labels], axis=1)
             quaternions = _to_quaternions(name, lines, kind, values)
-    return WaypointTable(positions, quaternions, parameters)
+    notes = (*table.notes(name), *equal)
+    return WaypointTable(positions, quaternions, parameters, yaw_alone, notes)
+
+
+def _without_repeats(name: str, table: NumberTable) -> tuple[NumberTable, tuple[str, ...]]:
+    """Leave out rows that equal the one before, and say so."""
+    repeats = np.concatenate([[False], np.all(np.diff(table.rows, axis=0) == 0.0, axis=1)])
+    count = int(np.count_nonzero(repeats))
+    if not count or _PARAMETER in table.header:
+        return table, ()
+    first = table.lines[int(np.argmax(repeats))]
+    lines = [line for line, repeated in zip(table.lines, repeats, strict=True) if not repeated]
+    said = "1 row equals" if count == 1 else f"{count} rows equal"
+    return table._replace(lines=lines, rows=table.rows[~repeats]), (
+        f"{name}: {said} the row before, first in line {first}, and left out; waypoints are"
+        " counted from 1 without them",
+    )
 
 
 def waypoints_text(table: WaypointTable, comment: str = "") -> str:
@@ -126,15 +167,18 @@ def waypoints_text(table: WaypointTable, comment: str = "") -> str:
 
 
 def _check_header(place: str, header: list[str]) -> None:
-    groups = list(_ORIENTATIONS.values())
-    known = [*_POSITION, _PARAMETER, *(label for group in groups for label in group)]
-    present = [group for group in groups if any(key in header for key in group)]
-    check_columns(place, header, known, [])
+    present = {
+        kind: group for kind, group in _ORIENTATIONS.items() if any(key in header for key in group)
+    }
+    check_columns(place, header, _KNOWN, [], others=True)
     if len(present) > 1:
-        kinds = " and ".join(f"'{group[0]}...'" for group in present)
+        kinds = " and ".join(f"'{group[0]}...'" for group in present.values())
         raise InputError(f"{place}: columns {kinds}; one kind of orientation allowed")
-    required = [*_POSITION, *(label for group in present for label in group)]
-    check_columns(place, header, known, required)
+    required = list(_POSITION)
+    for kind, group in present.items():
+        if [label for label in group if label in header] != [_YAW_ALONE.get(kind)]:
+            required += group
+    check_columns(place, header, _KNOWN, required, others=True)
 
 
 def _to_quaternions(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.ndarray:
@@ -142,6 +186,10 @@ def _to_quaternions(name: str, lines: list[int], kind: str, values: np.ndarray) 
     convention = kind.removesuffix("_deg")
     if convention in EULER_TO_QUATERNION:
         return EULER_TO_QUATERNION[convention](_angles(name, lines, kind, values))
+    if convention == "rpy":  # about fixed axes: in the other order about those that turn
+        return EULER_TO_QUATERNION["zyx"](_angles(name, lines, kind, values)[:, ::-1])
+    if kind == "rotation_vector":
+        return rotation_vector_to_quaternion(_angles(name, lines, kind, values))
     if kind == "quaternion":
         norm = np.linalg.norm(values, axis=1, keepdims=True)
         bad = np.flatnonzero(norm[:, 0] < 1e-6)
@@ -167,7 +215,8 @@ def _angles(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.nd
     far = np.argwhere(np.abs(values) > largest)
     if far.size:
         row, axis = far[0]
-        advice = f"; for degrees name the columns {kind}_deg_1, {kind}_deg_2, {kind}_deg_3"
+        in_degrees = ", ".join(_ORIENTATIONS.get(f"{kind}_deg", ()))
+        advice = f"; for degrees name the columns {in_degrees}" if in_degrees else ""
         raise InputError(
             f"{name}, line {lines[row]}, column {_ORIENTATIONS[kind][axis]}:"
             f" {values[row, axis]:g} {'deg' if degrees else 'rad'}; at most {largest:.4g} is"
@@ -176,6 +225,8 @@ def _angles(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.nd
     return np.deg2rad(values) if degrees else values
 
 
+# Of a length.
+_ROUNDING = 1e-9
 # Splines through more waypoints would take minutes and gigabytes.
 MAX_INTERPOLATED = 50_000
 
@@ -261,7 +312,12 @@ def path_from_waypoints(
         orientation = interpolate_orientation(
             table.quaternions, parameters, smoothness=smoothness, closed=closed
         )
-    return Path(position, orientation, waypoints=PathWaypoints(polygon, parameters, "interpolated"))
+    return Path(
+        position,
+        orientation,
+        waypoints=PathWaypoints(polygon, parameters, "interpolated"),
+        notes=table.notes,
+    )
 
 
 def _require_no(table: WaypointTable, corner_distance: float | None, key: str) -> None:
@@ -295,7 +351,12 @@ def _smooth_path(
             tolerance=tolerance.orientation,
             closed=closed,
         )
-    return Path(position, orientation, waypoints=PathWaypoints(table.positions, theta, "smoothed"))
+    return Path(
+        position,
+        orientation,
+        waypoints=PathWaypoints(table.positions, theta, "smoothed"),
+        notes=table.notes,
+    )
 
 
 def _rounded_path(table: WaypointTable, smoothness: int, closed: bool, distance: float) -> Path:
@@ -313,4 +374,20 @@ def _rounded_path(table: WaypointTable, smoothness: int, closed: bool, distance:
             q = np.vstack([q, q[:1]])
         q = check_neighbours(q)
         orientation = OrientationCurve(rounded(q, closed))
-    return Path(position, orientation, waypoints=PathWaypoints(points, theta, "rounded"))
+    waypoints = PathWaypoints(points, theta, "rounded")
+    notes = (*table.notes, *_cut_corners(chords, distance))
+    return Path(position, orientation, waypoints=waypoints, notes=notes)
+
+
+def _cut_corners(chords: np.ndarray, distance: float) -> tuple[str, ...]:
+    """Say where lines are too short for the distance that was asked for."""
+    short = np.flatnonzero(chords < 2.0 * distance * (1.0 - _ROUNDING))
+    if len(chords) < 2 or not short.size:
+        return ()
+    worst = int(np.argmin(chords))
+    numbers = f"{worst + 1} and {(worst + 1) % len(chords) + 1}"
+    return (
+        f"path.shape.corner_distance = {distance:g} m is more than half of {short.size} of"
+        f" {len(chords)} lines, of which the shortest, between waypoints {numbers}, has"
+        f" {chords[worst]:.4g} m: corners there are rounded from half the line on",
+    )

@@ -26,8 +26,9 @@ _STARTS, _STEPS, _MOST_PAIRS = 8, 30, 300
 _COMMON, _LONGEST = 1e-9, 0.3
 # Where a gap is looked for beside it, m, and its share of that if it is a wedge.
 _BESIDE, _NARROW = 1e-3, 0.3
-# Angle between normals that are nearly one, deg.
+# Angle between normals that are nearly one, deg, and the square of a sine that is rounding.
 _NEARLY_PARALLEL_DEG = 0.6
+_PARALLEL = 1e-20
 
 
 def refuse_forbidden_start(regions: Regions, start: ArrayLike, clock: float = 0.0) -> None:
@@ -195,7 +196,8 @@ def _touching(
             if angle > 180.0 - _NEARLY_PARALLEL_DEG and _narrows(one, other, y, n_1, clock):
                 return y, angle
             return None
-        if not square:
+        # of normals that differ by rounding neither a common place nor a step is found
+        if square < _PARALLEL:
             return None
         step = (h_1 - cosine * h_2) / square * np.array(n_1)
         step += (h_2 - cosine * h_1) / square * np.array(n_2)

@@ -193,6 +193,27 @@ _UPRIGHT = 0.1
 _NEIGHBOURS = 6
 _SPACINGS, _ROUGHNESSES = 1.5, 8.0
 _FOLDED = 0.02
+# Flying points: distance from the median of so many around, over the usual one, and their share.
+_AROUND, _FLYING, _MOST_FLYING = 16, 4.0, 0.1
+
+
+def _refuse_flying(points: np.ndarray, near: Neighbourhoods) -> None:
+    """Refuse single points off all others, which look like folds."""
+    count = min(_AROUND, len(points))
+    indices = cKDTree(points).query(points, count)[1]
+    # points off the others are rare, so the median of those around one is not
+    centres = np.median(points[indices], axis=1)
+    usual = np.median(np.linalg.norm(points - centres, axis=1))
+    away = np.linalg.norm(points - centres, axis=1)
+    flying = np.flatnonzero(away > _FLYING * max(float(usual), near.spacing))
+    if not 0 < len(flying) <= _MOST_FLYING * len(points):
+        return
+    worst = int(flying[np.argmax(away[flying])])
+    raise InputError(
+        f"surface points: {len(flying)} of {len(points)} stand apart from those around them, by up"
+        f" to {away[worst]:.3g} m at {_numbers(points[worst])} m, and make the patch look folded:"
+        " take flying points out of the scan"
+    )
 
 
 def choose_base(
@@ -255,6 +276,7 @@ def choose_base(
         elif best is None or steepest > best[0]:
             best = steepest, base
     if best is None:
+        _refuse_flying(points, near)
         raise InputError(
             f"surface points: the patch folds over: {'; '.join(failures)}; fit a part of it, or"
             " give the axis of a cylinder that it is seen from as a single sheet"

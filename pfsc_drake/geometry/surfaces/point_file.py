@@ -1,18 +1,16 @@
 """Files of points scanned on a surface."""
 
 from pathlib import Path as FilePath
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.geometry.files.mesh_files import read_obj_vertices, read_ply_vertices, read_stl
-from pfsc_drake.geometry.files.number_table import read_columns
+from pfsc_drake.geometry.files.number_table import check_columns, read_columns, read_numbers
+from pfsc_drake.geometry.files.unit import Unit, metres
 
-Unit = Literal["m", "cm", "mm", "inch"]
-
-_METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 _AXES = ["x", "y", "z"]
 _MESHES = {
     ".stl": lambda file: read_stl(file).vertices,
@@ -23,28 +21,45 @@ _MESHES = {
 _LARGEST = 50.0
 
 
-def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
-    """Read points scanned on a surface.
+class SurfacePoints(NamedTuple):
+    """Points of a file.
 
-    Args:
-        file: A CSV file with columns x, y, z in any order, or an STL, OBJ or PLY file whose
-            vertices are taken, equal ones once.
-        unit: Unit of the numbers in it.
+    Attributes:
+        points: [n, 3], m.
+        notes: Sentences on what of the file was ignored.
+    """
+
+    points: np.ndarray
+    notes: tuple[str, ...]
+
+
+def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
+    """Read points scanned on a surface, see :func:`read_surface_file`.
 
     Returns:
         Points, [n, 3], m.
+    """
+    return read_surface_file(file, unit).points
+
+
+def read_surface_file(file: str | FilePath, unit: Unit = "m") -> SurfacePoints:
+    """Read points scanned on a surface, and say what was ignored.
+
+    Args:
+        file: A CSV file with columns x, y, z in any order, others being ignored, or an STL, OBJ
+            or PLY file whose vertices are taken, equal ones once.
+        unit: Unit of the numbers in it.
 
     Raises:
         InputError: An unknown kind of file or unit, one that cannot be read, columns that are
-            unknown or missing, values that are not finite, points of a CSV file twice, further
+            missing or misspelled, values that are not finite, points of a CSV file twice, further
             than 1e4 m away or more than 50 m apart.
     """
-    if unit not in _METRES:
-        raise InputError(f"unit: '{unit}'; one of {', '.join(_METRES)} is required")
+    scale, notes = metres(unit), tuple[str, ...]()
     path = FilePath(file)
     kind = path.suffix.lower()
     if kind == ".csv":
-        points, places = _read_csv(str(file))
+        points, places, notes = _read_csv(str(file))
     elif kind in _MESHES:
         # the order of the file is kept
         vertices = _MESHES[kind](path)
@@ -54,7 +69,7 @@ def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
         raise InputError(
             f"{file}: points are read from files of the kinds .csv, {', '.join(_MESHES)}"
         )
-    points = points * _METRES[unit]
+    points = points * scale
     bad = np.argwhere(~(np.abs(points) <= FARTHEST))
     if bad.size:
         row, axis = bad[0]
@@ -68,12 +83,17 @@ def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
         raise InputError(
             f"{file}: {size:.4g} m from end to end; at most {_LARGEST:g} m are allowed{advice}"
         )
-    return points
+    return SurfacePoints(points, notes)
 
 
-def _read_csv(name: str) -> tuple[np.ndarray, list[str]]:
-    """Points [n, 3] in the file's unit, and where they stand."""
-    lines, points = read_columns(name, "points", _AXES)
+def _check_header(place: str, header: list[str]) -> None:
+    check_columns(place, header, _AXES, _AXES, others=True)
+
+
+def _read_csv(name: str) -> tuple[np.ndarray, list[str], tuple[str, ...]]:
+    """Points [n, 3] in the file's unit, where they stand, and what was ignored."""
+    table = read_numbers(name, "points", _check_header, known=_AXES)
+    lines, points = table.lines, table.rows[:, [table.header.index(axis) for axis in _AXES]]
     first: dict[tuple[float, ...], int] = {}
     for line, row in zip(lines, map(tuple, points.tolist()), strict=True):
         if first.setdefault(row, line) != line:
@@ -81,7 +101,7 @@ def _read_csv(name: str) -> tuple[np.ndarray, list[str]]:
                 f"{name}, line {line}: the same point as in line {first[row]}; each once is"
                 " required"
             )
-    return points, [f"line {line}" for line in lines]
+    return points, [f"line {line}" for line in lines], table.notes(name)
 
 
 def read_profile(file: str | FilePath, columns: list[str]) -> np.ndarray:

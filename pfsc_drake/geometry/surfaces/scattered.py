@@ -1,6 +1,7 @@
 """Surfaces fitted to scattered points, as people scan workpieces."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,6 +84,7 @@ class SurfaceFit:
         base: What the points were projected on, for people.
         spacing: Distance at which points stand, m.
         hole: Largest distance of a place on the surface from the nearest point, m.
+        hole_at: That place, [3], m.
         noise: Standard deviation of the points' noise along the normal as estimated from the
             residuals and the number of parameters that the fit has used up, m.
         uncertainty: Largest standard error of the surface along the base's normal that such
@@ -95,6 +97,7 @@ class SurfaceFit:
     base: str
     spacing: float
     hole: float
+    hole_at: np.ndarray
     noise: float
     uncertainty: float
 
@@ -124,7 +127,7 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     _check_length("largest_hole", options.largest_hole)
     near = neighbourhoods(cloud)
     base = choose_base(cloud, near, options.base, options.seen_from, options.along)
-    kept, domain, hole = _covered(cloud, base, options)
+    kept, domain, (centre, hole) = _covered(cloud, base, options)
     cloud = cloud[kept]
     theta = base.parameters(cloud)
     knots = _knots(domain, near.spacing, options.smoothness + 1, base.closed)
@@ -138,7 +141,9 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     slopes = _slopes(surface_of(spline.fit(exponent)), theta, base.normals(cloud))
     spline.weigh(slopes**2)
     exponent, noise = spline.best_predicting(exponent)
-    uncertainty = _uncertainty(spline, exponent, noise, near, options.tolerance)
+    uncertainty = _uncertainty(
+        spline, exponent, noise, near, options.tolerance, lambda: surface_of(spline.fit(exponent))
+    )
     if options.tolerance is None:
         coefficients = spline.fit(exponent)
     else:
@@ -152,7 +157,10 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     _check_upright(surface, base)
     left = residuals(surface, cloud, theta)
     check_scatter(left, cloud, near.spacing, options.tolerance)
-    return SurfaceFit(surface, cloud, left, base.name, near.spacing, hole, noise, uncertainty)
+    hole_at = surface.partials(centre[None], 0)[0, 0]
+    return SurfaceFit(
+        surface, cloud, left, base.name, near.spacing, hole, hole_at, noise, uncertainty
+    )
 
 
 def check_cloud(points: ArrayLike) -> np.ndarray:
@@ -195,8 +203,8 @@ def check_cloud(points: ArrayLike) -> np.ndarray:
 
 def _covered(
     points: np.ndarray, base: Base, options: ScatteredFitOptions
-) -> tuple[np.ndarray, tuple[Interval, Interval], float]:
-    """Which points are kept, the rectangle of parameters, and the radius of its largest hole."""
+) -> tuple[np.ndarray, tuple[Interval, Interval], tuple[np.ndarray, float]]:
+    """Which points are kept, the rectangle of parameters, and its largest hole, see `Coverage`."""
     theta = base.parameters(points)
     low, high = theta.min(axis=0), theta.max(axis=0)
     domain = (Interval(*_floats(low[0], high[0])), Interval(*_floats(low[1], high[1])))
@@ -207,7 +215,7 @@ def _covered(
     coverage = cover(theta, domain, reach, closed=base.closed[0])
     centre, radius = coverage.hole
     if radius <= reach:
-        return np.full(len(points), True), domain, radius
+        return np.full(len(points), True), domain, coverage.hole
     if not options.trim:
         nearest = points[int(np.argmin(np.linalg.norm(theta - centre, axis=1)))]
         raise InputError(
@@ -230,7 +238,7 @@ def _covered(
             f"surface points: {np.count_nonzero(kept)} are left in the covered rectangle;"
             f" at least {FEWEST_POINTS} are required"
         )
-    hole = cover(theta, part, reach, closed=base.closed[0]).hole[1]
+    hole = cover(theta, part, reach, closed=base.closed[0]).hole
     return kept, part, hole
 
 
@@ -260,6 +268,7 @@ def _uncertainty(
     noise: float,
     near: Neighbourhoods,
     tolerance: float | None,
+    estimate: Callable[[], ProductSurface],
 ) -> float:
     """Largest standard error of heights; refuses what the points leave open."""
     sides = [np.linspace(knots.begin, knots.end, _ERROR_SAMPLES) for knots in spline.knots]
@@ -268,10 +277,14 @@ def _uncertainty(
     worst = int(np.argmax(errors))
     allowed = max(_NOISES * noise, _ERROR_SPACINGS * near.spacing, tolerance or 0.0)
     if errors[worst] > allowed:
+        x, y, z = estimate().partials(theta[[worst]], 0)[0, 0]
         raise InputError(
-            f"surface points: leave the surface open by {errors[worst]:.2g} m (standard error) at"
-            f" theta = [{theta[worst, 0]:.4g}, {theta[worst, 1]:.4g}] m, at the edge or in a hole;"
-            f" {allowed:.2g} m would do: scan the place, or trim the patch with a smaller"
+            "surface points: do not determine the surface near"
+            f" [{x:.4g}, {y:.4g}, {z:.4g}] m, at its edge or in a hole: its standard error there is"
+            f" {errors[worst]:.2g} m, where {allowed:.2g} m are allowed. Points scatter by"
+            f" {noise:.2g} m about the smooth surface that predicts them best: if that is more than"
+            " the scanner's noise, the workpiece has a step or an edge, which no smooth surface"
+            " follows: fit a part of it; else scan the place, or trim the patch with a smaller"
             " largest_hole"
         )
     return float(errors[worst])

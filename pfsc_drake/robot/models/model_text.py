@@ -11,6 +11,7 @@ from xml.sax.saxutils import escape, quoteattr
 from pfsc_drake.robot.models.joint_edits import mimic_elements
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
+_GREY = '<color rgba="0.7 0.7 0.7 1"/>'
 # an element and the text that it becomes
 Edit = tuple[Element, str]
 
@@ -21,7 +22,8 @@ def usable_text(
     """Return a model in another text, or None if Drake can use the file as it is.
 
     ROS tools repeat a material wherever it is used, and let the colour differ; Drake refuses
-    that, so such materials are named apart. That joints follow others is left out: they are fixed
+    that, so such materials are named apart; textures go, for it refuses missing ones. That joints
+    follow others is left out: they are fixed
     where these stand. Springs can be left out, since Drake gives up no joint of a plant with
     springs. Lines stay where they are. Relative file names become absolute,
     since a text has no folder.
@@ -33,6 +35,7 @@ def usable_text(
     """
     edits = list(distinct_materials(model))
     edits += [(mimic, "") for _, mimic in mimic_elements(model)]
+    edits += without_textures(model)
     if without_springs:
         edits += [
             (element, f"<{element.name}>0</{element.name}>")
@@ -84,6 +87,21 @@ def distinct_materials(model: ModelXml) -> Iterator[Edit]:
             # its first tag alone
             head = replace(material, end=material.children[0].start)
             yield head, f"<material name={quoteattr(f'{name}_{material.start}')}>"
+
+
+def without_textures(model: ModelXml) -> Iterator[Edit]:
+    """Yield textures of a URDF model, to be left out, or to become a grey of materials without.
+
+    Args:
+        model: The model.
+    """
+    if model.root.name != "robot":
+        return
+    for material in (element for element in model.root.within() if element.name == "material"):
+        colour = "" if material.first("color") is not None else _GREY
+        for texture in material.all("texture"):
+            yield texture, colour
+            colour = ""
 
 
 def _look(material: Element) -> tuple[tuple[str, ...], ...]:

@@ -14,6 +14,7 @@ from pfsc_drake.errors import InputError
 
 LARGEST_FILE = 20_000_000  # bytes; geometry belongs into files of its own
 _DEEPEST = 200  # elements within elements
+_MOST_ATTRIBUTES = 1000  # of one element; parsers compare each with all others
 # what a simulator other than Drake or a driver reads, in a language of its own
 _FOREIGN = frozenset({"gazebo", "plugin", "ros2_control"})
 
@@ -132,6 +133,11 @@ def _parse(file: Path, content: bytes) -> Element:
             raise InputError(
                 f"{file}:{parser.CurrentLineNumber}: cannot be read: more than {_DEEPEST} "
                 "elements within each other"
+            )
+        if len(attributes) > _MOST_ATTRIBUTES:
+            raise InputError(
+                f"{file}:{parser.CurrentLineNumber}: cannot be read: {len(attributes)} attributes "
+                f"of one element; allowed: up to {_MOST_ATTRIBUTES}"
             )
         element = Element(name, attributes, parser.CurrentLineNumber, parser.CurrentByteIndex)
         open_elements[-1].children.append(element)

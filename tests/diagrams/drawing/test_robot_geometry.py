@@ -121,13 +121,13 @@ def test_stl_meshes_are_drawn_in_metres(draw, address):
     assert not drawing.warnings and not sticks(drawing)
 
 
-def test_meshes_that_drake_draws_are_left_to_it(draw):
+def test_other_meshes_are_drawn_by_their_geometry(draw):
     gltf = json.dumps({"asset": {"version": "2.0"}, "meshes": [{"primitives": []}]})
     files = {"meshes/a.OBJ": OBJ, "meshes/b.dae": COLLADA, "meshes/c.gltf": gltf}
     look = "".join(visual(mesh(f"package://my_arm/{file}")) for file in files)
     drawing = draw(urdf(look), files)
     assert all(isinstance(part.form, Mesh) for part in drawing.parts)
-    names = [Path(part.form.source().path()).name for part in drawing.parts]
+    names = [part.form.source().in_memory().mesh_file.filename_hint() for part in drawing.parts]
     assert sorted(names) == ["a.OBJ", "b.dae", "c.gltf"]
     assert not drawing.warnings
 
@@ -256,3 +256,34 @@ def test_sdf_models_are_read_alike(draw):
     assert isinstance(part.form, Triangles)
     (warning,) = drawing.warnings
     assert "link_2" in warning and "none.obj: no such file" in warning
+
+
+@pytest.mark.parametrize(
+    "address", ["{0}/part.obj", "file://{0}/part.obj", "../../../{1}/part.obj"]
+)
+def test_meshes_outside_the_packages_are_one_line(draw, tmp_path_factory, address):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (elsewhere / "part.obj").write_text(OBJ)
+    look = visual(mesh(address.format(elsewhere, elsewhere.name)))
+    drawing = draw(urdf(look, visual(PLATE)))
+    (warning,) = drawing.warnings
+    assert "link_1" in warning and "outside the model's packages" in warning
+    assert not looks(drawing, "link_1") and len(looks(drawing, "link_2")) == 1
+
+
+def test_a_package_is_not_left_by_its_address(draw, tmp_path):
+    (tmp_path / "part.obj").write_text(OBJ)
+    (warning,) = draw(urdf(visual(mesh("package://my_arm/../part.obj")))).warnings
+    assert "outside the model's packages" in warning
+
+
+def test_a_texture_that_is_missing_hinders_nothing(draw):
+    """Neither of the robot nor of its drawing: the model is read twice."""
+    textured = '<material name="black"><texture filename="package://my_arm/no.png"/></material>'
+    coloured = '<material name="red"><color rgba="1 0 0 1"/><texture filename="no.png"/></material>'
+    names = [f'<material name="{name}"/>' for name in ("black", "red")]
+    drawing = draw(urdf(*(visual(PLATE, name) for name in names), top=textured + coloured))
+    (black,), (red,) = looks(drawing, "link_1"), looks(drawing, "link_2")
+    assert (black.color.r(), black.color.g()) == (0.7, 0.7)
+    assert (red.color.r(), red.color.g()) == (1.0, 0.0)
+    assert not drawing.warnings

@@ -1,5 +1,6 @@
 """References that wait for the drives: what is expected comes, and what fits is left alone."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,17 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.scenario import GainParameters, LawGains
+from diagrams.scenario import (
+    GainParameters,
+    Keyframe,
+    LawGains,
+    Line,
+    OrientationParameters,
+    PathParameters,
+)
 from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 
@@ -138,3 +147,56 @@ def test_what_seems_too_much_at_a_glance_is_looked_at_closely(load_exact_scenari
     assert not station.task.drive_plan.said
     asked = make_task(settings, find_scenario("pfc_elastic_7r").parent).motion
     np.testing.assert_array_equal(station.task.motion.breakpoints, asked.breakpoints)
+
+
+@pytest.fixture(name="turning")
+def fixture_turning(load_exact_scenario):
+    """Return a function that makes a stiff arm turn its tool evenly on a line."""
+
+    def change(name, line, first, last):
+        settings = load_exact_scenario(name)
+        fractions = np.linspace(0.0, 1.0, 5)
+        angles = np.linspace(first, last, 5).tolist()
+        keyframes = [Keyframe(f, a) for f, a in zip(fractions.tolist(), angles, strict=True)]
+        settings.path = PathParameters(line, OrientationParameters("zyx", keyframes))
+        chosen, gains = settings.controller, GainParameters(poles=[-20.0, -20.0])
+        chosen.law, chosen.gains = "rigid", {"rigid": LawGains(gains, gains, gains)}
+        asked = settings.reference
+        asked.points, asked.dwell, asked.velocity, asked.acceleration = [0.0, 0.2], 0.0, 0.2, 1.0
+        settings.start.offset, settings.start.posture_deg = [0.0, 0.0], []
+        return settings
+
+    return change
+
+
+def test_a_wrist_that_becomes_singular_on_the_way_is_named_with_its_place(turning):
+    """Against the law's own fault in a run."""
+    line = Line([0.9, -0.1, 0.9], [0.9, 0.1, 0.9])
+    settings = turning("pfc_comau_6r", line, [0, 50, 0], [0, 130, 0])
+    settings.faults.joint_limits = False  # one is passed before
+    station = build_station(settings, Path())
+    (said,) = [s for s in station.warnings if "singular" in s]
+    place = re.search(r"wrist singular at eta = (.*) m: q_5 = .* deg \(q_4 and q_6 can", said)
+    simulator = Simulator(station.diagram)
+    station.set_start(simulator.get_mutable_context())
+    simulator.AdvanceTo(station.reference_duration)
+    _, raw = station.log.read(simulator.get_context())
+    faults = raw["law"][:, station.law.layout.status][:, 0]
+    i = int(np.argmax(faults != 0.0))
+    assert faults[i] in (Fault.SINGULAR, Fault.JOINT_SPEED)  # joints become fast just before
+    eta = raw["manifold_point"][i, station.task.place.layout.eta][0]
+    assert eta - 1e-3 < float(place[1]) < eta + 6e-3
+
+
+def test_a_joint_that_passes_its_limit_on_the_way_is_named_with_its_place(turning):
+    """The last joint turns as the tool does, up to 166 deg."""
+    line = Line([0.5, 0.0, 0.4], [0.5, 0.2, 0.4])
+    for last, found in ((240.0, 1), (60.0, 0)):
+        settings = turning("pfc_panda_7r", line, [0, 0, 180], [last, 0, 180])
+        said = [s for s in build_station(settings, Path()).warnings if "passes its limit" in s]
+        assert len(said) == found
+        if found:
+            place = re.search(
+                r"joint 7 passes its limit, q_7 = -166.0 deg, at eta = (.*) m, af", said[0]
+            )
+            assert 0.15 < float(place[1]) < 0.2

@@ -21,6 +21,7 @@ from diagrams.tasks.surface import followed_angles
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import shape_report
+from pfsc_drake.geometry.paths.path_warnings import path_warnings
 
 # an arc of a helix, radius 0.3 m, with the tool tilted more and more
 ANGLE = np.linspace(0.0, 2.0, 9)
@@ -303,7 +304,7 @@ def test_no_orientation_is_lost_unknowingly(num_joints):
     require_orientation(path, "full", 3)
     with pytest.raises(InputError) as caught:
         require_orientation(path, "full", num_joints)
-    parts = ["give the orientation too: columns", "keyframes: [{angles_deg", "task: none"]
+    parts = ["give the orientation too: path.orientation.keyframes: [{angles_deg", "task: none"]
     if num_joints != 6:
         parts.append(f"hold {num_joints - 3}")
     assert all(part in str(caught.value) for part in parts)
@@ -359,7 +360,7 @@ def test_noise_in_millimetres_is_one_of_the_unit(tmp_path):
     rng = np.random.default_rng(0)
     line = np.linspace([300.0, 0.0, 0.0], [500.0, 0.0, 0.0], 300)
     file = write_csv(tmp_path, "xyz", line + rng.normal(0.0, 0.2, line.shape))
-    with pytest.raises(InputError, match=r"tolerance = 0\.001 m.*their unit is m, not mm"):
+    with pytest.raises(InputError, match=r"tolerance = 0\.001 m.*if they are in mm write unit: mm"):
         make(Waypoints(file, tolerance=1e-3), law="rigid", folder=tmp_path)
 
 
@@ -387,3 +388,45 @@ def test_the_analytic_jacobian_needs_an_orientation():
     parameters = PathParameters(Circle(), OrientationParameters(jacobian="analytic"))
     with pytest.raises(InputError, match=r"jacobian = analytic: the path has no orientation; give"):
         make_path(parameters, "rigid", None)
+
+
+def test_yaw_alone_turns_the_tilt_of_a_keyframe(tmp_path):
+    """About the axis of the task, which is not the vertical."""
+    write_csv(tmp_path, ["x", "y", "z", "yaw"], np.hstack([POSITIONS, ANGLE[:, None]]))
+    axis, tilt = np.array([0.0, 0.6, 0.8]), Keyframe(0.0, [20.0, 0.0, 170.0])
+    orientation = OrientationParameters("zyx", [tilt], "yaw", yaw_axis=(2.0 * axis).tolist())
+    parameters = PathParameters(Waypoints("points.csv"), orientation)
+    path = make_path(parameters, "rigid", tmp_path)
+    found = path.orientation.rotation_matrix(path.waypoints.parameters)
+    expected = Rotation.from_rotvec(ANGLE[:, None] * axis) * Rotation.from_euler(
+        "ZYX", tilt.angles_deg, degrees=True
+    )
+    np.testing.assert_allclose(found, expected.as_matrix(), atol=1e-9)
+    with pytest.raises(InputError, match=r"points\.csv: column yaw alone, with .*task = full"):
+        make(Waypoints("points.csv"), folder=tmp_path)
+    with pytest.raises(InputError, match=r"keyframes: 2 given, and points\.csv has"):
+        make(Waypoints("points.csv"), [tilt, tilt], folder=tmp_path, task="yaw")
+
+
+def test_units_and_notes_of_a_waypoint_file(tmp_path):
+    write_csv(tmp_path, ["x", "y", "z", "stamp"], np.hstack([1e3 * POSITIONS, ANGLE[:, None]]))
+    path = make(Waypoints("points.csv", unit="mm"), folder=tmp_path, task="none")
+    np.testing.assert_allclose(path.waypoints.positions, POSITIONS, atol=1e-15)
+    (note,) = path.notes
+    assert "points.csv: column 'stamp' ignored" in note
+    assert note in path_warnings(path, shape_report(path))
+
+
+def test_two_waypoints_are_a_line(tmp_path):
+    write_csv(tmp_path, ["x", "y", "z"], POSITIONS[[0, 3]])
+    said = r"points\.csv: waypoints: 2 distinct .*: !Line \{start: \[0\.3, 0\.0, 0\.0\], end: \["
+    with pytest.raises(InputError, match=said):
+        make(Waypoints("points.csv"), folder=tmp_path)
+
+
+def test_rows_that_coincide_are_counted_from_one_and_the_file_is_named(tmp_path):
+    rows = np.hstack([POSITIONS, ZYX])
+    rows[4, :3] = rows[3, :3]
+    write_csv(tmp_path, ["x", "y", "z", "zyx_1", "zyx_2", "zyx_3"], rows)
+    with pytest.raises(InputError, match=r"points\.csv: waypoints: 4 and 5 coincide"):
+        make(Waypoints("points.csv"), folder=tmp_path)

@@ -1,5 +1,6 @@
 """Surfaces as scenarios give them, against their closed forms."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,12 @@ from scipy.spatial.transform import Rotation
 from diagrams.scenario import SurfaceParameters
 from diagrams.scenario.surface import Extruded, Fitted, Revolved, SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
-from diagrams.tasks.surface import given_quaternion, make_surface, make_surface_manifold
+from diagrams.tasks.surface import (
+    given_quaternion,
+    make_surface,
+    make_surface_manifold,
+    surface_from_shape,
+)
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix
@@ -244,3 +250,19 @@ def test_kinds_of_orientation_have_as_many_coordinates():
         ("normal", "full"): 6,
         ("normal", "tool_axis"): 5,
     }
+
+
+def test_a_hole_that_is_bridged_is_said(tmp_path):
+    rng = np.random.default_rng(8)
+    points = np.column_stack([rng.uniform(0.0, 0.3, (1500, 2)), np.zeros(1500)])
+    points += 1e-5 * rng.normal(size=points.shape)
+    left = points[np.linalg.norm(points[:, :2] - [0.2, 0.1], axis=1) > 0.025]
+    made = {}
+    for name, rows in {"whole": points, "holed": left}.items():
+        text = "\n".join(",".join(map(repr, row)) for row in rows.tolist())
+        (tmp_path / f"{name}.csv").write_text(f"x,y,z\n{text}\n")
+        shape = Fitted(file=f"{name}.csv", largest_hole=0.05)
+        made[name] = surface_from_shape(shape, 3, tmp_path).notes
+    assert made["whole"] == ()
+    (note,) = made["holed"]
+    assert re.search(r"holed\.csv: no point within 2[3456].* mm of \[0\.(19|2).*, 0\.(09|1)", note)

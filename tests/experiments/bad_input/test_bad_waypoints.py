@@ -98,12 +98,6 @@ def test_a_tolerance_below_the_noise(refused, mine, tmp_path):
     refused(mine(), *parts, changes=spline(", tolerance: 5e-5, corner_distance: 0.1"))
 
 
-def test_duplicate_waypoints(refused, mine, tmp_path):
-    csv(tmp_path, np.insert(POINTS, 4, POINTS[3], axis=0))
-    place = str(POINTS[3].tolist())
-    refused(mine(), "rows 3 and 4", place, "must differ", changes=spline())
-
-
 def test_too_few_waypoints(refused, mine, tmp_path):
     csv(tmp_path, POINTS[:6])
     refused(mine(), "6 distinct", "C^5", "at least 7", changes=spline())

@@ -12,6 +12,7 @@ from experiments.figures.drives import (
     has_virtual_input,
 )
 from experiments.results.run_log import RunLog
+from tests.shades import spans
 
 
 def set_units(log, units):
@@ -144,9 +145,7 @@ def test_friction_with_the_velocity_it_acts_on(drawn_log):
     assert right.get_ylabel() == "motor velocity\nin rad/s"
     for panel in (left, right):
         assert sum(panel.get_ylim()) == pytest.approx(0.0)
-    (rest,) = left.patches
-    begin, end = left.transData.inverted().transform(rest.get_extents())[:, 0]
-    assert (begin, end) == pytest.approx((0.5, 0.505))
+    assert spans(left) == [pytest.approx((0.5, 0.505))]
 
 
 def test_deflection_in_milliradians(drawn_log):

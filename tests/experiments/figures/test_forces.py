@@ -7,6 +7,7 @@ from experiments.figures.all import draw_figures
 from experiments.figures.coordinates import draw_progress
 from experiments.figures.forces import draw_force_map, draw_forces, draw_pressing
 from experiments.results.run_log import RunLog
+from tests.shades import spans
 
 PUSH = slice(81, 120)  # samples with 0.4 s < t < 0.6 s
 
@@ -18,13 +19,6 @@ def titles(drawing):
 def lines(panel):
     named = [line for line in panel.lines if not line.get_label().startswith("_")]
     return {line.get_label(): np.asarray(line.get_ydata()) for line in named}
-
-
-def spans(panel, label):
-    """Begin and end of the shades with a label."""
-    boxes = [patch.get_extents() for patch in panel.patches if patch.get_label() == label]
-    to_data = panel.transData.inverted()
-    return [tuple(to_data.transform(box)[:, 0]) for box in boxes]
 
 
 def test_all_panels(drawn_log):
@@ -81,7 +75,7 @@ def test_where_the_sensor_is_not_to_be_trusted(drawn_log):
     panels = draw_forces(drawn_log).canvas.axes
     assert spans(panels[0], "sensor not tared") == [pytest.approx((0.0, 0.1))]
     assert spans(panels[0], "sensor fault") == [pytest.approx((0.905, 1.0))]
-    assert all(len(panel.patches) == 2 for panel in panels)
+    assert all(len(spans(panel)) == 2 for panel in panels)
     legend = [text.get_text() for text in panels[0].get_legend().get_texts()]
     assert legend[-2:] == ["sensor not tared", "sensor fault"]
 
@@ -89,20 +83,20 @@ def test_where_the_sensor_is_not_to_be_trusted(drawn_log):
 def test_a_healthy_sensor_is_not_marked(drawn_log):
     drawn_log["tared"].values[:] = 1.0
     drawn_log["sensor_fault"].values[:] = 0.0
-    assert not any(panel.patches for panel in draw_forces(drawn_log).canvas.axes)
+    assert not any(spans(panel) for panel in draw_forces(drawn_log).canvas.axes)
 
 
 def test_pushes_are_marked_in_other_figures(drawn_log):
     panels = draw_progress(drawn_log).canvas.axes
     assert spans(panels[0], "tool pushed") == [pytest.approx((0.405, 0.6))]
-    assert all(len(panel.patches) == 1 for panel in panels)
+    assert all(len(spans(panel)) == 1 for panel in panels)
     force = drawn_log["wrench_ext"].values
     force[100:103] = 0.0  # a break of less than a fiftieth of the run
     assert len(spans(draw_progress(drawn_log).canvas.axes[0], "tool pushed")) == 1
     force[100:106] = 0.0
-    assert len(draw_progress(drawn_log).canvas.axes[0].patches) == 2
+    assert len(spans(draw_progress(drawn_log).canvas.axes[0])) == 2
     del drawn_log.signals["wrench_ext"]
-    assert not any(panel.patches for panel in draw_progress(drawn_log).canvas.axes)
+    assert not any(spans(panel) for panel in draw_progress(drawn_log).canvas.axes)
 
 
 TIME = np.linspace(0.0, 2.0, 201)

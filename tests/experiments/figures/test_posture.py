@@ -13,6 +13,7 @@ from experiments.figures.posture import (
     has_pushes,
 )
 from reporting.style import ALERT
+from tests.shades import shades, spans
 
 
 def drawn(panel, label):
@@ -65,8 +66,8 @@ def test_posture_error_and_swivel_angle(pushed_log):
     assert drawn(panels[0], "axis 3") == pytest.approx(np.rad2deg(0.1))
     assert drawn(panels[1], "swivel angle") == pytest.approx(np.rad2deg(0.2))
     assert drawn(panels[1], "reference") == pytest.approx(np.rad2deg(0.3))
-    shades = [patch.get_label() for patch in panels[0].patches]
-    assert shades == ["tool pushed", "link pushed"]
+    labels = [shown.get_label() for shown in shades(panels[0])]
+    assert labels == ["tool pushed", "link pushed"]
 
 
 def test_conditioning_over_time_and_path(drawn_log):
@@ -127,9 +128,8 @@ def test_limits_within_reach_are_bands(drawn_log):
     for panel in panels[2:4]:
         low, high = panel.get_ylim()
         assert low < 0.0 < high
-    beyond = [patch for patch in panels[3].patches if patch.get_label() == "beyond a limit"]
-    begin, end = panels[3].transData.inverted().transform(beyond[0].get_extents())[:, 0]
-    assert (begin, end) == pytest.approx((2.0 / 3.0, 1.0), abs=0.006)
+    (beyond,) = spans(panels[3], "beyond a limit")
+    assert beyond == pytest.approx((2.0 / 3.0, 1.0), abs=0.006)
     assert "grey beyond its limits, red where they are passed" in drawing.caption
     assert [len(bands(panel)) for panel in panels[:4]] == [0, 0, 1, 1]
     assert bands(panels[2])[0][0] == pytest.approx(np.rad2deg(2.2))

@@ -7,11 +7,11 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from experiments.hardware import robot as robot_module
-from experiments.hardware.check import check_first
+from experiments.hardware.check import check_alone, check_first
 from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.driven_run import run_drive
 from experiments.hardware.robot import run_robot
-from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus
+from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
 from pfsc_drake.errors import InputError
 from tests.experiments.hardware.test_drive import Loop, changed, panda
 
@@ -118,11 +118,44 @@ def test_a_drive_begins_with_what_is_new_and_ends_in_time(count, answers, lost):
         receive=lambda timeout: waiting.pop(0) if waiting else None,
         requests=list,
         tell=lambda utime, values: None,
+        foreign=0,
     )
     found = run_drive(drive, end, DriveOptions(), 0.01, lambda: False, lambda *_: None)
     assert drive.begun == [1]
     assert drive.answered == list(range(1, answers + 1))
     assert found == lost
+
+
+def test_a_second_sender_ends_the_drive():
+    loop, heard = Loop(panda()), []
+    other = RobotCommand(0, ControlMode.TORQUE, 3.0 * np.eye(7)[6])
+    receive, send = loop.end.receive, loop.end.send
+
+    def answer(command):
+        send(command)
+        if len(heard) == 30:
+            for _ in range(2):
+                loop.end.lcm.Publish(loop.end.dialect.command_channel, spoken(other))
+        heard.append(command)
+        loop.robot.advance()
+
+    def tell_and_receive(timeout):
+        loop.robot.tell()
+        return receive(timeout)
+
+    spoken = loop.end.dialect.encode_command
+    loop.end.receive, loop.end.send = tell_and_receive, answer
+    result = run_drive(loop.drive, loop.end, DriveOptions(), 1.0, lambda: False, lambda *_: None)
+    assert result.fault == "another sender commands the robot"
+    assert loop.end.foreign == 2
+    assert 200 < len(heard) < 400  # it rests at its start
+    loop.end.lcm.Publish(loop.end.dialect.command_channel, spoken(other))
+    check_alone(loop.end)  # of one that has ended before
+    loop.end.receive = lambda timeout: (
+        loop.end.lcm.Publish(loop.end.dialect.command_channel, spoken(other)) or receive(0.01)
+    )
+    with pytest.raises(InputError, match=r"another sender .*: [0-9]+ commands on"):
+        check_alone(loop.end)
 
 
 def test_after_a_long_halt_time_is_not_caught_up(monkeypatch):

@@ -132,6 +132,7 @@ def stands(status, ticks):
         (Event.INTERRUPTED, "interrupted"),
         (Event.ALONE, "who started the controller is gone"),
         (Event.UNRECORDED, "its record could not be written"),
+        (Event.FOREIGN, "another sender commands the robot"),
     ],
 )
 def test_a_stop_ends_when_the_robot_has_rested(panda, told, event, said):
@@ -282,7 +283,7 @@ def test_a_loop_that_breaks_off(panda, told):
 def test_an_interruption_is_passed_on(panda, told):
     panda.project.record.write(panda.folder / "kept", panda.rows(told[:3]))
     begin = time.monotonic()
-    words = """trap 'cp kept drive.bin; echo end rested; exit 0' INT
+    words = """trap 'cp kept drive.bin; echo end rested; exit 0' TERM
         n=0; while [ $n -lt 100 ]; do sleep 0.1; n=$((n + 1)); done"""
     loop = FakeLoop(panda, f'cd "$(dirname "$0")"; {words}')
     run = loop.run(interrupted=lambda: time.monotonic() - begin > 0.5)

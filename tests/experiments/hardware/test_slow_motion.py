@@ -103,6 +103,8 @@ class Obedient:
         seen: Changes what it tells.
     """
 
+    foreign = 0
+
     def __init__(self, chain, seen=lambda status: status):
         self.chain, self._tick, self._seen = chain, 0, seen
         start = np.deg2rad([20.0, -30.0, 25.0, -110.0, 15.0, 80.0, 40.0])

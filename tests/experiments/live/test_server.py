@@ -121,6 +121,17 @@ def test_a_connection_is_good_for_many_messages(server, pages):
             assert connection.sock is used
 
 
+def test_a_connection_that_is_to_close_closes(server, pages):
+    place = urlsplit(server.url)
+    with closing(http.client.HTTPConnection(place.hostname, place.port, timeout=5)) as connection:
+        headers = {"Origin": origin(server), "Connection": "close"}
+        connection.request("POST", place.path + "hear", GOOD, headers)
+        used, answer = connection.sock, connection.getresponse()
+        assert answer.status == 204
+        assert answer.getheader("Connection") == "close"
+        assert used.recv(1) == b""
+
+
 @pytest.mark.parametrize(
     ("body", "said"),
     [

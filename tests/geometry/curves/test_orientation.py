@@ -93,7 +93,7 @@ def test_two_keyframes_are_joined_smoothly() -> None:
 
 
 def test_errors() -> None:
-    with pytest.raises(InputError, match=r"keyframes 1 and 2 \(from 0\) are 175\.0 deg apart"):
+    with pytest.raises(InputError, match=r"orientations 2 and 3 are 175\.0 deg apart"):
         interpolate_orientation(
             _about_z(np.radians([0.0, 10.0, 185.0, 190.0])), np.arange(4.0), smoothness=2
         )
@@ -105,7 +105,7 @@ def test_errors() -> None:
         interpolate_orientation(
             _about_z(np.array([0.0, 1.0, 0.0])), np.arange(3.0), smoothness=2, closed=True
         )
-    with pytest.raises(InputError, match="row 1"):
+    with pytest.raises(InputError, match="quaternion 2: "):
         interpolate_orientation([[1, 0, 0, 0], [0, 0, 0, 0]], [0, 1], smoothness=2)
     with pytest.raises(InputError, match="shape"):
         interpolate_orientation([[1, 0, 0]], [0, 1], smoothness=2)

@@ -86,7 +86,7 @@ def test_ends_that_meet():
 def test_millimetres():
     (sentence,) = warnings(1e3 * WAVE, smoothness=3)
     assert "299.9" not in sentence
-    assert "up to 300 m from the origin; their unit is m, not mm" in sentence
+    assert "up to 300 m from the origin; if they are in mm write unit: mm" in sentence
 
 
 def test_orientation_that_turns_faster_than_was_asked_for():
@@ -127,3 +127,27 @@ def test_a_path_that_turns_back_on_itself():
     assert turning_back(points[:2]) is None
     assert turning_back(points + 0.01 * np.diag([0, 0, 0, 1])[:, [0, 3, 1]]) is None
     assert turning_back(WAVE) is None
+
+
+def test_a_tolerance_that_would_be_refused_is_not_advised():
+    """Scatter as large as the path: five times the noise is more than the whole way."""
+    advised = 0
+    for seed in range(8):
+        points = 0.05 * np.random.default_rng(seed).normal(size=(24, 3))
+        points[:, 0] += np.linspace(0.0, 0.3, 24)
+        for sentence in warnings(points, smoothness=3):
+            assert "write path.shape.tolerance" not in sentence
+            advised += "too short for their scatter" in sentence
+    assert advised > 0
+
+
+def test_lines_too_short_for_the_corner_distance():
+    """Of a rectangle of 30 by 100 mm, whose corners are rounded by 15 mm at most."""
+    points = [[0, 0, 0], [0.1, 0, 0], [0.1, 0.03, 0], [0, 0.03, 0]]
+    options = {"smoothness": 3, "closed": True}
+    (sentence,) = warnings(points, corner_distance=0.02, **options)
+    assert "corner_distance = 0.02 m is more than half of 2 of 4 lines" in sentence
+    assert "between waypoints 2 and 3, has 0.03 m" in sentence
+    (sentence,) = warnings(points, corner_distance=0.06, **options)
+    assert "4 of 4 lines" in sentence
+    assert warnings(points, corner_distance=0.015, **options) == []

@@ -5,6 +5,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
@@ -59,7 +60,16 @@ MATRIX = ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x,y,z,w\n1,2,3,4\n", r"points\.csv, line 1: column 'w' is unknown; allowed: x, y, z"),
+        ("x,y,Z\n1,2,3\n", r"points\.csv, line 1: column 'Z' is unknown; allowed: x, y, z"),
+        ("x,y,z,zyx1,zyx2,zyx3\n", r"column 'zyx1' is unknown; .*; did you mean 'zyx_1'"),
+        ("x,y,z,roll,pitch\n", "column 'yaw' is missing"),
+        ("x,y,z,rx,ry\n", "column 'rz' is missing"),
+        ("x,y,z,yaw,qw,qx,qy,qz\n", "one kind of orientation"),
+        ("x,y,z,rx,ry,rz\n0,0,0,0,0,180\n", r"column rz: 180 rad; at most 12\.57 is allowed$"),
+        ("x,y,z,roll,pitch,yaw\n0,0,0,0,0,180\n", "columns roll_deg, pitch_deg, yaw_deg"),
+        ("x,y,z\n0,3,0,2,0,1\n", "6 values; 3 are required; .* separated by semicolons"),
+        ("% milled\nG21\nG1 X1 Y2\n", "line 2: 'G21' is G-code"),
+        ("N10 G90\nN20 G1 X1 Y2\n", "line 1: 'N10 G90' is G-code"),
         ("x,y\n1,2\n", r"line 1: column 'z' is missing"),
         ("x,y,z,qw,qx,qy\n1,2,3,4,5,6\n", "column 'qz' is missing"),
         ("x,y,z,x\n1,2,3,4\n", "column 'x' twice"),
@@ -77,7 +87,6 @@ MATRIX = ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
         ("x,y,z\n1,2,1e300\n", r"line 2, column z: '1e300'"),
         ("x,y,z\n1,2,-1e5\n", r"line 2, column z: -100000 m; at most 10000 m"),
         ("0.5,0.1,0.2\n", "column '0.5' is unknown; .* the first line names the columns"),
-        ("x;y;z\n1;2;3\n", "column 'x;y;z' is unknown; .* separate columns by commas"),
         (
             "x,y,z,zyx_1,zyx_2,zyx_3\n0,0,0,0,0,180\n",
             r"column zyx_3: 180 rad; at most 12\.57 is allowed; for degrees name the columns "
@@ -216,3 +225,69 @@ def test_given_parameters_are_used(tmp_path: FilePath) -> None:
 def test_without_orientation(tmp_path: FilePath) -> None:
     table = read_waypoints(_write(tmp_path, "x,y,z\n0,0,0\n1,0,0\n2,1,0\n3,1,0\n"))
     assert path_from_waypoints(table, smoothness=2).orientation is None
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t", "|", " ", " ; "])
+def test_any_separator(tmp_path: FilePath, mark: str) -> None:
+    rows = [["y", "x", "z"], ["1", "2", "3.5"], ["4", "5e-1", "6"]]
+    expected = [[2.0, 1.0, 3.5], [0.5, 4.0, 6.0]]
+    text = "\n".join(mark.join(row) for row in rows)
+    np.testing.assert_array_equal(read_waypoints(_write(tmp_path, text)).positions, expected)
+    if mark != ",":
+        text = text.replace(".", ",")
+        np.testing.assert_array_equal(read_waypoints(_write(tmp_path, text)).positions, expected)
+
+
+def test_further_columns_are_ignored_with_a_note(tmp_path: FilePath) -> None:
+    file = _write(tmp_path, 'stamp,"x","y","z",vx\nnoon,1,2,3,\nlater,4,5,6,7\n')
+    table = read_waypoints(file)
+    np.testing.assert_array_equal(table.positions, [[1, 2, 3], [4, 5, 6]])
+    assert table.notes == (f"{file}: columns 'stamp', 'vx' ignored",)
+
+
+def test_rotation_vectors_and_roll_pitch_yaw(tmp_path: FilePath) -> None:
+    """Against products of matrices about single axes, and matrix exponentials."""
+    rolls = np.array([[0.3, -0.4, 2.5], [-3.0, 1.2, 0.0]])
+
+    def turn(axis: int, angle: float) -> np.ndarray:
+        return expm(angle * np.cross(np.eye(3)[axis], np.eye(3)).T)
+
+    for names, scale in (("roll,pitch,yaw", 1.0), ("roll_deg,pitch_deg,yaw_deg", 180.0 / np.pi)):
+        rows = "\n".join("0,0,0," + ",".join(map(repr, row)) for row in (scale * rolls).tolist())
+        found = read_waypoints(_write(tmp_path, f"x,y,z,{names}\n{rows}\n"))
+        expected = [turn(2, w) @ turn(1, p) @ turn(0, r) for r, p, w in rolls]
+        np.testing.assert_allclose(quaternion_to_matrix(found.quaternions), expected, atol=1e-14)
+        assert not found.yaw_alone
+    vectors = np.array([[0.0, 0.0, 0.0], [0.3, -2.0, 1.0], [1e-9, 0.0, 0.0]])
+    rows = "\n".join("0,0,0," + ",".join(map(repr, row)) for row in vectors.tolist())
+    found = read_waypoints(_write(tmp_path, f"x,y,z,rx,ry,rz\n{rows}\n"))
+    expected = [expm(np.cross(v, np.eye(3)).T) for v in vectors]
+    np.testing.assert_allclose(quaternion_to_matrix(found.quaternions), expected, atol=1e-14)
+
+
+def test_yaw_alone(tmp_path: FilePath) -> None:
+    table = read_waypoints(_write(tmp_path, "x,y,z,yaw_deg\n0,0,0,90\n1,0,0,-60\n"))
+    assert table.yaw_alone
+    half = np.deg2rad([45.0, -30.0])
+    expected = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+    np.testing.assert_allclose(table.quaternions, expected, atol=1e-15)
+
+
+def test_units_scale_positions_alone(tmp_path: FilePath) -> None:
+    file = _write(tmp_path, "theta,x,y,z,rx,ry,rz\n0,1,2,3,0.1,0,0\n5,4,5,6,0.2,0,0\n")
+    table, scaled = read_waypoints(file), read_waypoints(file, unit="inch")
+    np.testing.assert_allclose(scaled.positions, 0.0254 * table.positions)
+    np.testing.assert_array_equal(scaled.quaternions, table.quaternions)
+    np.testing.assert_array_equal(scaled.parameters, table.parameters)
+    with pytest.raises(InputError, match="unit: 'km'; one of m, cm, mm, inch"):
+        read_waypoints(file, unit="km")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="at most 10000 m"):
+        read_waypoints(_write(tmp_path, "x,y,z\n1,2,2e4\n"))
+    read_waypoints(_write(tmp_path, "x,y,z\n1,2,2e4\n"), unit="mm")
+
+
+def test_equal_rows_are_left_out_with_a_note(tmp_path: FilePath) -> None:
+    file = _write(tmp_path, "stamp,x,y,z\n1,0,0,1\n2,0,0,1\n3,0,1,1\n4,0,0,1\n5,0,0,1\n")
+    table = read_waypoints(file)
+    np.testing.assert_array_equal(table.positions, [[0, 0, 1], [0, 1, 1], [0, 0, 1]])
+    assert f"{file}: 2 rows equal the row before, first in line 3" in table.notes[1]

@@ -154,3 +154,17 @@ def test_boundaries_that_cross_or_keep_apart():
         HalfSpace((0, 0, 0), (0.0, 0.02, 1.0)),
     ):
         assert tangent_regions({"floor": floor, "other": other}, (0.0, 0.0, 0.1)) == []
+
+
+@pytest.mark.parametrize("degrees", range(0, 180, 5))
+def test_a_slot_whose_normals_differ_by_rounding(degrees):
+    """Opposite walls about a start half-way, one of whose normals is computed another way."""
+    one = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
+    start, half = np.array([0.9, 0.0, 0.9]), 0.006
+    for ulps in (-1.0, 0.0, 1.0):
+        other = one + ulps * np.spacing(one)
+        regions = {
+            "regions[0]": HalfSpace(start - half * one, one),
+            "regions[1]": HalfSpace(start + half * one, -other),
+        }
+        assert tangent_regions(regions, start) == []

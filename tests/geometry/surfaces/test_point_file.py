@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.surfaces.point_file import read_surface_points
+from pfsc_drake.geometry.surfaces.point_file import read_surface_file, read_surface_points
 
 POINTS = np.array([[0.0, 0.0, 0.5], [1.0, 0.0, 0.25], [0.0, 2.0, 0.0], [0.0, 0.0, 3.5]])
 CSV = b"z, x, y  # scanned\n" + b"".join(b"%g,%g,%g\n" % (z, x, y) for x, y, z in POINTS)
@@ -79,8 +79,7 @@ def test_equal_vertices_are_taken_once_in_the_order_of_the_file(tmp_path):
         ("a.csv", b"", "no points"),
         ("a.csv", b"x,y,z\n", "no points"),
         ("a.csv", b"x,y\n1,2\n", "line 1: column 'z' is missing"),
-        ("a.csv", b"x,y,z,q\n1,2,3,4\n", "column 'q' is unknown; allowed: x, y, z"),
-        ("a.csv", b"x;y;z\n1;2;3\n", "separate columns by commas"),
+        ("a.csv", b"x,y,Z\n1,2,3\n", "column 'Z' is unknown; allowed: x, y, z"),
         ("a.csv", b"1,2,3\n4,5,6\n", "the first line names the columns"),
         ("a.csv", b"x,y,z,x\n1,2,3,4\n", "column 'x' twice"),
         ("a.csv", b"x,y,z\n1,2\n", "line 2: 2 values; 3 are required"),
@@ -132,3 +131,11 @@ def test_missing_files_and_folders_are_refused(tmp_path, name):
 def test_an_unknown_unit_is_refused(tmp_path):
     with pytest.raises(InputError, match="unit: 'km'; one of m, cm, mm, inch"):
         read_surface_points(write(tmp_path, "a.csv", CSV), "km")
+
+
+def test_further_columns_are_ignored_with_a_note(tmp_path):
+    rows = "".join(f"{i};{x};{y};{z};late\n" for i, (x, y, z) in enumerate(POINTS.tolist()))
+    file = write(tmp_path, "a.csv", f"nx;x;y;z;stamp\n{rows}".encode())
+    found = read_surface_file(file, "cm")
+    np.testing.assert_allclose(found.points, 0.01 * POINTS, atol=1e-12)
+    assert found.notes == (f"{file}: columns 'nx', 'stamp' ignored",)

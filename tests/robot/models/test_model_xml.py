@@ -36,6 +36,10 @@ def test_prefixes_need_not_be_declared(write):
         (b"<robot><xacro:include filename='x'/></robot>", [":1:", "xacro"]),
         (b"<robot>\n<link name='$(arg prefix)l'/></robot>", [":2:", "xacro"]),
         (b"<robot><a b='${pi}'/></robot>", ["xacro"]),
+        (
+            b"<robot>\n<a %s/></robot>" % b" ".join(b'a%d="1"' % i for i in range(1001)),
+            [":2:", "1001 attributes of one element", "up to 1000"],
+        ),
         (b"<a>" * 300 + b"</a>" * 300, ["200 elements"]),
         (b'<!DOCTYPE r [<!ENTITY a "x"><!ENTITY b "&a;&a;">]><r>&b;</r>', ["entity 'a'"]),
         (b'<!DOCTYPE r [<!ENTITY a SYSTEM "/etc/hostname">]><r>&a;</r>', ["entity 'a'"]),

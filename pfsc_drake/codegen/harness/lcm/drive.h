@@ -10,7 +10,13 @@
 #include "messages.h"
 
 /* What happened before a status was answered, beside the status. */
-enum { DRIVE_INTERRUPTED = 1, DRIVE_ALONE = 2, DRIVE_UNRECORDED = 4, DRIVE_ASKED = 8 };
+enum {
+    DRIVE_INTERRUPTED = 1,
+    DRIVE_ALONE = 2,
+    DRIVE_UNRECORDED = 4,
+    DRIVE_ASKED = 8,
+    DRIVE_FOREIGN = 16
+};
 
 /* Why it ended. */
 typedef enum {

@@ -30,6 +30,7 @@
 
 #define LARGEST_PACKET 65536
 #define MOST_PACKETS 1000 /* that are looked at before an answer */
+#define RECENT 64         /* commands that are told from those of others */
 #define STACK 262144      /* bytes that are there before they are needed */
 
 static const char *const reasons[] = {
@@ -52,6 +53,8 @@ static struct {
     double override; /* share of the planned pace that is asked for */
     struct sockaddr_in group;
     uint32_t count;
+    unsigned char recent[RECENT][COMMAND_PACKET_SIZE]; /* commands that were sent */
+    unsigned long foreign; /* commands that others have sent */
 } bus;
 
 static void interrupt(int number)
@@ -97,6 +100,22 @@ static int open_bus(const char *address, const char *port, const char *ttl)
            && setsockopt(bus.out, IPPROTO_IP, IP_MULTICAST_LOOP, &loop, sizeof loop) == 0;
 }
 
+/* Count a command on the bus that is none of those sent from here. */
+static void compare_command(const unsigned char *message, size_t length)
+{
+    const uint32_t known = bus.count < RECENT ? bus.count : RECENT;
+    uint32_t k;
+    for (k = 1; k <= known; ++k) {
+        size_t size;
+        const unsigned char *sent = packet_message(
+            bus.recent[(bus.count - k) % RECENT], COMMAND_PACKET_SIZE, COMMAND_CHANNEL, &size);
+        if (sent != NULL && size == length && memcmp(sent, message, length) == 0) {
+            return;
+        }
+    }
+    ++bus.foreign;
+}
+
 /* Look at all packets that have come. */
 static void drain(void)
 {
@@ -117,6 +136,10 @@ static void drain(void)
         message = packet_message(packet, (size_t)size, WRENCH_CHANNEL, &length);
         if (message != NULL) {
             decode_wrench(message, length, heard.wrench);
+        }
+        message = packet_message(packet, (size_t)size, COMMAND_CHANNEL, &length);
+        if (message != NULL) {
+            compare_command(message, length);
         }
     }
 }
@@ -167,9 +190,11 @@ static int receive(double timeout)
 
 static void send_command(const drive_status *status, const double *values)
 {
-    unsigned char packet[COMMAND_PACKET_SIZE];
-    encode_command(bus.count++, status->utime, values, packet);
-    sendto(bus.out, packet, sizeof packet, 0, (struct sockaddr *)&bus.group, sizeof bus.group);
+    unsigned char *packet = bus.recent[bus.count % RECENT];
+    encode_command(bus.count, status->utime, values, packet);
+    ++bus.count;
+    sendto(
+        bus.out, packet, COMMAND_PACKET_SIZE, 0, (struct sockaddr *)&bus.group, sizeof bus.group);
 }
 
 static void note(
@@ -191,7 +216,7 @@ static int look_around(void)
 {
     return (is_interrupted ? DRIVE_INTERRUPTED : 0) | (bus.is_led ? 0 : DRIVE_ALONE)
            | (recorder_is_behind() ? DRIVE_UNRECORDED : 0)
-           | (bus.is_asked_to_stop ? DRIVE_ASKED : 0);
+           | (bus.is_asked_to_stop ? DRIVE_ASKED : 0) | (bus.foreign != 0 ? DRIVE_FOREIGN : 0);
 }
 
 static int is_over(const drive_state *drive, double seconds)
@@ -208,6 +233,7 @@ static const char *run(double seconds)
     const double begin = now();
     drain(); /* what came while nobody listened */
     heard.is_new = 0;
+    bus.foreign = 0;
     if (!receive(DRIVE_SILENCE)) {
         return "silence";
     }
@@ -315,7 +341,9 @@ static void go_first(void)
 
 int main(int argc, char **argv)
 {
-    struct sigaction caught;
+    static const int of_terminals[] = {SIGINT, SIGHUP};
+    size_t k;
+    struct sigaction caught, before;
     const char *reason;
     if (argc == 5 && strcmp(argv[1], "-r") == 0) {
         reason = repeat(argv[2], atof(argv[3]), argv[4]);
@@ -328,9 +356,12 @@ int main(int argc, char **argv)
     }
     memset(&caught, 0, sizeof caught);
     caught.sa_handler = interrupt;
-    sigaction(SIGINT, &caught, NULL);
     sigaction(SIGTERM, &caught, NULL);
-    sigaction(SIGHUP, &caught, NULL);
+    for (k = 0; k < sizeof of_terminals / sizeof of_terminals[0]; k++) {
+        if (sigaction(of_terminals[k], NULL, &before) == 0 && before.sa_handler != SIG_IGN) {
+            sigaction(of_terminals[k], &caught, NULL); /* ignored, as by nohup, it stays so */
+        }
+    }
     caught.sa_handler = SIG_IGN;
     sigaction(SIGPIPE, &caught, NULL);
     if (!open_bus(argv[1], argv[2], argv[3])) {
@@ -345,6 +376,9 @@ int main(int argc, char **argv)
     go_first();
     reason = run(atof(argv[4]));
     printf("%s", recorder_close() ? "" : "the record is not complete: it could not be written\n");
+    if (bus.foreign != 0) {
+        printf("%lu commands were not sent by this controller\n", bus.foreign);
+    }
     printf("end %s\n", reason);
     return 0;
 }
