@@ -43,6 +43,7 @@ from experiments.results.promises import (
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
+from experiments.results.rest import rest_metrics
 from experiments.results.stop import MotionAfterFault
 from experiments.results.streaming import stream_metrics
 from experiments.results.teleoperation import handle_warnings, teleoperation_metrics
@@ -245,6 +246,8 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
     metrics.update(limits.metrics(log))
+    effort = station.robot.gather("effort_limit") * settings.controller.effort_scale
+    metrics.update(rest_metrics(log, effort, converged_after(settings, log)))
     stop = ""
     if "fault_time" in log.attributes and log.time.size:
         motion_after = MotionAfterFault(log, limits)

@@ -35,8 +35,8 @@ class RestHold:
     after ``settling`` ticks, what shakes comes to rest in as many, and from then on a drive sticks
     while its motor stays within ``window``. A motor that has just stopped is at the edge of sliding
     on, as the drive overcomes all of its friction: half of that is taken back while what shakes
-    comes to rest, so that friction can bear forces in both directions. In the tick in which the reference or a drive moves
-    the law goes on. So a force that moves no drive is left to friction.
+    comes to rest, so that friction can bear forces in both directions. In the tick in which the
+    reference or a drive moves the law goes on. So a force that moves no drive is left to friction.
 
     Attributes:
         shaking: Largest displacement of a motor before [rad or m].
