@@ -41,9 +41,9 @@ from experiments.results.promises import (
     unpromised_distance,
 )
 from experiments.results.recorded_motion import collect_motion
+from experiments.results.rest import rest_metrics, rest_warnings
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
-from experiments.results.rest import rest_metrics
 from experiments.results.stop import MotionAfterFault
 from experiments.results.streaming import stream_metrics
 from experiments.results.teleoperation import handle_warnings, teleoperation_metrics
@@ -270,6 +270,7 @@ def _measure(
     warnings = [
         *prepared.warnings,
         *limits.warnings(log),
+        *rest_warnings(metrics),
         *saturation_warnings(log),
         *rate_warnings(log, station.task.drive_plan, settings.reference),
         *_sensor_warnings(log),

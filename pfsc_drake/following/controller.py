@@ -139,7 +139,11 @@ def add_controller(
     controller = builder.AddNamedSystem(
         "following_controller",
         FollowingController(
-            law, options.sampling_time, watched, carries=carries, hold=rest_hold(law, options)
+            law,
+            options.sampling_time,
+            watched,
+            carries=carries,
+            hold=rest_hold(law, believed, options),
         ),
     )
     robot, signals = believed.robot, dict(ports)

@@ -15,6 +15,7 @@ from pfsc_drake.control.estimation.momentum import (
 )
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.rest_hold import RestHold
+from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import Believed, Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
@@ -22,30 +23,42 @@ from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
 
-# rad or m, rad or m, s; see RestHold
-_SHAKING, _WINDOW, _SETTLING = 1e-3, 2e-4, 0.03
+# rad or m, and s; see RestHold
+_DRIFT, _SHAKING, _WINDOW, _SETTLING = 2e-3, 0.02, 2e-4, 0.03
 # m or rad; up to which error a law with an integral part leaves the rest to friction
 _LARGEST_ERROR = 2e-3
 # by which part of itself a coefficient is thought to change from sample to sample
 _DRIFT = 1e-3
 
 
-def rest_hold(law: FollowingLaw, options: ControllerParameters) -> RestHold | None:
-    """Return what holds the torques of drives that stick, if friction is compensated.
+def rest_hold(
+    law: FollowingLaw, believed: Believed, options: ControllerParameters
+) -> RestHold | None:
+    """Return what holds the torques of drives that stick, if friction is known and compensated.
 
-    A manifold that moves with time does not tell whether it rests: there the law goes on.
+    A manifold that moves does not tell whether it rests: there the law goes on.
 
     Args:
         law: The law.
+        believed: The robot.
         options: What is chosen of the controller.
     """
     friction, linearization = options.friction, law.linearization
-    if friction.source == "none" or not friction.hold_at_rest:
+    if friction.source == "none" or not friction.hold_at_rest or believed.friction is None:
         return None
-    if linearization.relative_degree == 1 or linearization.manifold.follows_time:
+    manifold = linearization.manifold
+    moves = manifold.follows_time or isinstance(manifold, MovingFrameManifold)
+    if linearization.relative_degree == 1 or moves:
         return None
     largest = _LARGEST_ERROR if law.stabilization.has_integral_part else np.inf
-    return RestHold(_SHAKING, _WINDOW, max(1, round(_SETTLING / options.sampling_time)), largest)
+    return RestHold(
+        np.asarray(believed.friction[0], dtype=float),
+        _DRIFT,
+        _SHAKING,
+        _WINDOW,
+        max(2, round(_SETTLING / options.sampling_time)),
+        largest,
+    )
 
 
 def add_friction_compensation(

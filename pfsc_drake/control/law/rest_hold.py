@@ -17,49 +17,59 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from pfsc_drake.blocks.block import Values
 from pfsc_drake.blocks.cases import where
 
 # derivatives of the reference below which it rests, in SI units
 _RESTS = 1e-6
+# position of a motor before the reference rests [rad or m]
+_NOWHERE = 1e9
 # share of the friction torque of a motor that has stopped
 _TAKEN_BACK = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RestHold:
-    """Holds the mean torque once the reference rests and every drive sticks.
+    """Holds the mean torques once the reference rests and the motors do not get on.
 
-    A drive sticks while its motor stays within ``shaking`` of where it was. The torques are held
-    after ``settling`` ticks, what shakes comes to rest in as many, and from then on a drive sticks
-    while its motor stays within ``window``. A motor that has just stopped is at the edge of sliding
-    on, as the drive overcomes all of its friction: half of that is taken back while what shakes
-    comes to rest, so that friction can bear forces in both directions. In the tick in which the
-    reference or a drive moves the law goes on. So a force that moves no drive is left to friction.
+    The motors do not get on where their mean position of ``settling`` ticks, however they shake
+    meanwhile, is within ``drift`` of that before. Then the mean torques of these ticks are
+    held. A motor that has just stopped is at the edge of sliding on, as its drive overcomes all
+    of the friction: half of that is taken back over the next ``settling`` ticks, so that friction
+    can bear forces in both directions. What shakes has to stay within ``shaking`` of the mean
+    until then, and within ``window`` from then on. In the tick in which the reference or a motor
+    moves the law goes on. So a force that moves no motor is left to friction.
 
     Attributes:
-        shaking: Largest displacement of a motor before [rad or m].
-        window: Largest displacement of one that has come to rest [rad or m].
-        settling: Ticks after which the torques are held, 1 or more.
-        largest_error: Error of the virtual output up to which they are [m or rad].
+        coulomb: ``f_c`` as it is believed, shape (N,) [Nm or N].
+        drift: Largest change of a mean position of a motor that does not get on [rad or m].
+        shaking: Largest displacement of a motor that comes to rest [rad or m].
+        window: Largest displacement of one at rest [rad or m].
+        settling: Ticks of a mean, 2 or more.
+        largest_error: Mean error of the virtual output up to which torques are held [m or rad].
     """
 
+    coulomb: np.ndarray
+    drift: float
     shaking: float
     window: float
     settling: int
     largest_error: float
 
-    def states(self, num_joints: int) -> dict[str, int]:
+    def states(self, num_joints: int, num_outputs: int) -> dict[str, int]:
         """Return the sizes of the states.
 
-        Those are where drives stick, their mean torque, that of friction, and ticks since.
+        Those are means of motor positions, torques of drives and of friction, and errors, since
+        ``rest_ticks``; and where the motors rested before.
 
         Args:
             num_joints: N.
+            num_outputs: m.
         """
-        names = ("rest_position", "rest_drive", "rest_friction")
-        return dict.fromkeys(names, num_joints) | {"rest_ticks": 1}
+        names = ("rest_position", "rest_drive", "rest_friction", "rest_before")
+        return dict.fromkeys(names, num_joints) | {"rest_error": num_outputs, "rest_ticks": 1}
 
     def step(
         self, x: Values, q_M: Any, motion: Any, error: Any, drive: Any, friction: Any
@@ -74,25 +84,37 @@ class RestHold:
             drive: What the law tells the drives, shape (N, 1) [Nm or N].
             friction: What it overcomes of friction by that, shape (N, 1) [Nm or N].
         """
-        whole = 2 * self.settling
-        window = where(x.rest_ticks >= whole, self.window, self.shaking)
-        sticks = ca.mmax(ca.fabs(q_M - x.rest_position)) < window
-        rests = ca.logic_and(sticks, ca.mmax(ca.fabs(motion)) < _RESTS)
-        holds = ca.logic_and(rests, x.rest_ticks >= self.settling)
-        # once held, an error within the window is nothing new
-        near = ca.logic_or(holds, ca.mmax(ca.fabs(error)) < self.largest_error)
-        settles = ca.logic_and(rests, near)
-        stays = ca.logic_and(rests, x.rest_ticks != whole - 1)
+        ticks, settling = x.rest_ticks, self.settling
+        rests = _largest(motion) < _RESTS
+        # first the means of settling ticks, then as many in which friction is taken back
+        window = where(ticks >= 2 * settling, self.window, self.shaking)
+        sticks = _largest(q_M - x.rest_before) < window
+        holds = ca.logic_and(ticks >= settling, ca.logic_and(rests, sticks))
         means = {}
-        for name, value in (("rest_drive", drive), ("rest_friction", friction)):
-            last = getattr(x, name)
-            mean = last + (value - last) / (x.rest_ticks + 1.0)
-            means[name] = where(holds, last, where(settles, mean, 0.0 * value))
-        share = ca.fmin((x.rest_ticks - self.settling) / self.settling, 1.0)
-        held = x.rest_drive - _TAKEN_BACK * share * x.rest_friction
-        states = {
-            "rest_position": where(stays, x.rest_position, q_M),
-            **means,
-            "rest_ticks": where(settles, ca.fmin(x.rest_ticks + 1.0, whole), 0.0),
+        values = {"position": q_M, "drive": drive, "friction": friction, "error": error}
+        for name, value in values.items():
+            last = getattr(x, f"rest_{name}")
+            mean = where(ticks == 0.0, value, last + (value - last) / (ticks + 1.0))
+            means[f"rest_{name}"] = where(holds, last, mean)
+        position = means["rest_position"]
+        steady = ca.logic_and(
+            _largest(position - x.rest_before) < self.drift,
+            _largest(means["rest_error"]) < self.largest_error,
+        )
+        whole, counts = ticks == settling - 1, ca.logic_and(rests, ticks < settling)
+        counts = ca.logic_and(counts, ca.logic_or(steady, ca.logic_not(whole)))
+        goes_on = ca.logic_or(holds, counts)
+        before = where(whole, position, where(ticks == 2 * settling - 1, q_M, x.rest_before))
+        share = ca.fmin((ticks - settling) / settling, 1.0)
+        coulomb = ca.DM(self.coulomb)
+        overcome = ca.fmin(ca.fmax(x.rest_friction, -coulomb), coulomb)
+        held = x.rest_drive - _TAKEN_BACK * share * overcome
+        states = means | {
+            "rest_before": where(goes_on, before, where(whole, position, _NOWHERE)),
+            "rest_ticks": where(goes_on, ca.fmin(ticks + 1.0, 2 * settling), 0.0),
         }
         return holds, where(holds, held, drive), states
+
+
+def _largest(values: Any) -> Any:
+    return ca.mmax(ca.fabs(values))

@@ -81,8 +81,8 @@ class SampledLaw(Block):
         }
         self.states = {"integral": m, "held": n, "known": 1, "output": m}
         if hold is not None:
-            self.states |= hold.states(n)
-            self.inner = {"holds": 1} | {f"next_{k}": size for k, size in hold.states(n).items()}
+            self.states |= hold.states(n, m)
+            self.inner = {"holds": 1} | {f"next_{k}": size for k, size in hold.states(n, m).items()}
         self._tells_velocity = layout.reference_velocity.stop > layout.reference_velocity.start
         if self._tells_velocity:
             self.outputs["reference_velocity"] = Port(n, "rad/s or m/s")
@@ -122,7 +122,11 @@ class SampledLaw(Block):
             q_M, drive = u.joint_state[2 * n : 3 * n], result[layout.drive]
             friction = getattr(u, "friction_torque", None)
             friction = ca.DM.zeros(n) if friction is None else friction
-            holds, drive, kept = self._hold.step(x, q_M, u.reference[m:], error, drive, friction)
+            moving = [u.reference[m:]]
+            if law.posture is not None:
+                moving.append(u.posture_reference[n:])
+            motion = ca.vertcat(*moving)
+            holds, drive, kept = self._hold.step(x, q_M, motion, error, drive, friction)
             outputs["evaluation"] = ca.vertcat(drive, result[layout.drive.stop :])
             outputs |= {"holds": holds} | {f"next_{name}": value for name, value in kept.items()}
         return outputs
@@ -144,7 +148,7 @@ class SampledLaw(Block):
             waits = saturated if self._hold is None else ca.logic_or(saturated, y.holds)
             later["integral"] = x.integral + where(waits, 0.0, self._period * error)
         if self._hold is not None:
-            later |= {name: getattr(y, f"next_{name}") for name in self._hold.states(1)}
+            later |= {name: getattr(y, f"next_{name}") for name in self._hold.states(1, 1)}
         if self._tells_velocity:
             later["reference_velocity"] = y.evaluation[layout.reference_velocity]
         return {name: where(u.stopping, getattr(x, name), new) for name, new in later.items()}

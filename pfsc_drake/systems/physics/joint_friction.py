@@ -55,6 +55,9 @@ class JointFriction(Diagram):
         friction: The law with its parameters, N joints.
         drift: How all of ``tau_f`` changes with time, if it does.
         rows: ``v`` is these times the input, shape (N, M); the input itself by default.
+
+    Attributes:
+        law: The law with its parameters, N joints.
     """
 
     def __init__(
@@ -64,7 +67,7 @@ class JointFriction(Diagram):
         rows: np.ndarray | None = None,
     ) -> None:
         super().__init__()
-        self._friction, self._drift = friction, drift
+        self.law, self._drift = friction, drift
         n = friction.dimension
         rows = np.eye(n) if rows is None else rows
         builder = DiagramBuilder()
@@ -103,7 +106,7 @@ class JointFriction(Diagram):
             times: Shape (samples,) [s].
         """
         scale = np.ones(len(times)) if self._drift is None else self._drift.scale(times)
-        return np.outer(scale, self._friction.coulomb), np.outer(scale, self._friction.viscous)
+        return np.outer(scale, self.law.coulomb), np.outer(scale, self.law.viscous)
 
     def set_load(self, context: Context, torque: np.ndarray) -> None:
         """Let friction carry a load from the start, as in a joint that has been stuck.
@@ -112,7 +115,7 @@ class JointFriction(Diagram):
             context: Context of this system.
             torque: ``tau_f`` at rest [Nm or N], shape (N,); limited to ``f_c``.
         """
-        context.SetContinuousState(self._friction.deflection(torque))
+        context.SetContinuousState(self.law.deflection(torque))
 
 
 class _Drifting(LeafSystem):

@@ -371,3 +371,22 @@ def test_encoders_of_a_fast_servo_differentiate_over_its_own_period(settings):
     np.testing.assert_allclose(v_M[1:], np.diff(q_M, axis=0) / period, atol=1e-9)
     # and its torques act over one of its periods
     assert np.abs(np.diff(torques[300:], axis=0)).max(axis=1).min() > 0.0
+
+
+def presliding(settings, step, given=()):
+    settings.friction.f_c, settings.friction.f_v = [30.0, 40.0, 25.0], [3.0, 2.0, 1.0]
+    settings.friction.presliding, settings.simulation.max_step = list(given), step
+    friction = build(settings).diagram.GetSubsystemByName("joint_friction")
+    return friction.law.presliding
+
+
+def test_shorter_steps_do_not_change_friction(settings):
+    np.testing.assert_array_equal(presliding(settings, 2e-4), presliding(settings, 1e-3))
+
+
+def test_the_presliding_is_that_given_if_steps_integrate_it(settings):
+    least = presliding(settings, 1e-3)
+    given = [2.0 * least[0], 0.25 * least[1], 3.0 * least[2]]
+    with pytest.raises(InputError, match=r"friction.presliding = .* of joint 2: steps of 0.001 s"):
+        presliding(settings, 1e-3, given)
+    np.testing.assert_array_equal(presliding(settings, 4.9e-4, given), given)
