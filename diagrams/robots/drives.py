@@ -40,7 +40,7 @@ from pfsc_drake.yaml.typed import spread
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
 _BRISTLES_PER_STEP = 0.5
-# s; shorter steps change nothing about the bristles
+# s; shorter steps of a continuous plant change nothing about the bristles
 _SHORTEST_STEP = 1e-3
 # share of that frequency of brakes, whose dampers act beside those of friction
 _OF_BRAKES = 0.3
@@ -329,8 +329,8 @@ def _bristles(
     if given:
         presliding = _per_joint("friction.presliding", given, f_c.size)
         return _of_presliding(options, f_c, f_v, drives, presliding)
-    longer = max(_step(options, drives), _SHORTEST_STEP)
-    return replace(_bristles_of_step(longer, stiffest, f_v, drives, 1.0), coulomb=f_c)
+    step = drives.step or max(_step(options, drives), _SHORTEST_STEP)
+    return replace(_bristles_of_step(step, stiffest, f_v, drives, 1.0), coulomb=f_c)
 
 
 def _of_presliding(
@@ -400,7 +400,7 @@ def _given_coefficients(
         return known.coulomb[:n], known.viscous[:n]
     values = []
     for key in ("f_c", "f_v"):
-        values.append(_per_joint(f"{block}.{key}", getattr(parameters, key) or [0.0], n))
+        values.append(_per_joint(f"{block}.{key}", getattr(parameters, key) or [0.0] * n, n))
     return values[0], values[1]
 
 

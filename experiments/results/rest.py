@@ -9,8 +9,9 @@ import numpy as np
 from experiments.results.run_log import FloatArray, RunLog
 from reporting.metrics import Metrics
 
-# s; of a rest that counts, and of its end that is looked at
-_SHORTEST, _WINDOW = 0.3, 0.2
+# s; of a rest that counts, of what is looked at, and of what comes after: there a motion begins
+# whose derivatives are felt before its speed is
+_SHORTEST, _WINDOW, _LEFT_OUT = 0.3, 0.2, 0.02
 # derivative of a reference that rests [m/s or rad/s]
 _RESTS = 1e-6
 # share of a drive's limit, peak to peak, and speed of the tool [m/s], that a robot at rest may have
@@ -18,7 +19,7 @@ ALLOWED_VIBRATION, ALLOWED_SPEED = 0.02, 2e-3
 
 
 def rest_metrics(log: RunLog, limits: FloatArray, begin: float) -> Metrics:
-    """Return how much drives and tool move over the last 0.2 s of each rest of the reference.
+    """Return how much drives and tool move over 0.2 s at the end of each rest of the reference.
 
     ``rest_vibration`` is the largest torque, peak to peak, as a share of the drive's limit,
     ``rest_speed`` the largest speed of the tool [m/s]. Rests below 0.3 s do not count, nor does
@@ -79,11 +80,13 @@ def _rests(log: RunLog, begin: float) -> list[slice]:
         if name in log:
             rate = np.abs(np.diff(log[name].values, axis=0)) / np.diff(time)[:, None]
             moving |= ~(rate < _RESTS).all(axis=1)
-    end = float(log.attributes.get("fault_time", np.inf))
-    moving |= (time[:-1] < begin) | (time[1:] > end)
+    fault = float(log.attributes.get("fault_time", np.inf))
+    moving |= (time[:-1] < begin) | (time[1:] > fault)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], moving, [True]]).astype(int)))
     windows = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         if time[last] - time[first] > _SHORTEST - 1e-9:
-            windows.append(slice(int(np.searchsorted(time, time[last] - _WINDOW)), int(last) + 1))
+            end = time[last] - _LEFT_OUT
+            ends = np.searchsorted(time, [end - _WINDOW - 1e-9, end + 1e-9])
+            windows.append(slice(int(ends[0]), int(ends[1])))
     return windows

@@ -26,10 +26,10 @@ def test_the_ends_of_rests_are_measured():
     metrics = rest_metrics(log_of(2.0, 1e-5), LIMITS, 0.0)
     shaking, speed = metrics["rest_vibration"], metrics["rest_speed"]
     assert shaking.value == pytest.approx(2 * 2.0 / 40.0, rel=1e-3)
-    assert shaking.source == "axis 2, rest until t = 2.000 s"
+    assert shaking.source == "axis 2, rest until t = 1.980 s"
     assert speed.value == pytest.approx(2.0 * np.pi * 50.0 * 1e-5, rel=0.02)
     (warning,) = rest_warnings(metrics)
-    assert "axis 2, rest until t = 2.000 s by 10 % of its limit, tool at 3.1 mm/s" in warning
+    assert "axis 2, rest until t = 1.980 s by 10 % of its limit, tool at 3.1 mm/s" in warning
 
 
 def test_a_robot_that_rests_is_not_mentioned():
