@@ -37,6 +37,8 @@ _SMOOTHING = 0.04
 _OF_PACE = 5e-3
 # s, between the knots of a slowed reference
 _KNOTS = 2e-3
+# of a drive's torque, from which on holding still takes so much that no pace helps
+_HELD = 0.95
 # of the pace, from which on a place counts as slowed
 _SLOW = 0.99
 
@@ -134,8 +136,42 @@ class DrivePlanner(MotionDemand):
             said = self._beyond_limits(self._step(_GLANCED), error.course, still=True)
             return self.unknown(str(error), said)
         said = self._beyond_limits(step, course[:, 0], still=step > _CHECKED)
+        said += self._held_beyond_reserve(step, course)
         plan = self._of_course(course, demand, step, fits)
         return replace(plan, said=[*said, *plan.said])
+
+    def allowed(self, course: np.ndarray, reserve: float | None = None) -> np.ndarray:
+        """Return what may be asked of the drives, infinite where no pace changes enough of it.
+
+        Args:
+            course: As of :class:`MotionDemand`.
+            reserve: As of :class:`MotionDemand`.
+        """
+        held = np.abs(self.at_rest(course)) >= _HELD * self.limits
+        return np.where(held, np.inf, super().allowed(course, reserve))
+
+    def _held_beyond_reserve(self, step: float, course: np.ndarray) -> list[str]:
+        """Return where holding still takes more than the reserve leaves, if it does."""
+        n, reserve = self.robot.dimension, self._reference.reserve
+        share = np.abs(self.at_rest(course)[:, :n]) / self.limits[:n]
+        i, axis = np.unravel_index(int(share.argmax()), share.shape)
+        worst = float(share[i, axis])
+        if worst <= 1.0 - reserve:
+            return []
+        place = self.where(self._task.motion, i * step)
+        said = (
+            f"holding still takes {100.0 * worst:.0f} % of the torque of axis {axis + 1} at "
+            f"{place}, reference.reserve = {reserve:g} leaves {100.0 * (1.0 - reserve):.0f} %"
+        )
+        if worst >= 1.0:
+            return [f"{said}: the robot cannot be held there, whatever its speed"]
+        if worst >= _HELD:
+            return [f"{said}: no lower speed changes that, and the motion is not slowed for it"]
+        lower = np.floor(100.0 * (1.0 - worst)) / 100.0
+        return [
+            f"{said}: the motion is slow there for what is left; reference.reserve = {lower:g} "
+            "would leave the weight, and less against disturbances"
+        ]
 
     def _beyond_limits(self, step: float, postures: np.ndarray, *, still: bool) -> list[str]:
         """Return which joint passes a limit on the way, if one does."""

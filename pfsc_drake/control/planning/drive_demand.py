@@ -247,7 +247,10 @@ def find_pace(
         InputError: If no pace is slow enough.
     """
     polynomials = demand.at_constant_rate(course)
-    even, tightest = _even_pace(polynomials, (1.0 - _FOR_CHANGES) * allowed)
+    # no pace changes the weight: of what it leaves, at most half is kept for changes
+    weight = np.abs(polynomials[:, 0])
+    even_allowed = np.maximum((1.0 - _FOR_CHANGES) * allowed, 0.5 * (weight + allowed))
+    even, tightest = _even_pace(polynomials, even_allowed)
     bound = np.full(len(course), change)
     half = max(1, round(smoothing / (2.0 * _BOXES * step)))
     reach = 2 * _BOXES * half + 1

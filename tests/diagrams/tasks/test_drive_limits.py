@@ -200,3 +200,23 @@ def test_a_joint_that_passes_its_limit_on_the_way_is_named_with_its_place(turnin
                 r"joint 7 passes its limit, q_7 = -166.0 deg, at eta = (.*) m, af", said[0]
             )
             assert 0.15 < float(place[1]) < 0.2
+
+
+def test_weight_above_the_reserve_is_said_and_not_waited_for(settings):
+    """It is the same torque whatever the drives can do, and a little less than that in motion."""
+    slow, weights = {"velocity": 0.2, "acceleration": 0.5}, []
+    strong = build_station(settings(**slow), Path()).task.drive_plan
+    assert not strong.said
+    demand = np.abs(strong.demand[:, :3]).max(axis=0) / strong.limits[:3]
+    axis = np.argmax(demand)
+    for share, words in ((0.9, "would leave the weight"), (1.25, "cannot be held there")):
+        weak = settings(**slow)
+        weak.controller.effort_scale = demand[axis] / share
+        plan = build_station(weak, Path()).task.drive_plan
+        said = next(line for line in plan.said if line.startswith("holding still takes"))
+        found = re.search(r"takes (\d+) % of the torque of axis (\d) at .* leaves 70 %", said)
+        assert found and words in said and int(found[2]) == axis + 1
+        assert 0.8 * share < int(found[1]) / 100.0 < share
+        weights.append(int(found[1]) * weak.controller.effort_scale)
+        assert strong.times[-1] <= plan.times[-1] < 1.5 * strong.times[-1]
+    assert weights[0] == pytest.approx(weights[1], rel=0.015)

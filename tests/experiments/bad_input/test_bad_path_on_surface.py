@@ -61,4 +61,4 @@ def test_points_far_from_the_surface(wrong, tmp_path):
     rows = [[0.85, 0.1 * k, 0.95 + 0.005 * k**2 + (k == 2) * 2e-3] for k in range(4)]
     lines = ["x,y,z", *(",".join(map(repr, row)) for row in rows)]
     (tmp_path / "points.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    wrong("path.shape", "waypoint 2", "at most 1 mm", changes=[shape("file: points.csv")])
+    wrong("path.shape", "waypoint 3", "at most 1 mm", changes=[shape("file: points.csv")])
