@@ -1,6 +1,7 @@
 """How properties are tested, without looking at the clock; what begins, and when is compiled."""
 
 import gc
+import signal
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -8,6 +9,10 @@ from hypothesis import HealthCheck, Phase, settings
 from pfsc_drake.compiled import bound_function
 from pfsc_drake.compiled.native_code import native_code
 from tests.deferred_code import DeferredCode
+
+# in the background of a script Ctrl-C is ignored, here and in all processes that are started
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 _CALM = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture, HealthCheck.data_too_large]
 
