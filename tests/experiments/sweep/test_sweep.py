@@ -3,19 +3,20 @@
 import csv
 import io
 import json
+import logging
 import os
 import shlex
 import signal
 import sys
 
 import pytest
+from distributed import LocalCluster
 from pyarrow import parquet
 from rich.console import Console
 
 from experiments.cli import main
 from experiments.sweep import many
 from experiments.sweep.definition import RECORD
-from experiments.sweep.many import open_cluster
 from experiments.sweep.summary import MACHINE_METRICS
 from experiments.sweep.sweep import define_sweep, run_sweep
 from reporting.folder import check_folder
@@ -27,8 +28,15 @@ METRIC = "static_path_deviation"
 @pytest.fixture(scope="module")
 def address():
     """Address of a scheduler with one process."""
-    with open_cluster(None, 1) as client:
-        yield client.scheduler.address
+    with LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        preload=["experiments.sweep.worker"],
+        silence_logs=logging.CRITICAL,
+    ) as cluster:
+        yield cluster.scheduler_address
 
 
 class Impatient(io.StringIO):
