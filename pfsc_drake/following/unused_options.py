@@ -151,7 +151,9 @@ def _friction_rules(options: FollowerOptions, law: str) -> list[Rule]:
     friction, key = options.controller.friction, "controller.friction"
     observed = friction.source == "observer"
     kalman = observed and friction.observer == "kalman"
-    told = friction.has_coefficients or options.obstacles is not None
+    overcome = friction.source != "none"
+    held = overcome and friction.hold_at_rest
+    told = friction.has_coefficients or held or options.obstacles is not None
     return [
         Rule(key, RELATIVE_DEGREE[law] > 1, "needs a law that commands torques"),
         Rule("friction", told, "needs controller.friction with coefficients, or obstacles"),
@@ -160,6 +162,11 @@ def _friction_rules(options: FollowerOptions, law: str) -> list[Rule]:
             f"{key}.smoothing", friction.has_coefficients, "needs source model or observer kalman"
         ),
         Rule(f"{key}.observer", observed, "needs source observer"),
+        Rule(
+            f"{key}.hold_at_rest",
+            overcome and options.friction is not None,
+            "needs a source, and the option friction",
+        ),
         Rule(f"{key}.rate", observed and not kalman, "needs observer disturbance"),
         Rule(f"{key}.kalman", kalman, "needs observer kalman"),
         Rule(

@@ -259,7 +259,7 @@ CONDITIONAL = [
     (follow, FollowerOptions(compliance=SENSED), "compliance", ["source", "tangential"]),
     (follow, FollowerOptions(compliance=OBSERVED), "compliance.observed", None),
     (follow, FollowerOptions(compliance=SENSED), "compliance.limits", None),
-    (follow, MODEL, "controller.friction", ["smoothing", "velocity"]),
+    (follow, MODEL, "controller.friction", ["smoothing", "velocity", "hold_at_rest"]),
     (follow, MODEL, "", ["friction"]),
     (follow, OBSERVER, "controller.friction", ["rate"]),
     (follow, KALMAN, "controller.friction", ["smoothing", "velocity"]),
