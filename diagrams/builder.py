@@ -15,12 +15,9 @@ from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.holder_station import add_holder, stop_both
 from diagrams.robots.arm import Arm
 from diagrams.robots.delta import DeltaPart
-from diagrams.robots.drives import (
-    add_drives,
-    add_friction,
-    believed_friction,
-)
+from diagrams.robots.drives import add_drives
 from diagrams.robots.force_sensor import add_sensor
+from diagrams.robots.friction import add_friction, believed_friction
 from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario

@@ -14,7 +14,8 @@ from diagrams.fault_instant import first_instant
 from diagrams.named_builder import PrefixingBuilder
 from diagrams.oscillation import oscillation_before
 from diagrams.robots.arm import Arm, add_arm
-from diagrams.robots.drives import add_drives, add_friction, believed_friction
+from diagrams.robots.drives import add_drives
+from diagrams.robots.friction import add_friction, believed_friction
 from diagrams.robots.held_workpiece import holding
 from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
 from diagrams.robots.model import is_delta

@@ -8,8 +8,9 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
-from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.drives import add_drives
 from diagrams.robots.force_sensor import add_force_sensor
+from diagrams.robots.friction import add_friction
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart

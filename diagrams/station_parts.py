@@ -7,10 +7,8 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.robots.arm import add_arm
 from diagrams.robots.belief import BeliefSource
 from diagrams.robots.delta import add_delta, free_step
-from diagrams.robots.drives import (
-    FrictionOptions,
-    ServoOptions,
-)
+from diagrams.robots.drives import ServoOptions
+from diagrams.robots.friction import FrictionOptions
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import add_remote_arm

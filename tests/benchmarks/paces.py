@@ -23,7 +23,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.builder import build_station
 from diagrams.robots.arm import add_arm
-from diagrams.robots.drives import add_friction
+from diagrams.robots.friction import add_friction
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.station_parts import belief_source, friction_options

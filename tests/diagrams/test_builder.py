@@ -17,7 +17,8 @@ WIRES = {
     ENCODERS: {
         ("tool_kinematics", "joint_state"),
         ("following_controller", "joint_state"),
-        ("holding_brakes", "velocity"),
+        ("brake_torque", "joint_state"),
+        ("holding_brakes", "joint_state"),
         ("log_signals", "joint_state"),
     },
     ("tool_kinematics", "tool_pose"): {
@@ -34,11 +35,12 @@ WIRES = {
     },
     ("following_controller", "law"): {("log_signals", "law")},
     ("following_controller", "stop_category"): {
-        ("all_stops", "u0"),
+        ("holding_brakes", "request_0"),
         ("log_signals", "stop_category"),
     },
-    ("all_stops", "y0"): {("holding_brakes", "request")},
-    ("holding_brakes", "resistance"): {("resistance", "u0")},
+    ("holding_brakes", "anchor"): {("brake_torque", "anchor")},
+    ("holding_brakes", "give"): {("brake_torque", "give")},
+    ("brake_torque", "resistance"): {("resistance", "u0")},
     ("resistance", "y0"): {("plant", "applied_generalized_force")},
     ("following_controller", "drive_torque"): {("hold", "value")},
     ("hold", "held"): {("drives", "u0")},
@@ -120,8 +122,8 @@ def test_a_failing_sensor_is_between_encoders_and_everything_else(settings):
     settings.simulation.sensor_failure.time = 0.1
     expected = dict(WIRES)
     # brakes are a part of the robot
-    readers = expected[ENCODERS] - {("holding_brakes", "velocity")}
-    log = {("log_signals", "joint_state"), ("holding_brakes", "velocity")}
+    brakes = {(name, "joint_state") for name in ("holding_brakes", "brake_torque")}
+    readers, log = expected[ENCODERS] - brakes, brakes | {("log_signals", "joint_state")}
     found = wires(build_station(settings, Path()).diagram)
     # the log has the truth, and what was delivered beside it
     assert found[ENCODERS] == log | {("sensor_failure", "measured")}

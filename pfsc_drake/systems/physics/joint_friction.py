@@ -1,25 +1,19 @@
-"""Coulomb and viscous friction of the joints, and brakes that hold them."""
+"""Coulomb and viscous friction of the joints."""
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import (
     BasicVector,
     Context,
     Diagram,
     DiagramBuilder,
-    DiscreteValues,
-    EventStatus,
-    InputPortIndex,
     LeafSystem,
     OutputPort,
 )
 from pydrake.systems.primitives import (
     Adder,
-    ConstantVectorSource,
     FirstOrderLowPassFilter,
     Gain,
     MatrixGain,
-    PortSwitch,
     Saturation,
 )
 
@@ -134,117 +128,3 @@ class _Drifting(LeafSystem):
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._drift.scale(context.get_time()) * self._torque.Eval(context))
-
-
-# s, in which the holding torque builds up
-_RISE = 0.02
-
-
-class HoldingBrakes(Diagram):
-    """Dry friction on the motors that sets in some time after the first request, and stays.
-
-    ``tau_b = c(t) f_c sat(s + tau v / delta)``, with c from 0 to 1 in 20 ms from ``delay`` after
-    the sample that sees a request. Until then nothing acts, and nothing is computed. See
-    :class:`BristleFriction` for the friction at rest.
-
-    Ports:
-        velocity (input): ``v`` of the motors [rad/s or m/s], shape (N,), or what it is rows of,
-            shape (M,).
-        request (input): Stop categories, one or more: 0 closes the brakes.
-        resistance (output): ``-tau_b``, the generalized force on the motors [Nm or N], shape
-            (N,).
-
-    State:
-        Continuous: deflection of each brake's bristles, shape (N,). Discrete: when they
-        close [s], infinite before a request, and whether they have begun to, shape (2,).
-
-    Args:
-        friction: Holding torques ``f_c`` with their bristles, N joints.
-        size: Size of the port ``request``.
-        delay: From the request until they close [s].
-        period: Sampling time [s].
-        rows: ``v`` is these times the input, shape (N, M); the input itself by default.
-    """
-
-    def __init__(
-        self,
-        friction: BristleFriction,
-        size: int,
-        delay: float,
-        period: float,
-        rows: np.ndarray | None = None,
-    ) -> None:
-        super().__init__()
-        n = friction.dimension
-        num_inputs = n if rows is None else rows.shape[1]
-        builder = DiagramBuilder()
-        actuator = builder.AddNamedSystem("actuator", _BrakeActuator(n, size, delay, period))
-        closed = actuator.GetOutputPort("closed")
-        still = builder.AddNamedSystem("still", ConstantVectorSource(np.zeros(num_inputs)))
-        none = builder.AddNamedSystem("none", ConstantVectorSource(np.zeros(n)))
-        moving, acting = (
-            builder.AddNamedSystem(name, PortSwitch(count))
-            for name, count in (("moving", num_inputs), ("acting", n))
-        )
-        rubbing = builder.AddNamedSystem("friction", JointFriction(friction, rows=rows))
-        # with open brakes the first input of a switch is evaluated, else the second
-        builder.Connect(still.get_output_port(), moving.DeclareInputPort("open"))
-        velocity = moving.DeclareInputPort("closed")
-        builder.Connect(moving.get_output_port(), rubbing.GetInputPort("velocity"))
-        builder.Connect(rubbing.GetOutputPort("resistance"), actuator.GetInputPort("resistance"))
-        builder.Connect(none.get_output_port(), acting.DeclareInputPort("open"))
-        builder.Connect(actuator.GetOutputPort("applied"), acting.DeclareInputPort("closed"))
-        for switch in (moving, acting):
-            builder.Connect(closed, switch.get_port_selector_input_port())
-        builder.ExportInput(velocity, "velocity")
-        builder.ExportInput(actuator.GetInputPort("request"), "request")
-        builder.ExportOutput(acting.get_output_port(), "resistance")
-        builder.BuildInto(self)
-
-
-class _BrakeActuator(LeafSystem):
-    """Moment at which brakes close, and the share of their torque."""
-
-    def __init__(self, num_joints: int, size: int, delay: float, period: float) -> None:
-        super().__init__()
-        self._delay, self._slack = delay, 0.5 * period
-        self.DeclareDiscreteState(np.array([np.inf, 0.0]))
-        self._request = self.DeclareVectorInputPort("request", size)
-        self._resistance = self.DeclareVectorInputPort("resistance", num_joints)
-        self.DeclareAbstractOutputPort(
-            "closed",
-            lambda: Value(InputPortIndex(0)),
-            self._calc_closed,
-            prerequisites_of_calc={self.xd_ticket()},
-        )
-        self.DeclareVectorOutputPort(
-            "applied",
-            num_joints,
-            self._calc_applied,
-            prerequisites_of_calc={
-                self._resistance.ticket(),
-                self.xd_ticket(),
-                self.time_ticket(),
-            },
-        )
-        self.DeclareInitializationDiscreteUpdateEvent(self._open)
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._notice)
-
-    def _open(self, context: Context, state: DiscreteValues) -> EventStatus:
-        state.set_value(np.array([np.inf, 0.0]))
-        return EventStatus.Succeeded()
-
-    def _notice(self, context: Context, state: DiscreteValues) -> None:
-        now, (closing, _) = context.get_time(), context.get_discrete_state_vector().value()
-        if closing == np.inf and (self._request.Eval(context) == 0.0).any():
-            closing = now + self._delay
-        state.set_value(np.array([closing, now + self._slack >= closing]))
-
-    def _calc_closed(self, context: Context, output: AbstractValue) -> None:
-        # that of the selector is 0
-        output.set_value(InputPortIndex(1 + int(context.get_discrete_state_vector()[1])))
-
-    def _calc_applied(self, context: Context, output: BasicVector) -> None:
-        since = context.get_time() - context.get_discrete_state_vector()[0]
-        share = min(max(since / _RISE, 0.0), 1.0)
-        output.SetFromVector(share * self._resistance.Eval(context))

@@ -49,7 +49,7 @@ def test_friction_is_beside_the_drives():
     assert behind["plant", "actuation"] == ("hold", "held")
     assert behind["plant", "resistance"] == ("all_resistances", "sum")
     assert behind["all_resistances", "u0"] == ("joint_friction", "resistance")
-    assert behind["all_resistances", "u1"] == ("holding_brakes", "resistance")
+    assert behind["all_resistances", "u1"] == ("brake_torque", "resistance")
     # the true velocity, whatever the encoders say
     assert behind["joint_friction", "velocity"] == ("joint_encoders", "y0")
 

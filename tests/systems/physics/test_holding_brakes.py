@@ -10,35 +10,53 @@ from pydrake.systems.primitives import (
     Integrator,
     LogVectorOutput,
     MatrixGain,
+    Multiplexer,
     TrajectorySource,
 )
 from pydrake.trajectories import PiecewisePolynomial
 
 from experiments.simulation import configure
 from pfsc_drake.physics.friction import bristles_for_step
-from pfsc_drake.systems.physics.joint_friction import HoldingBrakes
+from pfsc_drake.physics.holding_brakes import HoldingBrakes
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.physics.brake_torque import BrakeTorque
 
 INERTIA, HOLDING = 2.0, 50.0  # kg m^2, Nm
 FAULT, DELAY, TICK = 0.1, 0.05, 1e-3  # s
 
 
-def _velocity(load, fault=FAULT, end=0.6):
+def _velocity(load, fault=FAULT, end=0.6, asked=0):
     """Return times [s] and velocity [rad/s] of an inertia that a load [Nm] drives from rest."""
     builder = DiagramBuilder()
     friction = bristles_for_step(np.array([HOLDING]), np.zeros(1), np.array([INERTIA]), TICK)
-    brakes = builder.AddSystem(HoldingBrakes(friction, 1, DELAY, TICK))
+    block = HoldingBrakes(friction.presliding, 2, DELAY, TICK)
+    brakes = builder.AddSystem(BlockSystem(block, TICK))
+    held = builder.AddSystem(BrakeTorque(friction))
     motor = builder.AddSystem(Integrator(1))
+    angle = builder.AddSystem(Integrator(1))
+    # one rigid joint, whose links rest where the brakes do not look
+    joint_state = builder.AddSystem(Multiplexer(4))
+    elsewhere = builder.AddSystem(ConstantVectorSource([7.0]))
     inertia = builder.AddSystem(MatrixGain(np.array([[1.0 / INERTIA]])))
     torque = builder.AddSystem(Adder(2, 1))
     weight = builder.AddSystem(ConstantVectorSource([load]))
     steps = PiecewisePolynomial.ZeroOrderHold([0.0, fault, 10.0], np.array([[-1.0, 0.0, 0.0]]))
     status = builder.AddSystem(TrajectorySource(steps))
     builder.Connect(weight.get_output_port(), torque.get_input_port(0))
-    builder.Connect(brakes.GetOutputPort("resistance"), torque.get_input_port(1))
+    builder.Connect(held.GetOutputPort("resistance"), torque.get_input_port(1))
     builder.Connect(torque.get_output_port(), inertia.get_input_port())
     builder.Connect(inertia.get_output_port(), motor.get_input_port())
-    builder.Connect(motor.get_output_port(), brakes.GetInputPort("velocity"))
-    builder.Connect(status.get_output_port(), brakes.GetInputPort("request"))
+    builder.Connect(motor.get_output_port(), angle.get_input_port())
+    for k, source in enumerate((elsewhere, elsewhere, angle, motor)):
+        builder.Connect(source.get_output_port(), joint_state.get_input_port(k))
+    for system in (brakes, held):
+        builder.Connect(joint_state.get_output_port(), system.GetInputPort("joint_state"))
+    for name in ("anchor", "give"):
+        builder.Connect(brakes.GetOutputPort(name), held.GetInputPort(name))
+    never = builder.AddSystem(ConstantVectorSource([2.0]))
+    for k in range(2):
+        source = status if k == asked else never
+        builder.Connect(source.get_output_port(), brakes.GetInputPort(f"request_{k}"))
     log = LogVectorOutput(motor.get_output_port(), builder, TICK)
     simulator = Simulator(builder.Build())
     configure(simulator, "runge_kutta3", TICK)
@@ -53,8 +71,9 @@ def test_nothing_holds_before_they_close():
     np.testing.assert_allclose(v[t < open_until], 5.0 * t[t < open_until], atol=1e-9)
 
 
-def test_they_stop_what_moves_and_hold_it():
-    t, v = _velocity(10.0)
+@pytest.mark.parametrize("asked", [0, 1])
+def test_they_stop_what_moves_and_hold_it(asked):
+    t, v = _velocity(10.0, asked=asked)
     # closed, they take away (50 - 10) / 2 rad/s each second
     closed = FAULT + DELAY + 0.02
     start = v[np.searchsorted(t, closed)]

@@ -1,0 +1,70 @@
+"""Brakes that hold the motors from a stop category 0 on: when they close, and where."""
+
+import functools
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.block import Block, Port, Values
+
+# s, in which the holding torque builds up
+_RISE = 0.02
+
+
+class HoldingBrakes(Block):
+    """Moment of closing, anchors of the brakes, and how far they give.
+
+    A brake is a spring between its motor and an anchor that slides where the spring would exceed
+    ``c(t) f_c``, with c from 0 to 1 in 20 ms from ``delay`` after the tick that sees a request. Its
+    torque is that of :class:`~pfsc_drake.systems.physics.brake_torque.BrakeTorque`.
+
+    Ports:
+        request_0, request_1, .. (input): Stop categories, each (1,): 0 closes the brakes.
+        joint_state (input): True ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        anchor (output): Motor position at which each brake pulls with nothing [rad or m], shape
+            (N,); that of the motor while they are open.
+        give (output): Largest displacement from the anchor, ``c delta`` [rad or m], shape (N,).
+
+    State:
+        ``age`` of the first request [s], from one period on; 0 before; and the outputs.
+
+    Args:
+        presliding: ``delta``, displacement at the full holding torque [rad or m], shape (N,).
+        requests: Number of requests, one or more.
+        delay: From the request until they close [s].
+        period: Sampling time [s].
+    """
+
+    def __init__(self, presliding: np.ndarray, requests: int, delay: float, period: float) -> None:
+        self._presliding, self._delay, self._period = presliding, delay, period
+        n = self._size = presliding.size
+        self.inputs = {f"request_{k}": Port(1) for k in range(requests)}
+        self.inputs["joint_state"] = Port(4 * n)
+        self.outputs = {name: Port(n) for name in ("anchor", "give")}
+        self.states = {"age": 1, "anchor": n, "give": n}
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """Return what is remembered at the start; what is left out is zero."""
+        return {"anchor": self._motors(u)}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        return {"anchor": x.anchor, "give": x.give}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """Return what is remembered at the next tick; what is left out stays."""
+        requests = [getattr(u, name) == 0.0 for name in self.inputs if name != "joint_state"]
+        requested = functools.reduce(ca.logic_or, requests, x.age > 0.0)
+        age = x.age + self._period * requested
+        # from the request on, as the first tick of it counts already
+        share = ca.fmin(ca.fmax((age - self._period - self._delay) / _RISE, 0.0), 1.0)
+        give, motors = share * self._presliding, self._motors(u)
+        return {
+            "age": age,
+            "anchor": motors + ca.fmin(ca.fmax(x.anchor - motors, -give), give),
+            "give": give,
+        }
+
+    def _motors(self, u: Values) -> Any:
+        return u.joint_state[2 * self._size : 3 * self._size]
