@@ -41,7 +41,7 @@ from experiments.results.promises import (
     unpromised_distance,
 )
 from experiments.results.recorded_motion import collect_motion
-from experiments.results.rest import rest_metrics, rest_warnings
+from experiments.results.rest import rest_metrics
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
 from experiments.results.stop import MotionAfterFault
@@ -246,8 +246,7 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
     metrics.update(limits.metrics(log))
-    effort = station.robot.gather("effort_limit") * settings.controller.effort_scale
-    metrics.update(rest_metrics(log, effort, converged_after(settings, log)))
+    metrics.update(rest_metrics(log, converged_after(settings, log)))
     stop = ""
     if "fault_time" in log.attributes and log.time.size:
         motion_after = MotionAfterFault(log, limits)
@@ -270,7 +269,6 @@ def _measure(
     warnings = [
         *prepared.warnings,
         *limits.warnings(log),
-        *rest_warnings(metrics),
         *saturation_warnings(log),
         *rate_warnings(log, station.task.drive_plan, settings.reference),
         *_sensor_warnings(log),

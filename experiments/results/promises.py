@@ -16,6 +16,7 @@ from diagrams.station import Station
 from experiments.results.drives import DriveLimitsOfRun, plan_metrics
 from experiments.results.path import shape_metrics
 from experiments.results.posture import is_redundant
+from experiments.results.rest import set_rest_targets
 from experiments.results.run_log import FloatArray, RunLog
 from experiments.results.run_signals import expected_signals
 from pfsc_drake.errors import InputError, did_you_mean
@@ -103,6 +104,7 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
         metrics.set_target("least_distance_while_moving", bound, "obstacles.watch.margin")
     if "remaining_distance" in metrics:
         metrics.set_target("remaining_distance", f"<= {_ARRIVED:g}", "the motion arrives")
+    set_rest_targets(metrics)
     if settings.compliance.needs_sensor and "max_unanswered_force" in metrics:
         # what is less would be taken for a bias
         bound = f"<= {settings.sensor.taring_spread[:3].max():g}"

@@ -24,11 +24,13 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
 
 # rad or m, and s; see RestHold
-_DRIFT, _SHAKING, _WINDOW, _SETTLING = 2e-3, 0.02, 2e-4, 0.03
+_DRIFT, _SHAKING, _WINDOW, _SETTLING = 1e-3, 0.02, 2e-4, 0.03
 # m or rad; up to which error a law with an integral part leaves the rest to friction
 _LARGEST_ERROR = 2e-3
+# m or rad; by which a workpiece may get away from the tool before the law goes on
+_LARGEST_CHANGE = 3e-4
 # by which part of itself a coefficient is thought to change from sample to sample
-_DRIFT = 1e-3
+_COEFFICIENT_DRIFT = 1e-3
 
 
 def rest_hold(
@@ -36,7 +38,7 @@ def rest_hold(
 ) -> RestHold | None:
     """Return what holds the torques of drives that stick, if friction is known and compensated.
 
-    A manifold that moves does not tell whether it rests: there the law goes on.
+    Where a manifold's point moves with time, nothing tells whether it rests: there the law goes on.
 
     Args:
         law: The law.
@@ -46,9 +48,7 @@ def rest_hold(
     friction, linearization = options.friction, law.linearization
     if friction.source == "none" or not friction.hold_at_rest or believed.friction is None:
         return None
-    manifold = linearization.manifold
-    moves = manifold.follows_time or isinstance(manifold, MovingFrameManifold)
-    if linearization.relative_degree == 1 or moves:
+    if linearization.relative_degree == 1 or linearization.manifold.follows_time:
         return None
     largest = _LARGEST_ERROR if law.stabilization.has_integral_part else np.inf
     return RestHold(
@@ -58,6 +58,7 @@ def rest_hold(
         _WINDOW,
         max(2, round(_SETTLING / options.sampling_time)),
         largest,
+        _LARGEST_CHANGE if isinstance(linearization.manifold, MovingFrameManifold) else np.inf,
     )
 
 
@@ -171,7 +172,7 @@ def _kalman(
     def values(key: str, believed: np.ndarray | None = None) -> np.ndarray:
         given = getattr(kalman, key)
         if believed is not None and not given:
-            return (_DRIFT * believed) ** 2
+            return (_COEFFICIENT_DRIFT * believed) ** 2
         if len(given) not in (1, n):
             raise InputError(
                 f"controller.friction.kalman.{key}: {len(given)} values; allowed: 1 or {n}, the "

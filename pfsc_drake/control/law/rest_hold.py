@@ -24,10 +24,28 @@ from pfsc_drake.blocks.cases import where
 
 # derivatives of the reference below which it rests, in SI units
 _RESTS = 1e-6
+# rates of a posture [rad/s or m/s], and of a frame that carries the manifold [m/s, 1/s], below
+# which they rest: a posture comes to its end slowly, and a frame is measured
+_POSTURE_RESTS, _FRAME_RESTS = 1e-4, 5e-3
 # position of a motor before the reference rests [rad or m]
 _NOWHERE = 1e9
 # share of the friction torque of a motor that has stopped
 _TAKEN_BACK = 0.5
+
+
+def reference_rests(motion: Any, posture_rate: Any | None, frame_rate: Any | None) -> Any:
+    """Return whether a robot is to rest.
+
+    Args:
+        motion: Derivatives 1..r of the reference [m or rad, per s, ..].
+        posture_rate: First derivative of the posture reference, if there is one [rad/s or m/s].
+        frame_rate: That of a frame that carries the manifold, if there is one [m/s, 1/s].
+    """
+    rests = _largest(motion) < _RESTS
+    for rate, bound in ((posture_rate, _POSTURE_RESTS), (frame_rate, _FRAME_RESTS)):
+        if rate is not None:
+            rests = ca.logic_and(rests, _largest(rate) < bound)
+    return rests
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +57,9 @@ class RestHold:
     held. A motor that has just stopped is at the edge of sliding on, as its drive overcomes all
     of the friction: half of that is taken back over the next ``settling`` ticks, so that friction
     can bear forces in both directions. What shakes has to stay within ``shaking`` of the mean
-    until then, and within ``window`` from then on. In the tick in which the reference or a motor
-    moves the law goes on. So a force that moves no motor is left to friction.
+    until then, and within ``window`` from then on. In the tick in which the reference, a motor
+    or what carries the manifold moves the law goes on. So a force that moves no motor is left to
+    friction.
 
     Attributes:
         coulomb: ``f_c`` as it is believed, shape (N,) [Nm or N].
@@ -49,6 +68,7 @@ class RestHold:
         window: Largest displacement of one at rest [rad or m].
         settling: Ticks of a mean, 2 or more.
         largest_error: Mean error of the virtual output up to which torques are held [m or rad].
+        largest_change: Change of the error since then up to which they are held [m or rad].
     """
 
     coulomb: np.ndarray
@@ -57,6 +77,7 @@ class RestHold:
     window: float
     settling: int
     largest_error: float
+    largest_change: float = np.inf
 
     def states(self, num_joints: int, num_outputs: int) -> dict[str, int]:
         """Return the sizes of the states.
@@ -72,23 +93,25 @@ class RestHold:
         return dict.fromkeys(names, num_joints) | {"rest_error": num_outputs, "rest_ticks": 1}
 
     def step(
-        self, x: Values, q_M: Any, motion: Any, error: Any, drive: Any, friction: Any
+        self, x: Values, q_M: Any, rests: Any, error: Any, drive: Any, friction: Any
     ) -> tuple[Any, Any, dict[str, Any]]:
         """Return whether torques are held, those that the drives get, and the new states.
 
         Args:
             x: States, named as in :meth:`states`.
             q_M: Motor positions, shape (N, 1) [rad or m].
-            motion: Derivatives of the reference [m or rad, per s, ..].
+            rests: Whether the robot is to rest, see :func:`reference_rests`.
             error: Error of the virtual output, shape (m, 1) [m or rad].
             drive: What the law tells the drives, shape (N, 1) [Nm or N].
             friction: What it overcomes of friction by that, shape (N, 1) [Nm or N].
         """
         ticks, settling = x.rest_ticks, self.settling
-        rests = _largest(motion) < _RESTS
         # first the means of settling ticks, then as many in which friction is taken back
         window = where(ticks >= 2 * settling, self.window, self.shaking)
         sticks = _largest(q_M - x.rest_before) < window
+        if np.isfinite(self.largest_change):
+            near = _largest(error - x.rest_error) < self.largest_change
+            sticks = ca.logic_and(sticks, near)
         holds = ca.logic_and(ticks >= settling, ca.logic_and(rests, sticks))
         means = {}
         values = {"position": q_M, "drive": drive, "friction": friction, "error": error}

@@ -9,7 +9,8 @@ from pfsc_drake.blocks.cases import where
 from pfsc_drake.control.law.exact_linearization import Relation
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw, LawLayout
-from pfsc_drake.control.law.rest_hold import RestHold
+from pfsc_drake.control.law.rest_hold import RestHold, reference_rests
+from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
 
 
 class SampledLaw(Block):
@@ -122,11 +123,14 @@ class SampledLaw(Block):
             q_M, drive = u.joint_state[2 * n : 3 * n], result[layout.drive]
             friction = getattr(u, "friction_torque", None)
             friction = ca.DM.zeros(n) if friction is None else friction
-            moving = [u.reference[m:]]
+            manifold = law.linearization.manifold
+            posture_rate = frame_rate = None
             if law.posture is not None:
-                moving.append(u.posture_reference[n:])
-            motion = ca.vertcat(*moving)
-            holds, drive, kept = self._hold.step(x, q_M, motion, error, drive, friction)
+                posture_rate = u.posture_reference[n : 2 * n]
+            if isinstance(manifold, MovingFrameManifold):
+                frame_rate = manifold.frame_rate(u.manifold_point)
+            rests = reference_rests(u.reference[m:], posture_rate, frame_rate)
+            holds, drive, kept = self._hold.step(x, q_M, rests, error, drive, friction)
             outputs["evaluation"] = ca.vertcat(drive, result[layout.drive.stop :])
             outputs |= {"holds": holds} | {f"next_{name}": value for name, value in kept.items()}
         return outputs

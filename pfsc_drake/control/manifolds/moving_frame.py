@@ -158,6 +158,14 @@ class MovingFrameManifold:
         place, frame = self._split(point)
         return _rotation(frame) @ self.own.axes(place)
 
+    def frame_rate(self, point: Any) -> Any:
+        """Return the first derivative of ``[p_WC, R_WC]``, shape (12,) [m/s, 1/s].
+
+        Args:
+            point: The manifold's point, laid out by :attr:`layout`.
+        """
+        return self._split(point)[1][POSE_SIZE : 2 * POSE_SIZE]
+
     def _split(self, point: Any) -> tuple[Any, Any]:
         """Return the manifold's point in its frame, and the frame."""
         size = self.layout.own.size

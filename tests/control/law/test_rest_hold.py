@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.block import Values
-from pfsc_drake.control.law.rest_hold import RestHold
+from pfsc_drake.control.law.rest_hold import RestHold, reference_rests
 
 M, D, K, F_C = 0.0157, 0.06, 5000.0, 3.7
 POLES, RATE, TICK = [-60.0, -60.0, -250.0, -350.0], 300.0, 1e-3
@@ -25,7 +25,8 @@ class Held:
         self.sizes = (rest_hold or hold()).states(1, 1)
         states = {name: ca.SX.sym(name, size) for name, size in self.sizes.items()}
         told = {k: ca.SX.sym(k) for k in ("q_M", "motion", "error", "drive", "friction")}
-        holds, drive, later = (rest_hold or hold()).step(Values(**states), *told.values())
+        inputs = told | {"motion": reference_rests(told["motion"], None, None)}
+        holds, drive, later = (rest_hold or hold()).step(Values(**states), *inputs.values())
         results = [holds, drive, *(later[name] for name in states)]
         self.function = ca.Function("hold", [*states.values(), *told.values()], results)
         self.state = [0.0] * len(states)
@@ -144,3 +145,19 @@ def test_motors_that_get_on_and_errors_are_left_to_the_law():
     assert not any(far(0.1, 5.0, error=1.1e-3)[0] for _ in range(300))
     assert far(0.1, 5.0, error=0.9e-3)[0] is False
     assert any(far(0.1, 5.0, error=0.9e-3)[0] for _ in range(100))
+
+
+def test_what_gets_away_from_the_tool_is_followed():
+    held = Held(hold(largest_change=3e-4))
+    for _ in range(4 * SETTLING):
+        holds, _ = held(0.1, 5.0, error=1e-3)
+    assert holds and held(0.1, 7.0, error=1.29e-3)[0]
+    assert held(0.1, 7.0, error=1.31e-3) == (False, 7.0)
+
+
+@pytest.mark.parametrize("part, bound", [(0, 1e-6), (1, 1e-4), (2, 5e-3)])
+def test_references_postures_and_frames_have_to_rest(part, bound):
+    for factor in (0.9, 1.1):
+        motions = [ca.DM([0.0, 0.0]) for _ in range(3)]
+        motions[part] = ca.DM([0.0, -factor * bound])
+        assert bool(reference_rests(*motions)) is (factor < 1.0)

@@ -8,7 +8,10 @@ from pfsc_drake.blocks.block import Values
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.exact_linearization import ExactLinearization, Relation
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.rest_hold import RestHold
 from pfsc_drake.control.law.sampled_law import LawReport, SampledLaw
+from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
+from pfsc_drake.control.manifolds.path import PathManifold
 
 PERIOD, THETA = 1e-3, 0.6
 
@@ -134,3 +137,34 @@ def test_a_report_has_the_fault_and_what_the_drives_were_told(loop):
     expected[layout.drive], expected[layout.status.start] = told, 7.0
     np.testing.assert_array_equal(found["law"], expected)
     np.testing.assert_array_equal(found["status"], expected[layout.status])
+
+
+def test_drives_are_not_held_while_the_frame_moves(load_robot, position_path, make_law):
+    robot = load_robot("comau_racer_1_4_3r")
+    manifold = MovingFrameManifold(PathManifold(2, oriented=False))
+    law = make_law(robot.chain, "rigid", False, manifold=manifold)
+    hold = RestHold(np.array([4.0, 5.0, 3.0]), 1e-3, 0.02, 2e-4, settling=5, largest_error=np.inf)
+    q = robot.reach(position_path.position.derivatives(THETA, 0)[0] + [0.004, -0.006, 0.005])
+    state = np.concatenate([q, np.zeros(3), q, np.zeros(3)])
+    place = position_path.evaluator(2)(robot.tool_pose(state)[0].tolist(), THETA)
+
+    def drives(rate):
+        """Return the drive torques of some ticks, with the frame at a rate [m/s]."""
+        rows = np.zeros((3, 12))
+        rows[0, 3:], rows[1, 1] = np.eye(3).ravel(), rate
+        told = {"joint_state": state, "manifold_point": np.concatenate([place, rows.ravel()])}
+        linear, sampled = (
+            Stepper(ExactLinearization(law.linearization)),
+            Stepper(SampledLaw(law, PERIOD, hold)),
+        )
+        reference, torques = np.zeros(9), []
+        for k in range(25):
+            reference[0] = place[1] + 1e-3 * k
+            relation = linear.step(**told)
+            result = sampled.step(reference=reference, stopping=0.0, **told, **relation)
+            torques.append(result["evaluation"][law.layout.drive])
+        return np.array(torques)
+
+    # a reference that jumps moves torques, unless they are held
+    assert np.ptp(drives(4e-3)[15:], axis=0).max() == 0.0
+    assert np.ptp(drives(6e-3)[15:], axis=0).min() > 0.01

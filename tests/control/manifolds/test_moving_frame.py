@@ -170,3 +170,14 @@ def whole(frame):
     """Return a motion as a frame jet of numbers."""
     jets = Jet(frame.y.coefficients), Jet(frame.R.coefficients)
     return np.array(ca.DM(frame_vector(*jets))).ravel()
+
+
+def test_the_rate_of_the_frame_is_a_part_of_the_point(motions):
+    _, frame = motions
+    manifold = MovingFrameManifold(PathManifold(3, oriented=False))
+    own = np.full(manifold.layout.own.size, 7.0)
+    point = ca.vertcat(own, frame_vector(frame.y.truncate(3), frame.R.truncate(3)))
+    rates = np.array(ca.DM(manifold.frame_rate(point))).ravel()
+    samples = np.array([np.append(*frame.at(t)) for t in NODES])
+    for rate, values in zip(rates, samples.T, strict=True):
+        assert rate == pytest.approx(float(interpolant(values).deriv()(0.0)), abs=1e-8)
