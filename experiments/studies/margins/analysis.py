@@ -22,6 +22,7 @@ from experiments.studies.margins.box import (
 )
 from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
 from experiments.studies.margins.result import Case, DriveMargins, MarginAnalysis, Place
+from experiments.studies.margins.sticking import stuck_drives
 from experiments.studies.margins.walk import Instant, TouchedSurface, Walk, touched_surface, walk
 from pfsc_drake.control.margins import (
     BrokenLoop,
@@ -92,6 +93,8 @@ def analyse(
     )
     if not only_start:
         analysis.surface = study.touched_surface(own, nominal)
+        joints = station.robot.dimension
+        analysis.stuck = stuck_drives(settings, folder, joints, lambda what: progress(0.0, what))
     for instant, loop in zip(way.instants, loops, strict=True):
         progress(instant.time, "margins of the drives")
         if loop is not None:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from experiments.studies.margins.box import Error, ErrorBox
+from experiments.studies.margins.sticking import StuckDrives
 from experiments.studies.margins.walk import Instant, TouchedSurface
 from pfsc_drake.control.margins import DiscMargin, Modes
 
@@ -96,6 +97,7 @@ class MarginAnalysis:
         drives_are_servos: Whether the drives are servos that take velocities.
         remarks: What was left out of the loop, and why, one sentence each.
         surface: What of a surface that is pressed on it bears, if that is so and was looked at.
+        stuck: The loop at rest where friction holds the motors, if there is friction.
     """
 
     period: float
@@ -108,6 +110,7 @@ class MarginAnalysis:
     drives_are_servos: bool = False
     remarks: list[str] = field(default_factory=list)
     surface: TouchedSurface | None = None
+    stuck: StuckDrives | None = None
 
     @property
     def cases(self) -> list[Case]:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from experiments.studies.margins.result import (
     MarginAnalysis,
     Place,
 )
+from experiments.studies.margins.sticking import sticking_sentence
 from experiments.studies.margins.walk import TouchedSurface
 from pfsc_drake.control.margins import DiscMargin
 from reporting.metrics import Metrics
@@ -43,6 +45,7 @@ def sentences(analysis: MarginAnalysis) -> list[str]:
         *_parameters(analysis),
         *_drives(analysis),
         *_touched(analysis.surface),
+        *([] if analysis.stuck is None else [sticking_sentence(analysis.stuck)]),
         *analysis.remarks,
     ]
 
@@ -93,6 +96,10 @@ def metrics_of(analysis: MarginAnalysis) -> Metrics:
         if math.isfinite(surface.borne):
             most = surface.borne * stiffness
             result.add("borne_stiffness", most, "N/m", source=surface.instant.place)
+    if (stuck := analysis.stuck) is not None:
+        place = f"presliding {1e6 * stuck.presliding:g} urad"
+        source = f"{place}, torques are held instead" if stuck.held else place
+        result.add("stuck_rate", stuck.rate, "1/s", None if stuck.held else "< 0", source)
     tightest = analysis.tightest
     if tightest is not None:
         margin = min(tightest.drives, key=lambda margin: margin.alpha)
@@ -115,6 +122,7 @@ def margins_json(analysis: MarginAnalysis) -> str:
         "sampling_time": analysis.period,
         "drives": list(analysis.joints),
         "summary": sentences(analysis),
+        "stuck_drives": None if analysis.stuck is None else asdict(analysis.stuck),
         "loops": [_case_data(case) for case in analysis.cases],
         "margins": [
             {
