@@ -38,6 +38,7 @@ from experiments.results.promises import (
     GuidanceRules,
     audit,
     broken_promises,
+    leave_unjudged,
     set_promises,
     unpromised_distance,
 )
@@ -261,6 +262,8 @@ def _measure(
         metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
     set_promises(metrics, settings)
     lasted = end > settings.judged_after - 1.5 * settings.controller.sampling_time
+    if result.fault is not None or not lasted:
+        leave_unjudged(metrics, fault=result.fault is not None)
     results.write("metrics.json", metrics.to_json())
     warnings = [
         *prepared.warnings,
@@ -272,8 +275,9 @@ def _measure(
         *guidance_warnings(log, settings),
         *unpromised_distance(metrics, settings.controller.law),
     ]
-    broken = broken_promises(metrics, whole=lasted and result.fault is None)
-    return _Measured(log, motion, metrics, warnings, result.fault, broken, end, stop)
+    return _Measured(
+        log, motion, metrics, warnings, result.fault, broken_promises(metrics), end, stop
+    )
 
 
 def converged_after(settings: Scenario, log: RunLog) -> float:

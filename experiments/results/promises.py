@@ -28,6 +28,14 @@ _ALWAYS = (
     *("least_port_tank", "energy_margin", "least_distance_while_moving"),
     *("motion_after_fault", "slide_motion_after_fault"),
 )
+# metrics that only grow while a run lasts, or only fall, by how their names begin
+_GROWING = (
+    *("max_", "peak_", "largest_", "deepest_", "audit_", "joint_velocity_share"),
+    *("limit_reversals", "saturated_samples", "clipped_ticks", "missed_ticks", "waited_time"),
+)
+_FALLING = ("least_", "joint_limit_margin", "slide_limit_margin")
+# errors of the last sample, the worst of all axes
+_OF_THE_END = ("max_coulomb_error", "max_viscous_error")
 # m, by which a tool may be past the end of what it knows of its path: it follows its reference
 _PAST = 1e-3
 # m, that leader and follower may be apart in the end because energy lacks to tell it
@@ -115,19 +123,42 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
             metrics.set_target(name, target.bound, target.source)
 
 
-def broken_promises(metrics: Metrics, *, whole: bool) -> list[str]:
+def broken_promises(metrics: Metrics) -> list[str]:
     """Return what was promised and not kept, one phrase each.
 
     Args:
-        metrics: With their targets. One without a value has missed its target.
-        whole: Whether the run lasted as long as its scenario, without a fault. Of others only
-            those promises count that hold at every instant, and of which there is a value.
+        metrics: With their targets. One without a value has missed its target, unless it is
+            not judged.
     """
     return [
         _phrase(name, metric)
         for name, metric in metrics.items()
-        if metric.passed is False and (whole or (name in _ALWAYS and not math.isnan(metric.value)))
+        if metric.passed is False and metric.judged
     ]
+
+
+def leave_unjudged(metrics: Metrics, *, fault: bool) -> None:
+    """Take back the verdict on metrics for which a run that was cut short is too short.
+
+    It is judged by what holds at every instant, and by extremes that have passed their bound:
+    nothing that follows could mend them. After a fault the tool does not follow its reference,
+    so that extremes do not count.
+
+    Args:
+        metrics: With their targets.
+        fault: Whether a fault cut it short.
+    """
+    for name, metric in metrics.items():
+        if metric.bound is not None and name not in _ALWAYS:
+            metric.judged = not fault and _is_exceeded_extreme(name, metric)
+
+
+def _is_exceeded_extreme(name: str, metric: Metric) -> bool:
+    """Whether a metric has passed a bound that it cannot come back to."""
+    assert metric.bound is not None
+    begins = _GROWING if metric.bound[0].startswith("<") else _FALLING
+    extreme = name.startswith(begins) and name not in _OF_THE_END
+    return extreme and metric.passed is False and not math.isnan(metric.value)
 
 
 def unpromised_distance(metrics: Metrics, law: str) -> list[str]:
