@@ -115,6 +115,9 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
             metrics.set_target(name, ">= 0", "teleoperation.passive")
     if way is not None and "owed_distance_end" in metrics:
         metrics.set_target("owed_distance_end", f"<= {_OWED:g}", "leader and follower meet")
+    if settings.faults.chatter_turns > 0.0 and "limit_reversals" in metrics:
+        bound = f"< {settings.faults.chatter_turns:g}"
+        metrics.set_target("limit_reversals", bound, "faults.chatter_turns")
     if "past_known_way" in metrics:
         metrics.set_target("past_known_way", f"<= {_PAST:g}", "room to stop")
     for name, target in settings.targets.get(settings.controller.law, {}).items():
