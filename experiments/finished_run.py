@@ -18,6 +18,7 @@ from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
+from experiments.results.arrival import arrival_metrics
 from experiments.results.drives import (
     DriveLimitsOfRun,
     friction_metrics,
@@ -230,6 +231,7 @@ def _measure(
     metrics = path_following_metrics(
         log, settings.settling_tolerance, converged_after(settings, log), _MOVING
     )
+    metrics.update(arrival_metrics(log, station.task, settings))
     metrics.update(press_metrics(log))
     metrics.update(guidance_metrics(log))
     metrics.update(guide_metrics(log))

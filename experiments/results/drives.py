@@ -208,6 +208,7 @@ def limit_reversals(log: RunLog) -> float:
         log: With ``tau_d``, its limits, and ``fault``.
     """
     signal = log["tau_d"]
+    assert signal.limits is not None  # of drives
     followed = log["fault"].values[:, 0] == Fault.NONE
     at_limit = np.abs(signal.values) >= signal.limits * (1.0 - SATURATION_MARGIN)
     most = 0.0

@@ -189,7 +189,8 @@ def _phrase(name: str, metric: Metric) -> str:
     target = f"target {comparison} {format_quantity(number, metric.unit)}"
     if math.isnan(metric.value):
         return f"{name} has no value, {target}"
-    return f"{name} = {format_quantity(metric.value, metric.unit)}, {target}"
+    why = f" ({metric.source})" if name == "arrived" and metric.source else ""
+    return f"{name} = {format_quantity(metric.value, metric.unit)}, {target}{why}"
 
 
 SLOT_WIDTH = 10  # index, h, n (3), u, beta, phi, stiffness, depth
