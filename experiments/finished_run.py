@@ -17,6 +17,7 @@ from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
+from experiments.results.arrival import arrival_metrics
 from experiments.results.drives import (
     DriveLimitsOfRun,
     friction_metrics,
@@ -37,6 +38,7 @@ from experiments.results.promises import (
     GuidanceRules,
     audit,
     broken_promises,
+    leave_unjudged,
     set_promises,
     unpromised_distance,
 )
@@ -231,6 +233,7 @@ def _measure(
     metrics = path_following_metrics(
         log, settings.settling_tolerance, converged_after(settings, log), _MOVING
     )
+    metrics.update(arrival_metrics(log, station.task, settings))
     metrics.update(press_metrics(log))
     metrics.update(guidance_metrics(log))
     metrics.update(guide_metrics(log))
@@ -240,8 +243,7 @@ def _measure(
     metrics.update(mounting_metrics(log))
     metrics.update(holder_metrics(log, settings.reference.dwell))
     metrics.update(stream_metrics(log))
-    goal = station.task.motion.derivatives(station.task.motion.domain[1:], 0)[0, 0]
-    metrics.update(obstacle_metrics(log, settings.obstacles, goal))
+    metrics.update(obstacle_metrics(log, settings.obstacles))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
@@ -265,6 +267,8 @@ def _measure(
         metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
     set_promises(metrics, settings)
     lasted = end > settings.judged_after - 1.5 * settings.controller.sampling_time
+    if result.fault is not None or not lasted:
+        leave_unjudged(metrics, fault=result.fault is not None)
     results.write("metrics.json", metrics.to_json())
     warnings = [
         *prepared.warnings,
@@ -276,8 +280,9 @@ def _measure(
         *guidance_warnings(log, settings),
         *unpromised_distance(metrics, settings.controller.law),
     ]
-    broken = broken_promises(metrics, whole=lasted, stopped=result.fault is not None)
-    return _Measured(log, motion, metrics, warnings, result.fault, broken, end, stop)
+    return _Measured(
+        log, motion, metrics, warnings, result.fault, broken_promises(metrics), end, stop
+    )
 
 
 def converged_after(settings: Scenario, log: RunLog) -> float:

@@ -196,12 +196,14 @@ def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
     table.add_column("Metric", no_wrap=True)
     table.add_column("Value", justify="right", no_wrap=True)
     table.add_column("Target")
-    marks = {True: "[green]met[/]", False: "[red]missed[/]", None: ""}
+    colours = {"met": "green", "missed": "red", "no value": "red", "not judged": "yellow"}
     for name, metric in metrics.items():
         target = escape(metric.target or "")
         if metric.bound is not None:
             comparison, number = metric.bound
             target = f"{comparison} {format_quantity(number, metric.unit)}"
         value = format_quantity(metric.value, metric.unit)
-        table.add_row(name, value, f"{target} {marks[metric.passed]}".strip())
+        if verdict := metric.verdict:
+            target += f" [{colours[verdict]}]{verdict}[/]"
+        table.add_row(name, value, target)
     return table

@@ -44,12 +44,14 @@ class Metric:
         unit: SI unit, e.g. ``"m"``; ``"1"`` without unit.
         target: What it should be, ``"< 0.05e-3"`` (in ``unit``; also ``<= > >=``) or free text.
         source: Where the target or the definition comes from, e.g. ``"Sec. 3.8.3"``.
+        judged: Whether the run was long enough for the target.
     """
 
     value: float
     unit: str
     target: str | None = None
     source: str | None = None
+    judged: bool = True
 
     @property
     def bound(self) -> tuple[str, float] | None:
@@ -74,6 +76,17 @@ class Metric:
             return None
         comparison, number = self.bound
         return _COMPARISONS[comparison](self.value, number)
+
+    @property
+    def verdict(self) -> str:
+        """``met``, ``missed``, ``no value``, ``not judged``; empty without a comparable target."""
+        if self.passed is None:
+            return ""
+        if not self.judged:
+            return "not judged"
+        if math.isnan(self.value):
+            return "no value"
+        return "met" if self.passed else "missed"
 
 
 class Metrics(UserDict[str, Metric]):
@@ -126,7 +139,7 @@ class Metrics(UserDict[str, Metric]):
         path.write_text(self.to_json(), encoding="utf-8")
 
     def to_json(self) -> str:
-        """Returns flat JSON ``name: {value, unit, target?, source?}``; NaN, infinity are null."""
+        """Returns flat JSON ``name: {value, unit, target?, source?, judged?}``; NaN is null."""
         return json.dumps(self.to_data(), indent=2, allow_nan=False) + "\n"
 
     def to_data(self) -> dict[str, Any]:
@@ -173,13 +186,16 @@ def _to_json(metric: Metric) -> dict[str, Any]:
         entry["target"] = metric.target
     if metric.source is not None:
         entry["source"] = metric.source
+    if not metric.judged:
+        entry["judged"] = False
     return entry
 
 
 def _from_json(entry: dict[str, Any]) -> Metric:
     """The metric of one entry."""
     value = math.nan if entry["value"] is None else float(entry["value"])
-    return Metric(value, entry["unit"], entry.get("target"), entry.get("source"))
+    target, source = entry.get("target"), entry.get("source")
+    return Metric(value, entry["unit"], target, source, entry.get("judged", True))
 
 
 def format_quantity(value: float, unit: str) -> str:

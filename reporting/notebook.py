@@ -1,6 +1,5 @@
 """What a notebook shows of results: short tables, recordings in frames, how far a run is."""
 
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -15,7 +14,7 @@ from reporting.registry import known_metric
 _SHOWN = 8  # metrics of a short table
 _PARTS = 200  # of a whole, between two looks at its progress
 _CELL = 'style="text-align: left; padding: 0.1em 1.5em 0.1em 0"'
-_MARKS = {True: "✓ met", False: "✗ missed", None: ""}
+_MARKS = {"met": "✓ met", "missed": "✗ missed"}
 
 
 def in_notebook() -> bool:
@@ -99,7 +98,7 @@ def _row(name: str, metric: Metric) -> str:
         comparison, number = metric.bound
         target = escape(f"{comparison} {format_quantity(number, metric.unit)}")
     value = escape(format_quantity(metric.value, metric.unit) or NOT_A_NUMBER)
-    mark = _MARKS[metric.passed] if math.isfinite(metric.value) else ""  # else there was nothing
+    mark = _MARKS.get(metric.verdict, metric.verdict)
     cells = (f"<code>{escape(name)}</code>", value, f"{target} {mark}".strip())
     return f"<tr{meaning}>{''.join(f'<td {_CELL}>{cell}</td>' for cell in cells)}</tr>"
 

@@ -141,7 +141,8 @@ def _badges(metrics: Metrics, fault: str | None, interrupted: bool, broken: Sequ
     if fault:
         kind, end = "bad", "✗ stopped by fault"
     status = f'<span class="badge {kind}">{end}</span>'
-    verdicts = [metric.passed for metric in metrics.values() if metric.passed is not None]
+    judged = [metric for metric in metrics.values() if metric.judged]
+    verdicts = [metric.passed for metric in judged if metric.passed is not None]
     if not verdicts:
         return status
     kind = "good" if all(verdicts) else "bad"
@@ -210,9 +211,11 @@ def _target(metric: Metric) -> str:
 
 def _mark(metric: Metric) -> str:
     """Whether the target is met, by sign, word and colour."""
-    if metric.passed is None:
-        return ""
-    kind, text = ("good", "✓ met") if metric.passed else ("bad", "✗ missed")
+    verdict = metric.verdict
+    if verdict in ("", "not judged"):
+        return verdict
+    kind, sign = ("good", "✓") if verdict == "met" else ("bad", "✗")
+    text = f"{sign} {verdict}"
     return f'<span class="mark {kind}">{text}</span>'
 
 

@@ -18,6 +18,7 @@ from experiments.results.fastest import fastest_metrics
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.estimation.momentum import drive_momentum
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.supervision import DRIVE_MEMORY
 from pfsc_drake.robot.coordinate_text import coordinate_text
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from reporting.metrics import Metrics
@@ -195,6 +196,29 @@ def saturation_warnings(log: RunLog) -> list[str]:
         f"the run, first at {first:.3f} s{where}: while they are, nothing that the law promises "
         "holds"
     ]
+
+
+def limit_reversals(log: RunLog) -> float:
+    """Return the most turns of any drive's torque from limit to limit, while there is no fault.
+
+    As :class:`~pfsc_drake.control.law.supervision.DriveWatch` counts what the law commands, with
+    the same forgetting; here it is what drives apply, also behind velocity servos.
+
+    Args:
+        log: With ``tau_d``, its limits, and ``fault``.
+    """
+    signal = log["tau_d"]
+    assert signal.limits is not None  # of drives
+    followed = log["fault"].values[:, 0] == Fault.NONE
+    at_limit = np.abs(signal.values) >= signal.limits * (1.0 - SATURATION_MARGIN)
+    most = 0.0
+    for torque, counted in zip(signal.values.T, (at_limit & followed[:, None]).T, strict=True):
+        time, side = log.time[counted], np.sign(torque[counted])
+        turns, last = 0.0, -np.inf
+        for turned in time[1:][side[1:] != side[:-1]]:
+            turns = turns * np.exp((last - turned) / DRIVE_MEMORY) + 1.0
+            most, last = max(most, turns), turned
+    return most
 
 
 def is_saturated(log: RunLog) -> np.ndarray:

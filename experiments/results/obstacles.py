@@ -68,13 +68,12 @@ def _positions(states: FloatArray, count: int) -> FloatArray:
     return states.reshape(len(states), count, 6)[:, :, :3].reshape(len(states), 3 * count)
 
 
-def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None, goal: FloatArray) -> Metrics:
+def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metrics:
     """Return how near obstacles came, and what waiting for them cost, if there were any.
 
     Args:
         log: Log of a run.
         crossing: The obstacles.
-        goal: Tangential coordinates at the end of the requested motion [m], shape (k,).
     """
     metrics = Metrics()
     if crossing is None or "obstacle_distance" not in log or not log.time.size:
@@ -89,8 +88,6 @@ def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None, goal: Flo
         "least_distance_while_moving", float(least[moving].min()) if moving.any() else np.nan
     )
     metrics.add("waited_time", float(log["time_lost"].values[-1, 0]))
-    left = np.linalg.norm(goal - log["eta"].values[-1])
-    metrics.add("remaining_distance", float(left))
     position = log["obstacle_position"].values.reshape(len(log.time), -1, 3)
     speed = np.linalg.norm(np.gradient(position, log.time, axis=0), axis=2)
     metrics.add("largest_obstacle_speed", peak(speed[np.isfinite(speed)]))

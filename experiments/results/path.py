@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.station import Station
-from experiments.results.drives import peak_torque, saturation_count
+from experiments.results.drives import limit_reversals, peak_torque, saturation_count
 from experiments.results.run_log import FloatArray, RunLog, peak
 from pfsc_drake.geometry import ShapeReport
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
@@ -67,6 +67,8 @@ def path_following_metrics(
         saturated = saturation_count(log)
         metrics.add("saturated_samples", saturated)
         metrics.add("saturated_share", saturated / max(log.time.size, 1))
+        if log["tau_d"].limits is not None and "fault" in log:
+            metrics.add("limit_reversals", limit_reversals(log))
     if "manifold_force" in log:
         metrics.add("max_manifold_force", max_manifold_force(log))
         metrics.add("max_tangential_force", max_tangential_force(log))

@@ -29,10 +29,14 @@ _ALWAYS = (
     *("least_port_tank", "energy_margin", "least_distance_while_moving"),
     *("motion_after_fault", "slide_motion_after_fault"),
 )
-# what a longer run can only make larger
-_MAXIMA = ("max_", "peak_", "largest_", "deepest_")
-# m, within which a tool has arrived at the end of its motion
-_ARRIVED = 1e-3
+# metrics that only grow while a run lasts, or only fall, by how their names begin
+_GROWING = (
+    *("max_", "peak_", "largest_", "deepest_", "audit_", "rest_", "joint_velocity_share"),
+    *("limit_reversals", "saturated_samples", "clipped_ticks", "missed_ticks", "waited_time"),
+)
+_FALLING = ("least_", "joint_limit_margin", "slide_limit_margin")
+# errors of the last sample, the worst of all axes
+_OF_THE_END = ("max_coulomb_error", "max_viscous_error")
 # m, by which a tool may be past the end of what it knows of its path: it follows its reference
 _PAST = 1e-3
 # m, that leader and follower may be apart in the end because energy lacks to tell it
@@ -102,8 +106,6 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     if settings.obstacles is not None and "least_distance_while_moving" in metrics:
         bound = f">= {settings.obstacles.watch.margin:g}"
         metrics.set_target("least_distance_while_moving", bound, "obstacles.watch.margin")
-    if "remaining_distance" in metrics:
-        metrics.set_target("remaining_distance", f"<= {_ARRIVED:g}", "the motion arrives")
     set_rest_targets(metrics)
     if settings.compliance.needs_sensor and "max_unanswered_force" in metrics:
         # what is less would be taken for a bias
@@ -115,6 +117,9 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
             metrics.set_target(name, ">= 0", "teleoperation.passive")
     if way is not None and "owed_distance_end" in metrics:
         metrics.set_target("owed_distance_end", f"<= {_OWED:g}", "leader and follower meet")
+    if settings.faults.chatter_turns > 0.0 and "limit_reversals" in metrics:
+        bound = f"< {settings.faults.chatter_turns:g}"
+        metrics.set_target("limit_reversals", bound, "faults.chatter_turns")
     if "past_known_way" in metrics:
         metrics.set_target("past_known_way", f"<= {_PAST:g}", "room to stop")
     for name, target in settings.targets.get(settings.controller.law, {}).items():
@@ -123,28 +128,42 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
             metrics.set_target(name, target.bound, target.source)
 
 
-def broken_promises(metrics: Metrics, *, whole: bool, stopped: bool = False) -> list[str]:
-    """Return the requirements that were missed, one phrase each.
+def broken_promises(metrics: Metrics) -> list[str]:
+    """Return what was promised and not kept, one phrase each.
 
     Args:
-        metrics: With their targets. One without a value has missed its target.
-        whole: Whether the run lasted as long as its scenario. Of one that was cut short only
-            requirements count that hold at every instant, and maxima: one that was exceeded stays
-            so. Those without a value do not count.
-        stopped: Whether a fault stopped the run: then maxima of before and after do not count.
+        metrics: With their targets. One without a value has missed its target, unless it is
+            not judged.
     """
-
-    def is_judged(name: str, metric: Metric) -> bool:
-        if whole and not stopped:
-            return True
-        is_maximum = not stopped and name.startswith(_MAXIMA) and metric.is_upper_bound
-        return (name in _ALWAYS or is_maximum) and not math.isnan(metric.value)
-
     return [
         _phrase(name, metric)
         for name, metric in metrics.items()
-        if metric.passed is False and is_judged(name, metric)
+        if metric.passed is False and metric.judged
     ]
+
+
+def leave_unjudged(metrics: Metrics, *, fault: bool) -> None:
+    """Take back the verdict on metrics for which a run that was cut short is too short.
+
+    It is judged by what holds at every instant, and by extremes that have passed their bound:
+    nothing that follows could mend them. After a fault the tool does not follow its reference,
+    so that extremes do not count.
+
+    Args:
+        metrics: With their targets.
+        fault: Whether a fault cut it short.
+    """
+    for name, metric in metrics.items():
+        if metric.bound is not None and name not in _ALWAYS:
+            metric.judged = not fault and _is_exceeded_extreme(name, metric)
+
+
+def _is_exceeded_extreme(name: str, metric: Metric) -> bool:
+    """Whether a metric has passed a bound that it cannot come back to."""
+    assert metric.bound is not None
+    begins = _GROWING if metric.bound[0].startswith("<") else _FALLING
+    extreme = name.startswith(begins) and name not in _OF_THE_END
+    return extreme and metric.passed is False and not math.isnan(metric.value)
 
 
 def unpromised_distance(metrics: Metrics, law: str) -> list[str]:
@@ -172,7 +191,8 @@ def _phrase(name: str, metric: Metric) -> str:
     target = f"target {comparison} {format_quantity(number, metric.unit)}"
     if math.isnan(metric.value):
         return f"{name} has no value, {target}"
-    return f"{name} = {format_quantity(metric.value, metric.unit)}, {target}"
+    why = f" ({metric.source})" if name == "arrived" and metric.source else ""
+    return f"{name} = {format_quantity(metric.value, metric.unit)}, {target}{why}"
 
 
 SLOT_WIDTH = 10  # index, h, n (3), u, beta, phi, stiffness, depth

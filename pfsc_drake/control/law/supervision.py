@@ -266,7 +266,7 @@ def _substituted(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:
 
 
 # s, in which turns are forgotten
-_DRIVE_MEMORY = 0.2
+DRIVE_MEMORY = 0.2
 # ticks at a limit that one tick within the limits makes up for
 _FORGIVEN = 0.5
 
@@ -309,7 +309,7 @@ class DriveWatch(Block):
         self._limits = ca.DM(np.asarray(limits, dtype=float))
         self._ticks = round(time / period) if time else math.inf
         self._turns = parameters.chatter_turns or math.inf
-        self._decay = math.exp(-period / _DRIVE_MEMORY)
+        self._decay = math.exp(-period / DRIVE_MEMORY)
         self.inputs = {"drive": Port(n), "stopping": Port(1)}
         self.outputs = {"fault": Port(1)}
         self.states = {"ticks": n, "side": n, "turns": n}

@@ -7,12 +7,14 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.results.drives import DriveLimitsOfRun
+from experiments.results.drives import DriveLimitsOfRun, limit_reversals
+from experiments.results.promises import broken_promises, leave_unjudged, set_promises
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import find_scenario
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.yaml.typed import load_file
+from reporting.metrics import Metrics
 
 INF = np.inf
 
@@ -127,3 +129,31 @@ def test_a_speed_limit_of_zero_is_none():
     own = DriveLimitsOfRun.of(SerialChain((link("a", 0.0), link("b", 2.0))))
     np.testing.assert_array_equal(own.velocity, [INF, 2.0])
     assert own.metric_names() == ["joint_velocity_share"]
+
+
+def test_reversals_from_limit_to_limit_are_counted_of_what_drives_apply():
+    """Ten in 0.1 s on the second axis; the first is at one limit, the third within both."""
+    time = 0.01 * np.arange(21)
+    torque = np.tile([2.0, 0.0, 4.9], (21, 1))
+    torque[::2, 1] = 3.0 * (-1.0) ** np.arange(11)
+    log = RunLog(time)
+    log.add("tau_d", torque, "Nm", limits=[2.0, 3.0, 5.0])
+    fault = np.zeros(21)
+    log.add("fault", fault, "1", ["none"])
+    forgotten = np.exp(-0.02 / 0.2)
+    expected = (1.0 - forgotten**10) / (1.0 - forgotten)
+    assert limit_reversals(log) == pytest.approx(expected, rel=1e-9)
+    fault[5:] = 4.0  # from then on the law does not command
+    log.add("fault", fault, "1", ["none"])
+    assert limit_reversals(log) == pytest.approx(1.0 + forgotten, rel=1e-9)
+    log.add("tau_d", 0.9 * torque, "Nm", limits=[2.0, 3.0, 5.0])
+    assert limit_reversals(log) == 0.0
+
+
+def test_reversals_from_limit_to_limit_are_a_requirement_with_the_bound_of_the_supervision():
+    scenario, found = Scenario(), Metrics()
+    scenario.faults.chatter_turns = 4.0
+    found.add("limit_reversals", 4.5)
+    set_promises(found, scenario)
+    leave_unjudged(found, fault=False)
+    assert broken_promises(found) == ["limit_reversals = 4.5, target < 4"]

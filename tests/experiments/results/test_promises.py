@@ -7,7 +7,7 @@ import pytest
 from diagrams.scenario import Scenario, Target
 from diagrams.scenario.fixtures import FixtureParameters
 from experiments.cli import main
-from experiments.results.promises import broken_promises, set_promises
+from experiments.results.promises import broken_promises, leave_unjudged, set_promises
 from reporting.metrics import Metrics
 
 
@@ -35,33 +35,43 @@ def test_a_force_that_nobody_answers_is_a_promise_broken():
     scenario.compliance.transversal.stiffness.value = 2000.0
     found.add("max_unanswered_force", 60.0, "N")
     set_promises(found, scenario)
-    (broken,) = broken_promises(found, whole=False)
+    (broken,) = broken_promises(found)
     assert broken.startswith("max_unanswered_force = 60")
     scenario.compliance.source = "observed"
     free = Metrics()
     free.add("max_unanswered_force", 60.0, "N")
     set_promises(free, scenario)
-    assert not broken_promises(free, whole=True)
+    assert not broken_promises(free)
 
 
-def test_a_run_cut_short_is_judged_by_maxima_and_what_holds_at_every_instant():
-    found = metrics(deepest_violation=1.3e-3, max_path_deviation=2e-3, settling_time=math.nan)
-    found.set_target("deepest_violation", "<= 0.5e-3")
-    found.set_target("max_path_deviation", "< 1e-3")
-    found.set_target("settling_time", "< 1")
-
-    def missed(**how):
-        return [phrase.split()[0] for phrase in broken_promises(found, **how)]
-
-    assert missed(whole=False) == ["deepest_violation", "max_path_deviation"]
-    assert missed(whole=False, stopped=True) == missed(whole=True, stopped=True)
-    assert missed(whole=True, stopped=True) == ["deepest_violation"]
-    found.set_target("max_path_deviation", "> 1")
-    assert missed(whole=False) == ["deepest_violation"]
-    found.set_target("max_path_deviation", "< 1e-3")
-    whole = broken_promises(found, whole=True)
-    assert len(whole) == 3
-    assert "settling_time has no value, target < 1" in whole[2]
+def test_a_run_cut_short_is_judged_by_extremes_that_have_passed_their_bound():
+    found = metrics(
+        deepest_violation=0.3e-3,
+        max_path_deviation=2e-3,
+        max_orientation_error=0.5e-3,
+        max_coulomb_error=2e-3,
+        least_tank=2.0,
+        least_distance=0.1,
+        joint_limit_margin=math.nan,
+        settling_time=math.nan,
+        led_distance_end=2e-3,
+    )
+    for name in found:
+        at_least = name.startswith(("least", "joint"))
+        found.set_target(name, "> 1" if at_least else "< 1e-3")
+    assert [phrase.split()[0] for phrase in broken_promises(found)] == [
+        *("max_path_deviation", "max_coulomb_error", "least_distance", "joint_limit_margin"),
+        *("settling_time", "led_distance_end"),
+    ]
+    leave_unjudged(found, fault=False)
+    broken = [phrase.split()[0] for phrase in broken_promises(found)]
+    assert broken == ["max_path_deviation", "least_distance"]
+    judged = {name for name, metric in found.items() if metric.judged}
+    assert judged == {"deepest_violation", *broken}
+    assert found["deepest_violation"].verdict == "met"
+    assert found["settling_time"].verdict == "not judged"
+    leave_unjudged(found, fault=True)
+    assert not broken_promises(found)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +79,6 @@ def test_a_run_cut_short_is_judged_by_maxima_and_what_holds_at_every_instant():
     [
         ("< 1e-3", [], 0),
         ("< 1e-12", [], 3),
-        # a maximum that was exceeded stays so
         ("< 1e-12", ["--duration", "0.2"], 3),
         ("> 1", ["--duration", "0.2"], 0),
     ],

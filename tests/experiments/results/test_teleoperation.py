@@ -78,7 +78,7 @@ def test_what_a_side_owes_is_a_requirement(log, settings):
     metrics = teleoperation_metrics(log, settings)
     assert metrics["owed_distance_end"].value == 4e-3
     set_promises(metrics, settings)
-    missed = broken_promises(metrics, whole=True)
+    missed = broken_promises(metrics)
     assert any(phrase.startswith("owed_distance_end = 4\u202fmm") for phrase in missed)
 
 
