@@ -14,6 +14,8 @@ from reporting.metrics import Metrics
 
 # m, that a tool which has arrived may be short of its goal
 _SHORT = 5e-3
+# pace of a reference below which the tool waits
+_WAITS = 0.1
 # samples by which the length of a motion is measured
 _SAMPLES = 2001
 
@@ -41,7 +43,7 @@ def arrival_metrics(log: RunLog, task: Task, settings: Scenario) -> Metrics:
     if "eta_d" not in log:
         left += tangential_error(log, float(log.time[-1]))
     timely = end <= settings.judged_after + 0.5 * settings.controller.sampling_time
-    waits = "waiting_pace" in log and left > _SHORT and log["waiting_pace"].values[-1, 0] <= 0.0
+    waits = "waiting_pace" in log and left > _SHORT and log["waiting_pace"].values[-1, 0] < _WAITS
     metrics.add(
         "arrived",
         max(0.0, 1.0 - left / length),
