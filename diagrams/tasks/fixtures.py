@@ -195,7 +195,7 @@ def _of_profile(
 ) -> RevolvedRegion | ExtrudedRegion:
     # the surface itself is made for its checks
     check_single_sheet(surface_from_shape(shape, _SMOOTHNESS, folder).surface)
-    profile = profile_from_file(shape, _SMOOTHNESS, folder)
+    profile, _ = profile_from_file(shape, _SMOOTHNESS, folder)
     try:
         if isinstance(shape, Revolved):
             # of an open one inside is below, by its normal

@@ -235,7 +235,7 @@ def surface_from_file(
         found = fitted(shape, placed, made)
         return replace(found, notes=(*notes, *found.notes))
     rotation = shape.rotation
-    profile = profile_from_file(shape, smoothness, folder)
+    profile, notes = profile_from_file(shape, smoothness, folder)
     if isinstance(shape, Revolved):
         first, last = np.deg2rad(shape.angles_deg) if shape.angles_deg else (0.0, 0.0)
         return MadeSurface(
@@ -245,15 +245,17 @@ def surface_from_file(
                 rotation=rotation,
                 angles=(float(first), float(last)) if shape.angles_deg else None,
                 inward=shape.inward,
-            )
+            ),
+            notes=notes,
         )
-    return MadeSurface(extruded_surface(profile, rotation @ shape.direction, shape.length))
+    extruded = extruded_surface(profile, rotation @ shape.direction, shape.length)
+    return MadeSurface(extruded, notes=notes)
 
 
 def profile_from_file(
     shape: Revolved | Extruded, smoothness: int, folder: FilePath
-) -> PiecewisePolynomialCurve:
-    """Return the profile that a surface is made from.
+) -> tuple[PiecewisePolynomialCurve, tuple[str, ...]]:
+    """Return the profile that a surface is made from, and what of its file was ignored.
 
     Args:
         shape: What the scenario says.
@@ -269,7 +271,7 @@ def profile_from_file(
     """
     file = _file_of(shape, folder)
     if isinstance(shape, Revolved):
-        points = read_profile(file, ["radius", "height"])
+        points, notes = read_profile(file, ["radius", "height"])
         if not points[:, 0].min() > 0.0:
             raise InputError(
                 f"{shape.file}: radius = {points[:, 0].min():g} m; positive numbers are required, "
@@ -277,9 +279,11 @@ def profile_from_file(
             )
     else:
         rotation = shape.rotation
-        points = read_profile(file, ["x", "y", "z"]) @ rotation.T + shape.origin
+        points, notes = read_profile(file, ["x", "y", "z"])
+        points = points @ rotation.T + shape.origin
     try:
-        return interpolate(points, smoothness=shape.smoothness or smoothness, closed=shape.closed)
+        degree = shape.smoothness or smoothness
+        return interpolate(points, smoothness=degree, closed=shape.closed), notes
     except InputError as error:
         raise InputError(f"{shape.file}: {error}") from None
 

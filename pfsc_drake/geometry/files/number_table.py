@@ -176,26 +176,6 @@ def _refuse_g_code(name: str, rows: list[str]) -> None:
             )
 
 
-def read_columns(name: str, what: str, columns: list[str]) -> tuple[list[int], np.ndarray]:
-    """Read a CSV file that must have certain columns, in any order, and no others.
-
-    Args:
-        name: Name of the file.
-        what: What rows are, for messages.
-        columns: Names of the columns.
-
-    Returns:
-        Where in the file the rows stand, [n], and the columns in the order asked for, [n, columns].
-
-    Raises:
-        InputError: As :func:`read_numbers`, or columns are unknown, there twice or missing.
-    """
-    table = read_numbers(
-        name, what, lambda place, header: check_columns(place, header, columns, columns)
-    )
-    return table.lines, table.rows[:, [table.header.index(label) for label in columns]]
-
-
 def check_columns(
     place: str,
     header: list[str],

@@ -8,7 +8,7 @@ import numpy as np
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.geometry.files.mesh_files import read_obj_vertices, read_ply_vertices, read_stl
-from pfsc_drake.geometry.files.number_table import check_columns, read_columns, read_numbers
+from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
 from pfsc_drake.geometry.files.unit import Unit, metres
 
 _AXES = ["x", "y", "z"]
@@ -47,12 +47,12 @@ def read_surface_file(file: str | FilePath, unit: Unit = "m") -> SurfacePoints:
 
     Args:
         file: A CSV file with columns x, y, z in any order, others being ignored, or an STL, OBJ
-            or PLY file whose vertices are taken, equal ones once.
+            or PLY file whose vertices are taken. Equal points are taken once.
         unit: Unit of the numbers in it.
 
     Raises:
         InputError: An unknown kind of file or unit, one that cannot be read, columns that are
-            missing or misspelled, values that are not finite, points of a CSV file twice, further
+            missing or misspelled, values that are not finite, further
             than 1e4 m away or more than 50 m apart.
     """
     scale, notes = metres(unit), tuple[str, ...]()
@@ -93,38 +93,42 @@ def _check_header(place: str, header: list[str]) -> None:
 def _read_csv(name: str) -> tuple[np.ndarray, list[str], tuple[str, ...]]:
     """Points [n, 3] in the file's unit, where they stand, and what was ignored."""
     table = read_numbers(name, "points", _check_header, known=_AXES)
-    lines, points = table.lines, table.rows[:, [table.header.index(axis) for axis in _AXES]]
-    first: dict[tuple[float, ...], int] = {}
-    for line, row in zip(lines, map(tuple, points.tolist()), strict=True):
-        if first.setdefault(row, line) != line:
-            raise InputError(
-                f"{name}, line {line}: the same point as in line {first[row]}; each once is"
-                " required"
-            )
-    return points, [f"line {line}" for line in lines], table.notes(name)
+    points = table.rows[:, [table.header.index(axis) for axis in _AXES]]
+    kept = np.sort(np.unique(points, axis=0, return_index=True)[1])
+    notes = table.notes(name)
+    if again := len(points) - len(kept):
+        line = table.lines[int(np.setdiff1d(np.arange(len(points)), kept)[0])]
+        there = f"of which the first is in line {line}" if again > 1 else f"in line {line}"
+        notes += (f"{name}: points that are there already left out: {again}, {there}",)
+    return points[kept], [f"line {table.lines[row]}" for row in kept], notes
 
 
-def read_profile(file: str | FilePath, columns: list[str]) -> np.ndarray:
-    """Read the points of a profile.
+def read_profile(file: str | FilePath, columns: list[str]) -> SurfacePoints:
+    """Read the points of a profile, and say what was ignored.
 
     Args:
         file: CSV file.
-        columns: That it must have, in any order, and no others.
+        columns: That it must have, in any order, others being ignored.
 
     Returns:
         Points in the order of the file, [n, columns], m.
 
     Raises:
-        InputError: The file cannot be read, columns are unknown or missing, or a value is not a
+        InputError: The file cannot be read, columns are misspelled or missing, or a value is not a
             number or beyond 1e4 m.
     """
     name = str(file)
-    lines, points = read_columns(name, "points", columns)
+
+    def check_header(place: str, header: list[str]) -> None:
+        check_columns(place, header, columns, columns, others=True)
+
+    table = read_numbers(name, "points", check_header, known=columns)
+    points = table.rows[:, [table.header.index(label) for label in columns]]
     far = np.argwhere(np.abs(points) > FARTHEST)
     if far.size:
         row, column = far[0]
         raise InputError(
-            f"{name}, line {lines[row]}, column {columns[column]}: {points[row, column]:g} m;"
+            f"{name}, line {table.lines[row]}, column {columns[column]}: {points[row, column]:g} m;"
             f" at most {FARTHEST:g} m are allowed"
         )
-    return points
+    return SurfacePoints(points, table.notes(name))

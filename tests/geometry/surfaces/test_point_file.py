@@ -73,6 +73,16 @@ def test_equal_vertices_are_taken_once_in_the_order_of_the_file(tmp_path):
     np.testing.assert_array_equal(read_surface_points(file)[:, 0], [3.0, 1.0, 2.0])
 
 
+def test_equal_points_of_a_scan_are_taken_once_and_that_is_said(tmp_path):
+    file = write(tmp_path, "a.csv", b"x,stamp,y,z\n3,1,0,0\n1,2,0,0\n3,3,0,0\n2,4,0,0\n1,5,0,0\n")
+    points, notes = read_surface_file(file)
+    np.testing.assert_array_equal(points[:, 0], [3.0, 1.0, 2.0])
+    assert [note.removeprefix(f"{file}: ") for note in notes] == [
+        "column 'stamp' ignored",
+        "points that are there already left out: 2, of which the first is in line 4",
+    ]
+
+
 @pytest.mark.parametrize(
     ("name", "data", "reason"),
     [
@@ -84,7 +94,6 @@ def test_equal_vertices_are_taken_once_in_the_order_of_the_file(tmp_path):
         ("a.csv", b"x,y,z,x\n1,2,3,4\n", "column 'x' twice"),
         ("a.csv", b"x,y,z\n1,2\n", "line 2: 2 values; 3 are required"),
         ("a.csv", b"x,y,z\n1,nan,3\n", "line 2, column y: 'nan'; a finite number"),
-        ("a.csv", CSV + b"0.5,0,0\n", "line 6: the same point as in line 2"),
         ("a.csv", b"x,y,z\n1,2,3\n1,2,2e5\n", "line 3, z: 200000 m"),
         ("a.csv", b"x,y,z\n1,2,3\n1,2,200\n", "197 m from end to end; .* is its unit mm"),
         ("a.csv", b"\xff\xfe\x00", "not a text file; a readable CSV file"),

@@ -9,8 +9,9 @@ from pfsc_drake.geometry.surfaces.point_file import read_profile
 
 def test_columns_in_any_order(tmp_path):
     file = tmp_path / "profile.csv"
-    file.write_text("# a vase\nheight,radius\n0.0,0.1\n0.2,0.15\n", encoding="utf-8")
-    points = read_profile(file, ["radius", "height"])
+    file.write_text("# a vase\nheight,stamp,radius\n0.0,7,0.1\n0.2,8,0.15\n", encoding="utf-8")
+    points, notes = read_profile(file, ["radius", "height"])
+    assert notes == (f"{file}: column 'stamp' ignored",)
     np.testing.assert_array_equal(points, [[0.1, 0.0], [0.15, 0.2]])
 
 
@@ -19,7 +20,7 @@ def test_columns_in_any_order(tmp_path):
     [
         ("radius,height\n0.1,2e4\n", ("line 2", "height", "20000 m", "10000 m")),
         ("radius\n0.1\n", ("line 1", "'height'")),
-        ("radius,height,x\n0.1,0,0\n", ("line 1", "'x'", "radius, height")),
+        ("radius,height,Height\n0.1,0,0\n", ("line 1", "'Height'", "radius, height")),
         ("radius,height\n0.1,a\n", ("line 2", "'a'")),
         ("", ("no points",)),
     ],
