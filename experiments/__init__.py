@@ -11,30 +11,9 @@ From a script or a notebook::
 
 import os
 
-from pfsc_drake.door import door
+from pfsc_drake.lazy_names import lazy_names
 
 # all matrices are small; BLAS threads would only compete with the control loop
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# what users import, and the modules that are loaded when they do
-_DOOR = {
-    "Commands": "experiments.replay",
-    "ExportedController": "experiments.exported_controller",
-    "FirstCommand": "experiments.hardware.driven_run",
-    "Margins": "experiments.studies.margins.told",
-    "Replay": "experiments.replay",
-    "Run": "experiments.kept_run",
-    "Scenario": "diagrams.scenario",
-    "StaticCheck": "experiments.hardware.statics",
-    "check_robot": "experiments.hardware.calls",
-    "drive": "experiments.hardware.calls",
-    "export_controller": "experiments.exported_controller",
-    "first_command": "experiments.hardware.calls",
-    "load": "experiments.kept_run",
-    "margins": "experiments.api",
-    "run": "experiments.api",
-}
-
-__all__ = [*_DOOR]
-
-__getattr__ = door(__name__, _DOOR)
+__all__, __getattr__, __dir__ = lazy_names(__name__)

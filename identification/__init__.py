@@ -10,20 +10,9 @@ From a script or a notebook::
 
 import os
 
-from pfsc_drake.door import door
+from pfsc_drake.lazy_names import lazy_names
 
 # threads of BLAS compete with the processes side by side, and take longer than one does alone
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# what users import, and the modules that are loaded when they do
-_DOOR = {
-    "Identification": "identification.api",
-    "WrittenModel": "identification.consistency.writing",
-    "consistent_model": "identification.api",
-    "estimate": "identification.api",
-    "simulate": "identification.api",
-}
-
-__all__ = [*_DOOR]
-
-__getattr__ = door(__name__, _DOOR)
+__all__, __getattr__, __dir__ = lazy_names(__name__)

@@ -1,17 +1,22 @@
 """What is packaged: an installed wheel and a clone find the same models."""
 
-import ast
+import dataclasses
 import re
 import shutil
 import subprocess
 import sys
 import tomllib
+import typing
 from pathlib import Path
 
 import pytest
 
+import experiments
+import identification
 import pfsc_drake
 from pfsc_drake import __version__
+from pfsc_drake.geometry.regions.moving import MovingRegion
+from pfsc_drake.geometry.regions.region import Region
 from pfsc_drake.robot.models.files import models_directory
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -48,18 +53,51 @@ def test_wheel_carries_package_and_models():
     assert (ROOT / "pfsc_drake" / "py.typed").is_file()
 
 
-def test_type_checkers_see_what_users_import():
-    """The names that are loaded when they are used, from the modules that define them."""
-    tree = ast.parse((ROOT / "pfsc_drake" / "__init__.py").read_text(encoding="utf-8"))
-    (block,) = (node for node in tree.body if isinstance(node, ast.If))
-    assert ast.unparse(block.test) == "TYPE_CHECKING"
-    seen = {
-        alias.asname: statement.module
-        for statement in block.body
-        if isinstance(statement, ast.ImportFrom)
-        for alias in statement.names
-    }
-    assert seen == pfsc_drake._DOOR
+@pytest.mark.parametrize("package", [pfsc_drake, experiments, identification])
+def test_public_names_are_found_and_shown(package):
+    assert len(package.__all__) > 4 and set(package.__all__) < set(dir(package))
+    for name in package.__all__:
+        assert getattr(package, name).__name__ == name
+        assert name in vars(package)
+    wrong = package.__all__[0] + "s"
+    with pytest.raises(AttributeError, match=f"'{wrong}'; did you mean '{package.__all__[0]}'"):
+        getattr(package, wrong)
+    assert not hasattr(package, "__no_such_name__")
+
+
+def classes_of(hint):
+    """Return the project's dataclasses and abstract classes that a type hint mentions."""
+    if isinstance(hint, type) and hint.__module__.startswith("pfsc_drake."):
+        return {hint}
+    return set().union(*map(classes_of, typing.get_args(hint)))
+
+
+def test_whatever_arguments_are_made_of_has_a_public_name():
+    functions = [getattr(pfsc_drake, name) for name in pfsc_drake.__all__ if name[:4] == "add_"]
+    assert len(functions) >= 5
+    waiting, seen = [typing.get_type_hints(function) for function in functions], set()
+    while waiting:
+        for hint in waiting.pop().values():
+            for found in classes_of(hint) - seen:
+                seen.add(found)
+                if dataclasses.is_dataclass(found):
+                    waiting.append(typing.get_type_hints(found))
+    assert {found.__name__ for found in seen} - {*pfsc_drake.__all__} == set()
+
+
+def concrete_regions(base):
+    for kind in base.__subclasses__():
+        if not kind.__abstractmethods__:
+            yield kind
+        yield from concrete_regions(kind)
+
+
+def test_all_regions_have_public_names():
+    for name in pfsc_drake.__all__:
+        getattr(pfsc_drake, name)
+    kinds = {kind.__name__ for base in (Region, MovingRegion) for kind in concrete_regions(base)}
+    assert len(kinds) >= 12
+    assert {name for name in kinds if name[0] != "_"} <= {*pfsc_drake.__all__}
 
 
 def test_models_of_a_wheel(tmp_path):
