@@ -154,8 +154,10 @@ def leave_unjudged(metrics: Metrics, *, fault: bool) -> None:
         fault: Whether a fault cut it short.
     """
     for name, metric in metrics.items():
-        if metric.bound is not None and name not in _ALWAYS:
-            metric.judged = not fault and _is_exceeded_extreme(name, metric)
+        if metric.bound is not None:
+            at_all_times = name in _ALWAYS and not math.isnan(metric.value)
+            extreme = not fault and _is_exceeded_extreme(name, metric)
+            metric.judged = at_all_times or extreme
 
 
 def _is_exceeded_extreme(name: str, metric: Metric) -> bool:
