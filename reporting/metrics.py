@@ -139,7 +139,7 @@ class Metrics(UserDict[str, Metric]):
         path.write_text(self.to_json(), encoding="utf-8")
 
     def to_json(self) -> str:
-        """Returns flat JSON ``name: {value, unit, target?, source?, judged?}``; NaN is null."""
+        """Returns flat JSON ``name: {value, unit, target?, source?}``; NaN, infinity are null."""
         return json.dumps(self.to_data(), indent=2, allow_nan=False) + "\n"
 
     def to_data(self) -> dict[str, Any]:
@@ -186,16 +186,13 @@ def _to_json(metric: Metric) -> dict[str, Any]:
         entry["target"] = metric.target
     if metric.source is not None:
         entry["source"] = metric.source
-    if not metric.judged:
-        entry["judged"] = False
     return entry
 
 
 def _from_json(entry: dict[str, Any]) -> Metric:
     """The metric of one entry."""
     value = math.nan if entry["value"] is None else float(entry["value"])
-    target, source = entry.get("target"), entry.get("source")
-    return Metric(value, entry["unit"], target, source, entry.get("judged", True))
+    return Metric(value, entry["unit"], entry.get("target"), entry.get("source"))
 
 
 def format_quantity(value: float, unit: str) -> str:

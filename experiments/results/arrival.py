@@ -25,7 +25,8 @@ def arrival_metrics(log: RunLog, task: Task, settings: Scenario) -> Metrics:
 
     What is left is the reference's distance to go, by its own time where it waits for obstacles,
     and how far the tool is from the reference; the latter does not count where the tool
-    complies along the path. It is a requirement where the motion ends within the scenario's time.
+    complies along the path. It is a requirement of runs that are as long as their scenario, where
+    the motion ends within that time.
 
     Args:
         log: Log of a run.
@@ -42,12 +43,14 @@ def arrival_metrics(log: RunLog, task: Task, settings: Scenario) -> Metrics:
     left = _distance(task, min(float(log.time[-1]) - lost, end))
     if "eta_d" not in log:
         left += tangential_error(log, float(log.time[-1]))
-    timely = end <= settings.judged_after + 0.5 * settings.controller.sampling_time
+    tick = settings.controller.sampling_time
+    timely = end <= settings.judged_after + 0.5 * tick
+    lasted = float(log.time[-1]) > settings.judged_after - 1.5 * tick
     waits = "waiting_pace" in log and left > _SHORT and log["waiting_pace"].values[-1, 0] < _WAITS
     metrics.add(
         "arrived",
         max(0.0, 1.0 - left / length),
-        target=f">= {1.0 - _SHORT / length:.6f}" if timely else None,
+        target=f">= {1.0 - _SHORT / length:.6f}" if timely and lasted else None,
         source="the tool still waits for an obstacle" if waits else None,
     )
     return metrics

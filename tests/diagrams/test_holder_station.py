@@ -23,6 +23,7 @@ END, BEGIN = 0.75, 0.5
 def exact(**holder):
     """Return the scenario of two arms whose controllers know and see the truth."""
     settings, plain = shipped_scenario("pfc_two_arms"), Scenario()
+    settings.reference.dwell = settings.holder.reference.dwell = 0.3
     for key in ("friction", "encoders", "model_error"):
         setattr(settings, key, getattr(plain, key))
         setattr(settings.holder, key, deepcopy(getattr(plain, key)))

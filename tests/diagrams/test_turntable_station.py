@@ -21,6 +21,7 @@ END, BEGIN = 0.8, 0.5  # s
 def exact(**table):
     """Return the scenario with a robot that knows and sees the truth, and a table like that."""
     settings, plain = shipped_scenario("pfc_turntable"), Scenario()
+    settings.reference.dwell = settings.turntable.dwell = 0.3
     for key in ("friction", "encoders", "model_error"):
         setattr(settings, key, getattr(plain, key))
     for key, value in ({"increments": 0.0, "lag": 0.0} | table).items():

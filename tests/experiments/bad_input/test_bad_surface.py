@@ -132,11 +132,6 @@ def test_a_tolerance_below_the_noise(wrong, tmp_path):
     wrong("tolerance", "1e-05 m", "allow", changes=fitted(", tolerance: 1e-5"))
 
 
-def test_points_twice(wrong, tmp_path):
-    file = csv(tmp_path, np.vstack([dish(), dish()[:1]]))
-    wrong("line 627", "line 2", changes=fitted(), file=file)
-
-
 def test_grids(wrong, tmp_path):
     csv(tmp_path, dish(SQUARE))
     wrong("grid = [24, 25]", "625", changes=fitted(", grid: [24, 25]"))

@@ -44,7 +44,8 @@ def arrival(end, *, lost=0.0, lag=0.0, judged_after=6.0, pace=1.0, **further):
 def test_the_share_counts_what_the_reference_has_left_and_what_the_tool_lags(end, lost, lag, share):
     found = arrival(end, lost=lost, lag=lag)["arrived"]
     assert found.value == pytest.approx(share, abs=1e-6)
-    assert found.passed is (share > 1.0 - 5e-3 / 3.0)
+    # a run that was cut short is too short for it
+    assert found.passed is (None if end < 6.0 else share > 1.0 - 5e-3 / 3.0)
 
 
 def test_a_tool_that_waits_to_the_end_breaks_a_promise_and_the_line_says_why():

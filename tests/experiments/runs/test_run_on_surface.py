@@ -62,7 +62,7 @@ def test_the_path_is_followed_on_the_dish(on_surface):
         np.testing.assert_allclose(seen, np.broadcast_to(seen[-1], seen.shape), atol=1e-5)
     assert angle_between(normal[0], normal[-1]) > 0.1
     targets = [m for m in run.metrics.values() if m.get("target")]
-    assert len(targets) == 2
+    assert len(targets) == 3
     assert all(metric["value"] < float(metric["target"].split()[1]) for metric in targets)
 
 

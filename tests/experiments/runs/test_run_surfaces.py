@@ -64,7 +64,7 @@ def test_signals_and_targets(surface_run, name):
 
 def _met(metric):
     sign, number = metric["target"].split()
-    compare = {"<": operator.lt, "<=": operator.le, ">": operator.gt}[sign]
+    compare = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}[sign]
     return compare(metric["value"], float(number))
 
 
