@@ -7,9 +7,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.task import Followed
 from pfsc_drake.geometry import (
     Path,
     PiecewisePolynomialCurve,
@@ -82,15 +82,14 @@ def add_path_following(
         if oriented:
             R_e = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
         start = ToolTarget(point[manifold.layout.position][:3], R_e)
-        lap = path.length if path.closed else None
         return Followed(
             manifold,
             Projector(evaluator),
             along,
             start,
             point,
-            lap=lap,
-            length=path.length,
+            path_length=path.length,
+            closed=path.closed,
             projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
             warnings=path_warnings(path, shape_report(path), "path_from_waypoints: "),
         )
