@@ -94,6 +94,9 @@ class PathTask(Task):
         }
         self.place = PathManifold(self.relative_degree, **followed)
         self.manifold = self._law_manifold(self.relative_degree, **followed)
+        if self.manifold.follows_time:
+            count = len(self.manifold.coordinates)
+            self.prescribed_point = TrajectoryPoint(self.path, self.relative_degree, count)
         self.warnings += self._euler_warnings("path" if surface is None else "surface")
         self._points = reference.arc_lengths(self.path.length)
         self._check_points(self._points)
@@ -211,11 +214,6 @@ class TrajectoryTask(PathTask):
     """Classical tracking of a point that moves along the path with time (Sec. 3.8.4)."""
 
     _law_manifold = MovingPoint
-
-    @property
-    def prescribed_point(self) -> TrajectoryPoint:
-        """Block with the point that the law acts on, which time prescribes."""
-        return TrajectoryPoint(self.path, self.relative_degree, len(self.manifold.coordinates))
 
     def point(self, start: StartPoint) -> np.ndarray:
         """Return the point of the manifold that the law acts on at the start."""

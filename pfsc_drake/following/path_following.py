@@ -6,6 +6,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.manifold import Projector
+from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
@@ -53,7 +54,8 @@ def add_path_following(
             ``elastic``.
         motion: Arc length over time [m], e.g. from :func:`~pfsc_drake.rest_to_rest`; along the
             whole path once if omitted.
-        options: What else is chosen.
+        options: What else is chosen; with ``controller.manifold`` = ``trajectory`` the point that
+            time prescribes is tracked, for comparison (Sec. 3.8.4).
 
     Returns:
         The controller, one diagram with the ports of :class:`Follower`.
@@ -69,7 +71,8 @@ def add_path_following(
 
     def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         oriented = path.orientation is not None
-        manifold = PathManifold(
+        tracks = chosen.controller.manifold == MovingPoint.name
+        manifold = (MovingPoint if tracks else PathManifold)(
             relative_degree,
             oriented=oriented,
             turning=path.frame.turns,
@@ -90,7 +93,10 @@ def add_path_following(
             point,
             path_length=path.length,
             closed=path.closed,
-            projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+            projection=None if tracks else lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+            prescribed_point=TrajectoryPoint(path, relative_degree, len(manifold.coordinates))
+            if tracks
+            else None,
             warnings=path_warnings(path, shape_report(path), "path_from_waypoints: "),
         )
 

@@ -55,6 +55,7 @@ class Task:
         warnings: Doubts about manifold and motion, one sentence each.
         guided: Regions and paths of a tool that a hand guides through space.
         streamed: Path whose waypoints come while the tool moves.
+        prescribed_point: Block with the point that the law acts on, where time prescribes it.
     """
 
     projector_name: ClassVar[str] = "projector"
@@ -64,16 +65,12 @@ class Task:
     warnings: Sequence[str] = ()
     guided: Guided | None = None
     streamed: StreamedPath | None = None
+    prescribed_point: TrajectoryPoint | None = None
 
     @property
     def projecting(self) -> Block:
         """Block that finds the closest point on the manifold."""
         raise NotImplementedError
-
-    @property
-    def prescribed_point(self) -> TrajectoryPoint | None:
-        """Block with the point that the law acts on, where time prescribes it."""
-        return None
 
     @property
     def lap(self) -> float | None:
@@ -106,6 +103,7 @@ class Followed(Task):
         guided: See :class:`Task`.
         streamed: See :class:`Task`.
         projection: Finds the closest point on a path beforehand.
+        prescribed_point: See :class:`Task`.
         warnings: See :class:`Task`.
     """
 
@@ -119,6 +117,7 @@ class Followed(Task):
     guided: Guided | None = None
     streamed: StreamedPath | None = None
     projection: Projection | None = None
+    prescribed_point: TrajectoryPoint | None = None
     warnings: Sequence[str] = ()
 
     @property

@@ -220,12 +220,14 @@ def _limit_rules(key: str, is_on: bool) -> list[Rule]:
 
 def _motion_rules(followed: Followed) -> list[Rule]:
     timed = "needs a path or surface with a motion over time"
+    tracks = followed.manifold.follows_time
     return [
         Rule(key, followed.motion is not None or followed.streamed is not None, timed)
         for key in ("override", "stream")
     ] + [
         Rule("obstacles", followed.streamed is None, timed),
-        Rule("swings", followed.guided is None, "needs a path or surface"),
+        Rule("swings", followed.guided is None and not tracks, "needs a path or surface"),
+        Rule("transition", not tracks, "the reference of a trajectory is a point that moves"),
     ]
 
 

@@ -205,7 +205,11 @@ def plan_waiting(
     chain, watch = law.robot, obstacles.watch
     if not isinstance(chain, SerialChain):
         raise InputError("obstacles: given; must be None for a robot that is no chain of links")
+    if obstacles.elbow is not None:
+        allowed = "None for an arm without joints to spare, and one whose posture yields to forces"
+        spare = law.posture is not None and options.controller.posture.yields == "none"
+        require(spare, "obstacles.elbow", "given", allowed)
     joints = joint_course(named, followed, q_J, options.friction, watch.reserve)
     order = law.linearization.relative_degree
     ahead, pace = waiting_motion(chain, watch, motion, order, joints)
-    return Waiting(obstacles.shapes, watch, ahead, pace, None)
+    return Waiting(obstacles.shapes, watch, ahead, pace, obstacles.elbow)

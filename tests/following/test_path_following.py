@@ -272,6 +272,25 @@ def test_a_path_that_oscillates_along_its_normal_is_followed(path):
         assert abs(expected) > 5e-3
 
 
+def test_a_trajectory_is_tracked_for_comparison(path):
+    """The tool comes back to where time prescribes it to be, not to the closest point."""
+    options = FollowerOptions(controller=ControllerParameters(manifold="trajectory"))
+    simulator, follower = closed_loop(path, "comau_racer_1_4", "rigid", options)
+    plant = simulator.get_system().GetSystems()[0]
+    own = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositions(own, follower.start_posture + 0.01)
+    planned = follower.followed.motion.derivatives(np.array([0.0, 1.2]), 0)[:, 0, 0]
+    distances = []
+    for time, eta in zip((0.0, 1.2), planned, strict=True):
+        simulator.AdvanceTo(time)
+        tool = plant.GetFrameByName("tool_point").CalcPoseInWorld(own).translation()
+        point = path.position.derivatives(np.array([path.arc_length.parameter(eta)]), 0)[0, 0]
+        distances.append(np.linalg.norm(tool - point))
+        errors = read(simulator, follower, "manifold_state")[:3]
+        assert np.linalg.norm(errors) == pytest.approx(distances[-1], abs=1e-6)
+    assert distances[0] > 5e-3 and distances[1] < 1e-5
+
+
 def test_it_steps_without_drake(path):
     """The same torques as the diagram's, from what the diagram measured."""
     simulator, follower = closed_loop(path, "comau_racer_1_4_elastic", "elastic")

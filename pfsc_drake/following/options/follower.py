@@ -8,6 +8,7 @@ from pfsc_drake.checks import require, require_between, require_not_negative, re
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters, RobotLimitParameters
 from pfsc_drake.control.law.swing import Swing
 from pfsc_drake.control.law.timed_reference import StreamLimits
+from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
 from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.following.options.compliance import ComplianceParameters
@@ -112,10 +113,12 @@ class ObstacleOptions:
     Attributes:
         shapes: What they look like.
         watch: How progress waits for them.
+        elbow: How the elbow of an arm with joints to spare avoids them; it does not if omitted.
     """
 
     shapes: list[ObstacleShape]
     watch: WatchParameters = dc.field(default_factory=WatchParameters)
+    elbow: ElbowParameters | None = None
 
     def __post_init__(self) -> None:
         require(bool(self.shapes), "shapes", "none", "one or more")
