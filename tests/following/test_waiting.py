@@ -151,7 +151,7 @@ def test_an_elbow_avoids_obstacles_where_there_is_one():
     for made in (follower("", OPTIONS), follower("", options)):
         step = made.stepper().step
         place = [0.2, 0.6, 0.8, 0.0, 0.0, 0.0]
-        for _ in range(3):
+        for _ in range(100):
             told = step(plant_state=made.start_state, obstacles=place)
         torques.append(told["drive_torque"])
     assert np.abs(torques[1] - torques[0]).max() > 1.0
