@@ -14,6 +14,7 @@ from diagrams.drawing.replay import build_delta_replay, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.holder_station import add_holder, stop_both
 from diagrams.robots.arm import Arm
+from diagrams.robots.belief import believed_robot
 from diagrams.robots.delta import DeltaPart
 from diagrams.robots.drives import add_drives
 from diagrams.robots.force_sensor import add_sensor
@@ -45,13 +46,13 @@ from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.obstacles import add_obstacles, add_told_obstacles
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
-from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import law_manifold
 from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.waiting import Approach, plan_waiting
 from diagrams.turntable_station import add_turntable
 from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.control.planning.course import CourseStart
+from pfsc_drake.following.assembly import ControllerAssembly
 from pfsc_drake.following.law import make_law
 from pfsc_drake.following.law_warnings import MODES
 from pfsc_drake.geometry.progress import Progress
@@ -126,28 +127,23 @@ def build_station(
     rest = cache(lambda: find_rest(task, part, *begin(), held))
     law = make_law(scenario.controller, believed, law_manifold(task, held), rest, scenario.faults)
     start, initial_state = begin()
-    on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
     rubbing = friction_options(scenario, folder)
     friction = believed_friction(part, scenario.controller.friction.believed, rubbing)
     link_state = part.coordinates.link_rows @ initial_state
     start_posture = link_state[: part.robot.dimension]
-    following = Following(
-        following_options(scenario), believed, task, law, start_posture, on_motors, friction, held
-    )
+    options = following_options(scenario)
     crossing = scenario.obstacles
     begun = CourseStart(rest().q_J, start.place)
     asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
     plans = [each.plan for each in (holder, turntable) if each is not None]
     carrier_plan = plans[0] if plans else None
     keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress, carrier_plan)
-    if like is not None:
-        following = replace(following, waiting=like.waiting)
-    elif crossing is not None:
+    waiting = None if like is None else like.waiting
+    if like is None and crossing is not None:
         given, allowed = scenario.compliance.is_given, "left out where progress waits"
         require(not given, "compliance", "given", allowed)
         approach = Approach(start_posture, scenario.start.transition)
         waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction, approach)
-        following = replace(following, waiting=waiting)
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation
@@ -176,12 +172,22 @@ def build_station(
     if crossing is not None:
         told = add_told_obstacles if remote else add_obstacles
         obstacles = told(builder, crossing, period)
-    place = add_place(
-        builder, following, joint_state, override, obstacles.get("obstacles_measured")
+    tuning = None if scenario.operator is None else scenario.operator.tuning
+    known = believed_robot(believed, scenario.encoders, period, friction)
+    assembly = ControllerAssembly(
+        builder, task, law, known, options, start_posture, waiting, tuning
     )
+    assembly.add_place(joint_state, None if held is None else held.motion)
+    stream, pen = assembly.stream, None
+    if isinstance(task, StreamTask) and stream is not None:
+        pen = task.add_source(builder, stream, period)
+    if override is not None:
+        assembly.connect("override", override)
+    if "obstacles_measured" in obstacles:
+        assembly.connect("obstacles", obstacles["obstacles_measured"])
     # what acts on the tool acts where the tool is, also if a law follows another point
-    beside = place.projector.GetOutputPort("manifold_point")
-    around = place.signals | {"joint_state": true_state}
+    beside = assembly.projector.GetOutputPort("manifold_point")
+    around = assembly.signals | {"joint_state": true_state}
     if held is None:
         around["manifold_point"] = beside
     operator = None
@@ -209,18 +215,19 @@ def build_station(
         failure = failures.force_sensor_failure
         forces |= add_sensor(builder, part, scenario.sensor, failure, period, states | forces)
         if mounting is not None:
-            forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
+            forces |= add_payload(
+                builder, mounting, part.gravity, period, assembly.signals | forces
+            )
         if holder is not None and holder.reaction is not None:
-            holder.reaction.tell(builder, forces["wrench_measured"], place.world_pose)
+            holder.reaction.tell(builder, forces["wrench_measured"], assembly.world_pose)
     led = {} if operator is None else operator.requests
     if afar is not None:
         led = led | {"wrench_led": afar.lead(builder, forces)}
-    controller, made = add_law(builder, following, place, forces | led)
-    signals = place.signals | obstacles | forces | made | links.signals
+    controller, made = assembly.add_law(forces | led)
+    signals = assembly.signals | obstacles | forces | made | links.signals
     if afar is not None:
         signals |= afar.connect(builder, task, believed, servo_lag(scenario), signals)
-    if isinstance(task, StreamTask) and place.stream is not None:
-        stream = place.stream
+    if isinstance(task, StreamTask) and stream is not None:
         signals["true_place"] = task.add_true_place(builder, part.robot, true_state, stream, period)
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     if links.drive_torque is not None:
@@ -244,8 +251,8 @@ def build_station(
     stops = [] if remote else [signals["stop_category"]]
     stops += [signals["servo_stop_category"]] if "servo_stop_category" in signals else []
     signals |= add_friction(builder, part, true_state, rubbing, stops)
-    known = joint_state if remote else true_state
-    signals |= states_to_log(known, place.signals["joint_state"])
+    logged = joint_state if remote else true_state
+    signals |= states_to_log(logged, assembly.signals["joint_state"])
     if holder is not None and carrier is not None:
         stop_both(builder, controller, carrier)
         signals |= holder.signals
@@ -276,13 +283,13 @@ def build_station(
         part,
         task,
         law,
-        place.projector.get_name(),
+        assembly.projector.get_name(),
         access,
         servo,
         log,
         initial_state,
         start,
-        on_motors,
+        assembly.on_motors,
         source,
         warn,
         workpiece,
@@ -291,8 +298,8 @@ def build_station(
         mounting,
         0 if remote else scenario.driver.ticks(period),
         holder,
-        place.pen,
-        following.waiting,
+        pen,
+        waiting,
         None if afar is None else afar.link,
         turntable,
     )

@@ -14,6 +14,7 @@ from diagrams.fault_instant import first_instant
 from diagrams.named_builder import PrefixingBuilder
 from diagrams.oscillation import oscillation_before
 from diagrams.robots.arm import Arm, add_arm
+from diagrams.robots.belief import believed_robot
 from diagrams.robots.drives import add_drives
 from diagrams.robots.friction import add_friction, believed_friction
 from diagrams.robots.held_workpiece import holding
@@ -33,7 +34,6 @@ from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.held_reaction import HeldReaction, add_held_reaction
 from diagrams.tasks.drive_limits import keep_drive_limits
-from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.held_frame import HeldFrame
 from diagrams.tasks.motion_demand import MotionDemand
 from diagrams.tasks.planned_frame import planned_frame
@@ -47,6 +47,7 @@ from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame, 
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.assembly import ControllerAssembly
 from pfsc_drake.following.fault_description import FaultScene, FoundFault, describe
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry import PiecewisePolynomialCurve
@@ -173,7 +174,6 @@ def add_holder(
         rest = cache(lambda: find_rest(task, part, start, state))
         believed = part.belief.robot
         law = make_law(own.controller, believed, task.manifold, rest, own.faults)
-        on_motors = own.controller.law == "rigid" and not believed.is_rigid
         rubbing = friction_options(own, folder)
         friction = believed_friction(part, own.controller.friction.believed, rubbing)
         q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
@@ -190,26 +190,27 @@ def add_holder(
         links = add_link_state(
             named, part, own.controller, own.encoders, measured, true_state, q_J, friction
         )
-        following = Following(
-            following_options(own), believed, task, law, q_J, on_motors, friction, carries=True
+        known = believed_robot(believed, own.encoders, period, friction)
+        assembly = ControllerAssembly(
+            named, task, law, known, following_options(own), q_J, carries=True
         )
-        place = add_place(named, following, links.joint_state)
+        assembly.add_place(links.joint_state)
         reaction, told = None, own.controller.external_torque.source
         if scenario.forces:
-            seen = place.signals["tool_pose"] if told == "measured" else None
+            seen = assembly.signals["tool_pose"] if told == "measured" else None
             reaction = add_held_reaction(named, part, true_state, seen, period)
         forces = {} if reaction is None else reaction.forces
-        controller, made = add_law(named, following, place, forces)
+        controller, made = assembly.add_law(forces)
     drive = controller.GetOutputPort(controller.drive_port)
     if links.drive_torque is not None:
         builder.Connect(drive, links.drive_torque)
-    ports = place.signals | {"drive": drive}
+    ports = assembly.signals | {"drive": drive}
     add_drives(named, part, None, DriverParameters(), period, ports, state)
     rubs = add_friction(named, part, true_state, rubbing, [made["stop_category"]])
-    motion = _add_motion(named, holder, following, order, controller, plan)
+    motion = _add_motion(named, holder, law, order, controller, plan)
     pose = np.array(pose_function(part.robot)(q_J)).ravel()
-    logged = place.signals | made | rubs | forces | {"frame_jet": motion}
-    logged |= states_to_log(true_state, place.signals["joint_state"])
+    logged = assembly.signals | made | rubs | forces | {"frame_jet": motion}
+    logged |= states_to_log(true_state, assembly.signals["joint_state"])
     source = measured.get_system().get_name(), measured.get_name()
     planned = [] if task.drive_plan is None else task.drive_plan.said
     link_state = part.coordinates.link_rows @ state
@@ -228,12 +229,12 @@ def add_holder(
         ControllerAccess(controller),
         state,
         start,
-        on_motors,
+        assembly.on_motors,
         HeldFrame(pose, order, motion),
         plan,
         {f"{HOLDER}{name}": port for name, port in logged.items()},
         warn,
-        place.projector.get_name(),
+        assembly.projector.get_name(),
         source,
         reaction,
     )
@@ -294,17 +295,17 @@ def _check(holder: HolderParameters, period: float, order: int) -> None:
 def _add_motion(
     builder: DiagramBuilder,
     holder: HolderParameters,
-    following: Following,
+    law: FollowingLaw,
     order: int,
     controller: FollowingController,
     plan: Callable[[], PiecewisePolynomialCurve],
 ) -> OutputPort:
     """Add what tells the workpiece's motion, and return its port."""
-    robot, period = following.robot, controller.period
+    robot, period = law.robot, controller.period
     highest = order if holder.derivatives == "known" else 0
     flange = FlangeFrame(
         robot,
-        following.law.linearization.relative_degree,
+        law.linearization.relative_degree,
         order,
         _placement(holder),
         min(highest, holder.highest),

@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
+from diagrams.robots.belief import believed_robot
 from diagrams.robots.drives import add_drives
 from diagrams.robots.force_sensor import add_force_sensor
 from diagrams.robots.friction import add_friction
@@ -27,8 +28,8 @@ from diagrams.station_parts import (
 )
 from diagrams.station_start import find_rest, find_start
 from diagrams.surroundings.forces import add_surroundings
-from diagrams.tasks.following import Following, add_place
 from pfsc_drake.drivers.messages import ControlMode
+from pfsc_drake.following.assembly import ControllerAssembly
 from pfsc_drake.following.law import make_law
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.systems.fuse import BlockAccess, fuse_blocks
@@ -163,7 +164,8 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     # where its tool is, not where a controller expects it
     seen = replace(scenario.controller, delay=None)
     options = replace(following_options(scenario), controller=seen)
-    following = Following(options, part.robot, task, law, link_state[:n])
+    known = believed_robot(part.robot, scenario.encoders, period)
+    assembly = ControllerAssembly(builder, task, law, known, options, link_state[:n])
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(
         builder,
@@ -174,9 +176,9 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         period,
         scenario.encoder_period,
     )
-    place = add_place(builder, following, true_state)
-    beside = place.projector.GetOutputPort("manifold_point")
-    around = place.signals | {"joint_state": true_state, "manifold_point": beside}
+    assembly.add_place(true_state)
+    beside = assembly.projector.GetOutputPort("manifold_point")
+    around = assembly.signals | {"joint_state": true_state, "manifold_point": beside}
     forces = add_surroundings(builder, part, task, outside(scenario), around, start)
     torque = wrench = None
     if not part.robot.is_rigid:
@@ -213,7 +215,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         wrench,
         initial_state,
         start.place,
-        place.projector.get_name(),
+        assembly.projector.get_name(),
         late,
     )
 

@@ -17,7 +17,7 @@ from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
-from diagrams.tasks.waiting import Waiting
+from diagrams.tasks.waiting import CrossingWait
 from diagrams.turntable_station import Turntable
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -86,7 +86,7 @@ class Station:
     ticks_late: int = 0
     holder: Holder | None = None
     pen: OperatorPanel | None = None
-    waiting: Waiting | None = None
+    waiting: CrossingWait | None = None
     leader: TeleoperationEnd | None = None
     turntable: Turntable | None = None
 

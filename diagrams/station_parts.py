@@ -23,18 +23,17 @@ from diagrams.surroundings.mounting import Mounting, make_mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.surroundings.teleoperation import LedFromAfar, add_operator_afar
 from diagrams.surroundings.workpieces import NotchedWorkpiece, PressedWorkpiece
-from diagrams.tasks.following import FollowingOptions
 from diagrams.tasks.path_following import PathTask, TrajectoryTask
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import free_motion, make_lead
 from pfsc_drake.following.options.compliance import ComplianceParameters
+from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
@@ -311,19 +310,26 @@ def outside(scenario: Scenario) -> Outside:
     )
 
 
-def following_options(scenario: Scenario) -> FollowingOptions:
+def following_options(scenario: Scenario) -> FollowerOptions:
     """Return what a scenario chooses of its controller.
 
     Args:
         scenario: The scenario.
+
+    Raises:
+        InputError: If the way to its reference does not suit the manifold.
     """
-    operator = scenario.operator
-    return FollowingOptions(
-        scenario.controller,
-        scenario.faults,
-        scenario.compliance,
-        scenario.encoders,
-        scenario.reference.swings,
-        scenario.start.transition,
-        TuningParameters() if operator is None else operator.tuning,
+    reference, begins = scenario.reference, scenario.start
+    if scenario.controller.manifold == "trajectory":
+        count = f"{len(reference.swings)} given"
+        allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
+        require(not reference.swings, "reference.swings", count, allowed)
+        allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
+        require(begins.transition == 0.0, "start.transition", begins.transition, allowed)
+    return FollowerOptions(
+        controller=scenario.controller,
+        faults=scenario.faults,
+        transition=begins.transition,
+        compliance=scenario.compliance,
+        swings=reference.swings,
     )

@@ -38,7 +38,9 @@ from pfsc_drake.control.law.reference import (
 from pfsc_drake.control.law.reference import (
     straight_lines as straight_lines,
 )
+from pfsc_drake.control.law.swing import Swing as Swing
 from pfsc_drake.control.law.timed_reference import StreamLimits as StreamLimits
+from pfsc_drake.control.obstacles.elbow_room import ElbowParameters as ElbowParameters
 from pfsc_drake.control.obstacles.parameters import WatchParameters as WatchParameters
 from pfsc_drake.control.obstacles.shapes import (
     Capsule as Capsule,

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import OutputPort
 
-from diagrams.tasks.task import ManifoldProjector, Task
+from diagrams.tasks.task import Task
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
-from pfsc_drake.following.carried import add_framed_point, add_seen_tool, placed, resting_point
+from pfsc_drake.following.carried import placed, resting_point
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
 
@@ -49,34 +49,6 @@ class HeldFrame:
             point: The manifold's point in the frame.
         """
         return resting_point(point, self.start, self.order)
-
-    def add_place(
-        self,
-        builder: DiagramBuilder,
-        task: Task,
-        tool_pose: OutputPort,
-        reference: OutputPort | None,
-        period: float,
-    ) -> tuple[ManifoldProjector, OutputPort]:
-        """Add what finds the tool's place on the manifold in its frame.
-
-        Args:
-            builder: Builder of the diagram.
-            task: What the tool is to do.
-            tool_pose: ``[y_t, R_e]`` in the world as measured, shape (12,).
-            reference: Derivatives of the virtual output's reference by rows.
-            period: Sampling time [s].
-
-        Returns:
-            What finds it, with the point and the frame for the law; and the tool's pose as it is
-            seen from the frame.
-        """
-        assert self.motion is not None  # of what moves in a diagram
-        seen = add_seen_tool(builder, tool_pose, self.motion, self.order, period)
-        place = task.add_place(builder, seen, reference, period)
-        own = task.manifold
-        point = add_framed_point(builder, own, place.manifold_point, self.motion, period)
-        return ManifoldProjector(place.projector, point), seen
 
 
 def law_manifold(task: Task, held: HeldFrame | None) -> Manifold:

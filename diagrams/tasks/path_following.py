@@ -5,7 +5,6 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import (
     ControllerParameters,
@@ -19,7 +18,7 @@ from diagrams.tasks.drawing import PathDrawing
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
 from diagrams.tasks.surface import followed_angles, require_joints
-from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
+from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint
@@ -34,7 +33,6 @@ from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.path import PathTarget
 from pfsc_drake.geometry.paths.path_warnings import closing_gap, euler_warnings, path_warnings
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.systems.block_system import BlockSystem
 
 # m, between the points of the way along the path
 _SPACING = 2e-3
@@ -96,6 +94,9 @@ class PathTask(Task):
         }
         self.place = PathManifold(self.relative_degree, **followed)
         self.manifold = self._law_manifold(self.relative_degree, **followed)
+        if self.manifold.follows_time:
+            count = len(self.manifold.coordinates)
+            self.prescribed_point = TrajectoryPoint(self.path, self.relative_degree, count)
         self.warnings += self._euler_warnings("path" if surface is None else "surface")
         self._points = reference.arc_lengths(self.path.length)
         self._check_points(self._points)
@@ -213,28 +214,6 @@ class TrajectoryTask(PathTask):
     """Classical tracking of a point that moves along the path with time (Sec. 3.8.4)."""
 
     _law_manifold = MovingPoint
-
-    def add_place(
-        self,
-        builder: DiagramBuilder,
-        tool_pose: OutputPort,
-        reference: OutputPort | None,
-        period: float,
-    ) -> ManifoldProjector:
-        """Add what finds the place on the manifold.
-
-        The law acts on the point that time prescribes.
-        """
-        projector = super().add_place(builder, tool_pose, reference, period).projector
-        num_outputs = len(self.manifold.coordinates)
-        point = TrajectoryPoint(self.path, self.relative_degree, num_outputs)
-        leader = builder.AddNamedSystem(
-            "trajectory_point",
-            BlockSystem(point, period),
-        )
-        assert reference is not None  # time leads the point
-        builder.Connect(reference, leader.GetInputPort("reference"))
-        return ManifoldProjector(projector, leader.GetOutputPort("manifold_point"))
 
     def point(self, start: StartPoint) -> np.ndarray:
         """Return the point of the manifold that the law acts on at the start."""

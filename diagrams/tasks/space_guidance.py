@@ -16,7 +16,7 @@ from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.following.followed import Guided
+from pfsc_drake.following.task import Guided
 from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.geometry.paths.path_warnings import euler_warnings
 from pfsc_drake.geometry.progress import Progress
@@ -48,6 +48,7 @@ class SpaceTask(Task):
     projector_name = "tool_place"
     place: SpaceManifold
     manifold: SpaceManifold
+    guided: Guided
     shape = None
 
     def __init__(

@@ -97,6 +97,7 @@ class StreamTask(Task):
         angles = followed_angles(said)
         self.place = PathManifold(order, oriented=self.path.is_oriented, **angles)
         self.manifold, self._start, self.warnings = self.place, start, []
+        self.streamed = self.path
         self._duration = duration or self._longest(shape)
         self.motion = PiecewisePolynomialCurve([0.0, self._duration], np.zeros((1, 1, 1)))
         placed = not any(start.offset)
@@ -146,7 +147,8 @@ class StreamTask(Task):
         return [part[:, :POSITION] for part in np.split(rows, breaks) if len(part) > 1]
 
     @property
-    def _projecting(self) -> Block:
+    def projecting(self) -> Block:
+        """Block that finds the closest point on the path."""
         return self.path.projector
 
     def add_source(

@@ -3,26 +3,23 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.tasks.drawing import ManifoldDrawing
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.manifolds.manifold import (
-    Manifold,
     PlaceEvaluator,
     PlaceManifold,
     Projector,
 )
 from pfsc_drake.control.planning.limiting import Limiting
+from pfsc_drake.following.task import Task as FollowingTask
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport, zyx_to_matrix
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.block_system import BlockSystem
 
 
 @dataclass(frozen=True)
@@ -36,19 +33,6 @@ class StartPoint:
 
     target: ToolTarget
     place: np.ndarray
-
-
-@dataclass(frozen=True)
-class ManifoldProjector:
-    """What finds the place on a manifold.
-
-    Attributes:
-        projector: Projects the tool onto it, and remembers where it was.
-        manifold_point: The point that the law acts on, laid out by the task's manifold.
-    """
-
-    projector: BlockSystem
-    manifold_point: OutputPort
 
 
 # of what drives can do, the largest share that a faster motion may ask for
@@ -112,39 +96,23 @@ class DrivePlan:
         return bool(np.any(self.pace < 1.0))
 
 
-class Task(ABC):
+class Task(FollowingTask, ABC):
     """What a tool is to follow, and how it moves along.
 
     Attributes:
         place: Manifold in whose coordinates the tool's true place is told.
-        manifold: Manifold that the law makes linear.
-        motion: Tangential coordinates of the reference over time, of as many dimensions.
         shape: Numbers of the manifold that decide whether it can be followed, if there are any.
         fit: Where the points stand that the manifold was fitted to, if it was.
         warnings: What is out of proportion in it, one sentence each.
         drive_plan: What the motion asks of the drives, once that has been found out.
-        projector_name: Name of what finds the place on the manifold.
     """
 
-    projector_name: ClassVar[str]
-
     place: PlaceManifold
-    manifold: Manifold
     motion: PiecewisePolynomialCurve
     shape: ShapeReport | SurfaceReport | None
     fit: Residuals | None = None
     warnings: list[str]
     drive_plan: DrivePlan | None = None
-
-    @property
-    def lap(self) -> float | None:
-        """Length of the manifold [m] if it is closed in its only direction."""
-        return None
-
-    @property
-    def length(self) -> float:
-        """Length of the manifold [m] if it is a path; else 0."""
-        return 0.0
 
     def inverted(self, start: StartPoint) -> tuple[ToolTarget, str] | None:
         """Return what a start may have been meant to be, and how to say so.
@@ -182,31 +150,9 @@ class Task(ABC):
     def drawing(self) -> ManifoldDrawing:
         """How the manifold is drawn."""
 
-    def add_place(
-        self,
-        builder: DiagramBuilder,
-        tool_pose: OutputPort,
-        reference: OutputPort | None,
-        period: float,
-    ) -> ManifoldProjector:
-        """Add what finds the place on the manifold.
-
-        Args:
-            builder: Builder of the diagram.
-            tool_pose: ``[y_t, R_e]`` as measured, shape (12,).
-            reference: Derivatives of the virtual output's reference by rows; None where a hand
-                leads the tool.
-            period: Sampling time [s].
-        """
-        projector = builder.AddNamedSystem(
-            self.projector_name, BlockSystem(self._projecting, period)
-        )
-        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
-
     @property
-    def _projecting(self) -> Block:
-        """What finds the place on the manifold at each tick."""
+    def projecting(self) -> Block:
+        """Block that finds the closest point on the manifold."""
         return Projector(self.evaluator)
 
     @property

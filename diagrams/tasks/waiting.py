@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import ReferenceParameters
 from diagrams.scenario.checks import require
@@ -16,35 +15,26 @@ from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.control.law.reference import Transition
-from pfsc_drake.control.law.waiting_reference import WaitingReference
-from pfsc_drake.control.obstacles.elbow_room import ElbowRoom
-from pfsc_drake.control.obstacles.obstacle_watch import ArmAhead
-from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.waiting import COURSE_STEP, JointCourse, add_waiting, waiting_motion
+from pfsc_drake.following.waiting import COURSE_STEP, JointCourse, Waiting, waiting_motion
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.systems.block_system import BlockSystem
 
 # m or rad, from which on a tool starts beside its path
 _AT_THE_PATH = 5e-3
 
 
 @dataclass(frozen=True)
-class Waiting:
-    """How progress waits.
+class CrossingWait(Waiting):
+    """Progress that waits for the obstacles of a scenario.
 
     Attributes:
         crossing: The obstacles.
-        ahead: Where the arm will be.
-        pace: How the motion can be stopped.
     """
 
     crossing: CrossingParameters
-    ahead: ArmAhead
-    pace: WaitingPace
 
 
 @dataclass(frozen=True)
@@ -105,7 +95,7 @@ def plan_waiting(
     start: CourseStart,
     friction: tuple[np.ndarray, np.ndarray] | None,
     approach: Approach,
-) -> Waiting:
+) -> CrossingWait:
     """Return how the progress of a task waits for obstacles.
 
     Args:
@@ -142,58 +132,5 @@ def plan_waiting(
     joints = JointCourse(step, course, planner.demand, allowed_demand)
     order = law.linearization.relative_degree
     ahead, pace = waiting_motion(chain, watch, task.motion, order, joints)
-    return Waiting(crossing, ahead, pace)
-
-
-def add_waiting_reference(
-    builder: DiagramBuilder,
-    waiting: Waiting,
-    task: Task,
-    outputs: int,
-    period: float,
-    ports: dict[str, OutputPort],
-) -> dict[str, OutputPort]:
-    """Add a reference that waits for obstacles.
-
-    Args:
-        builder: Builder of the diagram.
-        waiting: How.
-        task: What the tool is to do.
-        outputs: Number of outputs.
-        period: Sampling time [s].
-        ports: ``joint_state`` and ``obstacles_measured``, and ``override`` if somebody may ask for
-            another pace.
-
-    Returns:
-        ``reference`` and its ``own_time``, and for the log ``clock`` and ``watch``; of an elbow
-        that gives way ``posture_torque``.
-    """
-    timed = WaitingReference(task.motion, waiting.pace, outputs, period)
-    shapes = [obstacle.shape for obstacle in waiting.crossing.moving]
-    generator, watch = add_waiting(
-        builder,
-        timed,
-        waiting.ahead,
-        shapes,
-        waiting.crossing.watch,
-        waiting.pace,
-        period,
-        ports["joint_state"],
-    )
-    builder.Connect(ports["obstacles_measured"], watch.GetInputPort("obstacles"))
-    if "override" in ports:
-        builder.Connect(ports["override"], watch.GetInputPort("asked"))
-    made = {}
-    if waiting.crossing.elbow is not None:
-        ahead, age = waiting.ahead, waiting.crossing.watch.latency
-        room = ElbowRoom(ahead.chain, ahead.outline, shapes, waiting.crossing.elbow, age)
-        elbow = builder.AddNamedSystem("elbow_room", BlockSystem(room, period))
-        builder.Connect(ports["joint_state"], elbow.GetInputPort("joint_state"))
-        builder.Connect(ports["obstacles_measured"], elbow.GetInputPort("obstacles"))
-        made["posture_torque"] = elbow.GetOutputPort("torque")
-    return made | {
-        "reference": generator.GetOutputPort("reference"),
-        "clock": generator.GetOutputPort("clock"),
-        "own_time": generator.GetOutputPort("own_time"),
-        "watch": watch.GetOutputPort("record"),
-    }
+    shapes = [obstacle.shape for obstacle in crossing.moving]
+    return CrossingWait(shapes, watch, ahead, pace, crossing.elbow, crossing)

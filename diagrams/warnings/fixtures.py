@@ -7,7 +7,7 @@ from diagrams.scenario.fixtures import FixtureParameters
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.parameters import bearable_stiffness
-from pfsc_drake.following.followed import Guided
+from pfsc_drake.following.task import Guided
 
 
 def stiff_fixtures(fixtures: FixtureParameters, guided: Guided) -> list[str]:

@@ -7,8 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.manifolds.carried import FramedPoint, SeenTool
 from pfsc_drake.control.manifolds.manifold import Manifold
-from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, FramedLayout, MovingFrameManifold
-from pfsc_drake.following.followed import Followed
+from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, FramedLayout
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.block_system import BlockSystem
 
@@ -35,22 +34,6 @@ def resting_point(point: np.ndarray, frame: np.ndarray, order: int) -> np.ndarra
         order: Relative degree of the law.
     """
     return np.concatenate([point, frame, np.zeros(POSE_SIZE * order)])
-
-
-def carried(followed: Followed, frame: np.ndarray) -> Followed:
-    """Return what is followed in a frame that moves.
-
-    Args:
-        followed: The same in a frame that rests in the world's place.
-        frame: Pose of the frame at the start, ``[p_WC, R_WC by rows]`` [m, 1], shape (12,).
-    """
-    manifold = followed.manifold
-    return replace(
-        followed,
-        manifold=MovingFrameManifold(manifold),
-        start=placed(followed.start, frame),
-        point=resting_point(followed.point, frame, manifold.layout.order),
-    )
 
 
 def add_seen_tool(

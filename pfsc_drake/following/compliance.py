@@ -1,5 +1,6 @@
 """Compliance: from forces on the tool to the reference of the law."""
 
+import math
 from collections.abc import Sequence
 
 import casadi as ca
@@ -24,8 +25,9 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.followed import Wanted
 from pfsc_drake.following.options.compliance import ComplianceParameters
+from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.task import Task
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 
@@ -85,10 +87,12 @@ def force_ports(
 
 def add_compliance(
     builder: DiagramBuilder,
-    compliance: ComplianceParameters,
+    options: FollowerOptions,
     linearization: Linearization,
     robot: RobotModel,
-    wanted: Wanted,
+    task: Task,
+    posture: np.ndarray,
+    tuning: TuningParameters,
     ports: dict[str, OutputPort],
     period: float,
 ) -> dict[str, OutputPort]:
@@ -96,10 +100,12 @@ def add_compliance(
 
     Args:
         builder: Builder of the diagram.
-        compliance: How the tool yields.
+        options: How the tool complies, and whether its motion ends.
         linearization: Linearization of the law that follows the reference.
         robot: The robot as it is believed, N joints.
-        wanted: What is wanted of the tool without forces.
+        task: Task of the tool without forces.
+        posture: Joint coordinates at the start, shape (N,) [rad or m].
+        tuning: Response of the impedance to an operator's settings.
         ports: Those of :func:`force_ports`, and ``joint_state``, ``manifold_point``,
             ``manifold_state`` and ``desired_reference`` with derivatives up to
             :func:`reference_order`; with an operator ``impedance_request``.
@@ -115,19 +121,20 @@ def add_compliance(
     Raises:
         InputError: If the compliance does not suit the law.
     """
-    manifold, impedance_parameters = linearization.manifold, compliance.impedance()
+    manifold, compliance = linearization.manifold, options.compliance
+    impedance_parameters = compliance.impedance()
     if manifold.name == SpaceManifold.name:
         # guidance leads along, see add_guidance
         impedance_parameters.tangential = CoordinateImpedance()
     law = ImpedanceLaw(
-        impedance_parameters.on_path(wanted.length),
+        impedance_parameters.on_path(task.length),
         manifold.coordinates,
         linearization.relative_degree,
         period,
         desired_order=reference_order(compliance, linearization),
-        lap=wanted.lap,
+        lap=task.lap,
     )
-    limits = _limits(compliance, linearization.manifold, robot, wanted.start, period)
+    limits = _limits(compliance, linearization.manifold, robot, posture, period)
     free = None if limits is None else limits.tangential
     ends = _ends(law, manifold, compliance.limits.settling)
     yielding = ImpedanceFilter(law, start="actual", free=free, ends=ends)
@@ -142,7 +149,8 @@ def add_compliance(
     if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
     told = {"manifold_force": force, "reference": reference, "ready": ready}
-    signals = _add_press(builder, compliance, law, manifold.coordinates, told, wanted.end)
+    end = task.end if options.stream is None else math.inf
+    signals = _add_press(builder, compliance, law, manifold.coordinates, told, end)
     builder.Connect(signals.pop("pressed_force", force), impedance.GetInputPort("manifold_force"))
     builder.Connect(ready, impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
@@ -152,7 +160,7 @@ def add_compliance(
         signals["limit_force"] = _add_limits(builder, limits, impedance, ports)
     # where guidance leads along, the impedance is the one given
     if "impedance_request" in ports and manifold.name != SpaceManifold.name:
-        signals |= _add_tuner(builder, wanted.tuning, manifold.coordinates, law, impedance, ports)
+        signals |= _add_tuner(builder, tuning, manifold.coordinates, law, impedance, ports)
     elif not law.is_constant:
         signals["damping"] = impedance.GetOutputPort("damping")
     return signals | {

@@ -1,21 +1,23 @@
 """A law with what tells it of its reference, of forces and friction, and of spare joints."""
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.blocks.wiring_blocks import Collect, Constant
+from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.reference import SmoothStart
 from pfsc_drake.following.compliance import add_compliance, has_impedance, reference_order
-from pfsc_drake.following.followed import Wanted
 from pfsc_drake.following.friction import add_friction_compensation, rest_hold
 from pfsc_drake.following.law import Believed, supervision
 from pfsc_drake.following.observed_forces import add_external_torque, add_observed_forces
-from pfsc_drake.following.options.compliance import ComplianceParameters, ObservedForceParameters
+from pfsc_drake.following.options.compliance import ObservedForceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.follower import FaultParameters
+from pfsc_drake.following.options.follower import FaultParameters, FollowerOptions
 from pfsc_drake.following.posture import add_posture_reference
 from pfsc_drake.following.prediction import connect_predictor
+from pfsc_drake.following.task import Task
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
@@ -29,8 +31,10 @@ def add_reference(
     controller: FollowingController,
     linearization: Linearization,
     robot: RobotModel,
-    compliance: ComplianceParameters,
-    wanted: Wanted,
+    options: FollowerOptions,
+    task: Task,
+    posture: np.ndarray,
+    tuning: TuningParameters,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Connect ``reference`` and ``alarms`` of a controller.
@@ -40,8 +44,10 @@ def add_reference(
         controller: The controller.
         linearization: Linearization of its law.
         robot: The robot as it is believed, N joints.
-        compliance: How the tool yields.
-        wanted: What is wanted of the tool.
+        options: How the tool complies, and how long the transition to the motion takes.
+        task: Task of the tool.
+        posture: Joint coordinates at the start, shape (N,) [rad or m].
+        tuning: Response of the impedance to an operator's settings.
         ports: ``desired_reference``, derivatives up to :func:`reference_order` by rows, and what
             :func:`add_compliance` takes; of a force sensor ``sensor_fault`` and ``tared``; of a
             reference that waits ``own_time``, with which a transition waits.
@@ -52,11 +58,11 @@ def add_reference(
     Raises:
         InputError: If the compliance does not suit the law.
     """
-    m, period = linearization.num_outputs, controller.period
+    m, period, compliance = linearization.num_outputs, controller.period, options.compliance
     state, desired = controller.GetOutputPort("manifold_state"), ports["desired_reference"]
-    if wanted.transition > 0.0:
+    if options.transition > 0.0:
         order = reference_order(compliance, linearization)
-        smooth = SmoothStart(wanted.transition, order, m, state.size(), period)
+        smooth = SmoothStart(options.transition, order, m, state.size(), period)
         start = builder.AddNamedSystem("smooth_start", BlockSystem(smooth, period))
         builder.Connect(desired, start.GetInputPort("desired_reference"))
         builder.Connect(state, start.GetInputPort("manifold_state"))
@@ -66,7 +72,9 @@ def add_reference(
     made = {"reference": desired}
     if has_impedance(compliance, linearization.manifold):
         told = ports | {"desired_reference": desired, "manifold_state": state}
-        made |= add_compliance(builder, compliance, linearization, robot, wanted, told, period)
+        made |= add_compliance(
+            builder, options, linearization, robot, task, posture, tuning, told, period
+        )
     _connect_alarms(builder, controller, ports, made)
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     return made

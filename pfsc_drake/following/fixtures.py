@@ -19,9 +19,9 @@ from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.compliance import force_ports
-from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.follower import FixtureOptions
+from pfsc_drake.following.task import Guided
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.near_regions import NearRegions

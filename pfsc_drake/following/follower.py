@@ -1,8 +1,8 @@
 """A whole controller as one diagram, with the ports that a robot has."""
 
 import copy
+import dataclasses as dc
 import logging
-import math
 from collections.abc import Callable
 from typing import cast
 
@@ -18,17 +18,13 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import SampledRobot
-from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
-from pfsc_drake.control.manifolds.manifold import PlaceManifold, ToolKinematics
-from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
+from pfsc_drake.control.manifolds.manifold import PlaceManifold
+from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, MovingFrameManifold, frame_size
 from pfsc_drake.control.streams.messages import WaypointLayout
 from pfsc_drake.errors import InputError, require, require_one_of
-from pfsc_drake.following.carried import add_framed_point, add_seen_tool, carried
-from pfsc_drake.following.compliance import reference_order
-from pfsc_drake.following.controller import add_controller, add_reference
+from pfsc_drake.following.assembly import ControllerAssembly, acts_on_motors
+from pfsc_drake.following.carried import placed, resting_point
 from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe
-from pfsc_drake.following.fixtures import add_fixture_guidance
-from pfsc_drake.following.followed import Followed, Wanted
 from pfsc_drake.following.law import Believed, make_law, sampled_robot
 from pfsc_drake.following.law_warnings import law_warnings, observed_force_warnings
 from pfsc_drake.following.options.compliance import ComplianceParameters
@@ -38,10 +34,9 @@ from pfsc_drake.following.options.controller import (
     LawGains,
 )
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.prediction import add_prediction
-from pfsc_drake.following.streamed_path import StreamedPath, add_stream
+from pfsc_drake.following.task import Followed
 from pfsc_drake.following.unused_options import refuse_unused
-from pfsc_drake.following.waiting import add_waiting_motion
+from pfsc_drake.following.waiting import plan_waiting
 from pfsc_drake.geometry.rotation import check_rotation_matrix
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import RobotModel
@@ -53,6 +48,10 @@ Ports = dict[str, OutputPort]
 _logger = logging.getLogger("pfsc_drake")
 # what sentences on faults tell of besides
 _DESCRIBED = ("reference", "manifold_force", "press")
+# names of outputs, and of what they put out
+_OUTPUTS = {name: name for name in ("reference", "manifold_force", "limit_force", "mode", "guides")}
+_OUTPUTS |= {"record": "guidance", "stream": "stream", "watch": "watch"}
+_OUTPUTS |= {"manifold_point": "manifold_point"}
 
 
 class Follower(Diagram):
@@ -142,15 +141,20 @@ class Follower(Diagram):
         near = self._near(options.posture)
         followed = make(self.robot, near, RELATIVE_DEGREE[law])
         refuse_unused(options, law, self.robot, followed)
-        self._own, self._moves = followed.manifold, options.frame is not None
+        if followed.streamed is not None:
+            only = "no override and no stream: way points themselves come"
+            require(not (options.override or options.stream), "options", "both given", only)
+        self.followed, self._moves = followed, options.frame is not None
+        start, point, manifold = followed.start, followed.point, followed.manifold
         if options.frame is not None:
-            followed = carried(followed, _frame_of(options.frame, options.compliance))
-        self.followed = followed
-        self.start_posture = solve_pose(self.robot, followed.start, near, "start")
+            frame = _frame_of(options.frame, options.compliance)
+            start, point = placed(start, frame), resting_point(point, frame, manifold.layout.order)
+            manifold = MovingFrameManifold(manifold)
+        self.start_posture = solve_pose(self.robot, start, near, "start")
         chosen = _with_gains(options.controller, law, options.bandwidth)
         self.period = chosen.sampling_time
-        rest = RestPosture(self.start_posture, followed.point)
-        self.law = make_law(chosen, self.robot, followed.manifold, lambda: rest, options.faults)
+        rest = RestPosture(self.start_posture, point)
+        self.law = make_law(chosen, self.robot, manifold, lambda: rest, options.faults)
         self._builder = DiagramBuilder()
         self._wire(chosen, options)
         self._builder.BuildInto(self)
@@ -208,7 +212,7 @@ class Follower(Diagram):
         signals = {name: value(port) for name, port in self._signals.items()}
         now = FaultInstant(context.get_time(), signals)
         suspects = self._controller.suspects(self.GetSubsystemContext(self._controller, context))
-        place, on_motors = cast(PlaceManifold, self._own), self._on_motors
+        place, on_motors = cast(PlaceManifold, self.followed.manifold), self._on_motors
         scene = FaultScene(self.law, self.robot, place, on_motors, now, None, suspects)
         return describe(kind, scene)
 
@@ -264,41 +268,32 @@ class Follower(Diagram):
         return measured.GetOutputPort("all")
 
     def _wire(self, chosen: ControllerParameters, options: FollowerOptions) -> None:
-        builder, law = self._builder, self.law
-        linearization = law.linearization
-        self._on_motors = on_motors = chosen.law == "rigid" and not self.robot.is_rigid
-        joint_state, believed, predictor = add_prediction(
-            builder, Believed(self.robot, options.friction), chosen, self._measured(options)
+        builder, followed = self._builder, self.followed
+        waiting = None
+        if options.obstacles is not None:
+            waiting = plan_waiting((self.law, chosen.law), followed, options, self.start_posture)
+        believed = Believed(self.robot, options.friction)
+        self._on_motors = acts_on_motors(chosen.law, believed)
+        assembly = ControllerAssembly(
+            builder,
+            followed,
+            self.law,
+            believed,
+            dc.replace(options, controller=chosen),
+            self.start_posture,
+            waiting,
         )
-        kinematics = self._add("tool_kinematics", ToolKinematics(self.robot, on_motors))
-        builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-        projector, place = self._place(kinematics.GetOutputPort("tool_pose"))
-        ports = {"joint_state": joint_state, "manifold_point": place}
-        ports |= self._forces(chosen, options)
-        compliance = options.compliance
-        yields = compliance.is_given and compliance.source == "observed"
-        observed = compliance.observed if yields else None
-        controller, signals, _ = add_controller(
-            builder, law, believed, chosen, options.faults, ports, observed, predictor
-        )
-        followed, robot = self.followed, self.robot
-        self._controller = controller
-        self._signals = ports | {
-            "tool_pose": kinematics.GetOutputPort("tool_pose"),
-            "law": controller.GetOutputPort("law"),
-        }
-        if followed.streamed is not None:
-            desired, made = self._streamed(followed.streamed, options, projector)
-        elif options.obstacles is not None:
-            desired, made = self._waiting(chosen.law, options, joint_state)
-        else:
-            desired, made = self._motion(options, signals)
-        motion = followed.motion if options.stream is None else None
-        end = math.inf if motion is None else motion.domain[1]
-        wanted = Wanted(self.start_posture, options.transition, followed.lap, followed.length, end)
-        told = signals | {"desired_reference": desired}
-        made |= add_reference(builder, controller, linearization, robot, compliance, wanted, told)
-        self._signals |= {name: made[name] for name in _DESCRIBED if name in made}
+        assembly.add_place(self._measured(options), self._frame_jet())
+        for name, (port, *others) in assembly.inputs.items():
+            if name != "override" or options.override:
+                builder.ExportInput(port, name)
+                for other in others:
+                    builder.ConnectInput(name, other)
+        forces = self._forces(chosen, options)
+        self._controller, made = assembly.add_law(forces)
+        self._signals = assembly.signals | forces
+        self._signals |= {name: made[name] for name in ("law", *_DESCRIBED) if name in made}
+        controller = self._controller
         drive = controller.GetOutputPort(controller.drive_port)
         builder.ExportOutput(drive, controller.drive_port)
         if self._actuation is not None:
@@ -307,31 +302,21 @@ class Follower(Diagram):
             actuation = self._add("actuation", Linear(self._actuation))
             builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
             builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
-        for name in (
-            *("reference", "manifold_force", "limit_force"),
-            *("mode", "record", "guides", "stream", "watch"),
-        ):
-            if name in made:
-                builder.ExportOutput(made[name], name)
-        builder.ExportOutput(ports["manifold_point"], "manifold_point")
+        outputs = assembly.signals | made
+        for name, signal in _OUTPUTS.items():
+            if signal in outputs:
+                builder.ExportOutput(outputs[signal], name)
         for name in ("manifold_state", "status", "fault", "stop_category"):
             builder.ExportOutput(controller.GetOutputPort(name), name)
 
-    def _place(self, tool_pose: OutputPort) -> tuple[BlockSystem, OutputPort]:
-        """Add what finds the tool's place on the manifold; return it, and the law's point."""
-        builder, r = self._builder, self.law.linearization.relative_degree
-        frame = None
-        if self._moves:
-            told = self._add("frame", Collect({"frame_jet": frame_size(r)}))
-            builder.ExportInput(told.GetInputPort("frame_jet"), "frame_jet")
-            frame = told.GetOutputPort("all")
-            tool_pose = add_seen_tool(builder, tool_pose, frame, r, self.period)
-        projector = self._add("projector", self.followed.projector)
-        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        point = projector.GetOutputPort("manifold_point")
-        if frame is not None:
-            point = add_framed_point(builder, self._own, point, frame, self.period)
-        return projector, point
+    def _frame_jet(self) -> OutputPort | None:
+        """Export the motion of the frame that carries the manifold, if one does."""
+        if not self._moves:
+            return None
+        size = frame_size(self.law.linearization.relative_degree)
+        frame = self._add("frame", Collect({"frame_jet": size}))
+        self._builder.ExportInput(frame.GetInputPort("frame_jet"), "frame_jet")
+        return frame.GetOutputPort("all")
 
     def _forces(self, chosen: ControllerParameters, options: FollowerOptions) -> Ports:
         """Export what is known of forces on the tool, and return it by the names of its uses."""
@@ -346,69 +331,6 @@ class Follower(Diagram):
         measured = wrench.GetOutputPort("measured")
         made |= {"wrench_measured": measured} if sensed else {}
         return made | ({"wrench_ext": measured} if known else {})
-
-    def _streamed(
-        self, path: StreamedPath, options: FollowerOptions, projector: BlockSystem
-    ) -> tuple[OutputPort, Ports]:
-        """Return the reference along a path of way points that come, and what is told of them."""
-        only = "no override and no stream: way points themselves come"
-        require(not (options.override or options.stream), "options", "both given", only)
-        linearization = self.law.linearization
-        order = reference_order(options.compliance, linearization)
-        m, builder = linearization.num_outputs, self._builder
-        stream = add_stream(builder, path, projector, order, m, self.period)
-        builder.ExportInput(stream.waypoints, "waypoints")
-        return stream.reference, {"stream": stream.stream}
-
-    def _waiting(
-        self, law: str, options: FollowerOptions, joint_state: OutputPort
-    ) -> tuple[OutputPort, Ports]:
-        """Return the reference that waits for obstacles, and what is told of them."""
-        motion = add_waiting_motion(
-            self._builder, (self.law, law), self.followed, options, self.start_posture, joint_state
-        )
-        self._builder.ExportInput(motion.obstacles, "obstacles")
-        if options.override:
-            self._builder.ExportInput(motion.asked, "override")
-        return motion.reference, {"watch": motion.watch}
-
-    def _motion(self, options: FollowerOptions, signals: Ports) -> tuple[OutputPort, Ports]:
-        """Return the reference before it yields, and what else is told of it."""
-        followed, linearization = self.followed, self.law.linearization
-        order = reference_order(options.compliance, linearization)
-        if followed.motion is None:
-            assert followed.guided is not None
-            guidance = add_fixture_guidance(
-                self._builder,
-                followed.guided,
-                options.compliance,
-                self.robot,
-                order,
-                signals,
-                self.start_posture,
-            )
-            names = [name for name in ("mode", "record", "guides") if guidance.HasOutputPort(name)]
-            told = {name: guidance.GetOutputPort(name) for name in names}
-            return guidance.GetOutputPort("reference"), told
-        m, motion, stream = linearization.num_outputs, followed.motion, options.stream
-        block: TimedReference | StreamedReference
-        if stream is None:
-            block = TimedReference(motion, order, m, self.period)
-            ports = ["override"] if options.override else []
-        else:
-            if motion.dimension != 1 or options.override:
-                raise InputError(
-                    "stream: given; must be None on surfaces, which have two coordinates to go "
-                    "along, and with an override, in place of which there is the port speed"
-                )
-            start = float(motion.derivatives(np.array([motion.domain[0]]), 0)[0, 0, 0])
-            end = followed.length if followed.lap is None else math.inf
-            block = StreamedReference(stream, order, m, self.period, start=start, end=end)
-            ports = ["goal", "speed"]
-        reference = self._add("reference", block)
-        for name in ports:
-            self._builder.ExportInput(reference.GetInputPort(name), name)
-        return reference.GetOutputPort("reference"), {}
 
 
 def _frame_of(frame: np.ndarray, compliance: ComplianceParameters) -> np.ndarray:

@@ -17,11 +17,11 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.fixtures import free_motion, make_lead
-from pfsc_drake.following.followed import Followed, Guided
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ExternalTorqueParameters
 from pfsc_drake.following.options.follower import FixtureOptions, FollowerOptions
+from pfsc_drake.following.task import Followed, Guided
 from pfsc_drake.geometry import matrix_to_quaternion
 from pfsc_drake.geometry.regions.checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.geometry.regions.moving import MovingRegion

@@ -6,10 +6,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.manifold import Projector
+from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.task import Followed
 from pfsc_drake.geometry import (
     Path,
     PiecewisePolynomialCurve,
@@ -53,7 +54,8 @@ def add_path_following(
             ``elastic``.
         motion: Arc length over time [m], e.g. from :func:`~pfsc_drake.rest_to_rest`; along the
             whole path once if omitted.
-        options: What else is chosen.
+        options: What else is chosen; with ``controller.manifold`` = ``trajectory`` the point that
+            time prescribes is tracked, for comparison (Sec. 3.8.4).
 
     Returns:
         The controller, one diagram with the ports of :class:`Follower`.
@@ -69,7 +71,8 @@ def add_path_following(
 
     def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         oriented = path.orientation is not None
-        manifold = PathManifold(
+        tracks = chosen.controller.manifold == MovingPoint.name
+        manifold = (MovingPoint if tracks else PathManifold)(
             relative_degree,
             oriented=oriented,
             turning=path.frame.turns,
@@ -82,16 +85,18 @@ def add_path_following(
         if oriented:
             R_e = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
         start = ToolTarget(point[manifold.layout.position][:3], R_e)
-        lap = path.length if path.closed else None
         return Followed(
             manifold,
             Projector(evaluator),
             along,
             start,
             point,
-            lap=lap,
-            length=path.length,
-            projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+            path_length=path.length,
+            closed=path.closed,
+            projection=None if tracks else lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+            prescribed_point=TrajectoryPoint(path, relative_degree, len(manifold.coordinates))
+            if tracks
+            else None,
             warnings=path_warnings(path, shape_report(path), "path_from_waypoints: "),
         )
 

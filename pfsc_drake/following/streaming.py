@@ -7,10 +7,10 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.streams.parameters import StreamParameters
-from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.streamed_path import StreamedPath
+from pfsc_drake.following.task import Followed
 from pfsc_drake.robot.robot_model import RobotModel
 
 

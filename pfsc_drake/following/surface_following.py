@@ -9,9 +9,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.task import Followed
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.surface import Surface

@@ -14,10 +14,10 @@ from pfsc_drake.control.law.robust_gains import rule_of_poles
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import GainParameters
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.task import Followed
 from pfsc_drake.robot.robot_model import RobotModel
 
 
@@ -220,10 +220,15 @@ def _limit_rules(key: str, is_on: bool) -> list[Rule]:
 
 def _motion_rules(followed: Followed) -> list[Rule]:
     timed = "needs a path or surface with a motion over time"
+    tracks = followed.manifold.follows_time
     return [
         Rule(key, followed.motion is not None or followed.streamed is not None, timed)
         for key in ("override", "stream")
-    ] + [Rule("obstacles", followed.streamed is None, timed)]
+    ] + [
+        Rule("obstacles", followed.streamed is None, timed),
+        Rule("swings", followed.guided is None and not tracks, "needs a path or surface"),
+        Rule("transition", not tracks, "the reference of a trajectory is a point that moves"),
+    ]
 
 
 def _fixture_rules(options: FollowerOptions, law: str, followed: Followed) -> list[Rule]:

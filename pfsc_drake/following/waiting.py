@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.waiting_reference import WaitingReference
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
 from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
@@ -22,8 +23,8 @@ from pfsc_drake.control.planning.drive_demand import (
 )
 from pfsc_drake.control.planning.stopping import stopping_bandwidth
 from pfsc_drake.errors import InputError, require
-from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.task import Followed
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.robot_model import largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -130,13 +131,29 @@ def waiting_motion(
     )
 
 
+@dataclass(frozen=True)
+class Waiting:
+    """Progress that waits for obstacles.
+
+    Attributes:
+        shapes: The obstacles.
+        watch: Parameters of the watch.
+        ahead: Where the arm will be.
+        pace: How the motion can be stopped.
+        elbow: How the elbow of an arm with joints to spare complies, if it does.
+    """
+
+    shapes: Sequence[ObstacleShape]
+    watch: WatchParameters
+    ahead: ArmAhead
+    pace: WaitingPace
+    elbow: ElbowParameters | None
+
+
 def add_waiting(
     builder: DiagramBuilder,
     reference: WaitingReference,
-    ahead: ArmAhead,
-    shapes: Sequence[ObstacleShape],
-    watch: WatchParameters,
-    pace: WaitingPace,
+    waiting: Waiting,
     period: float,
     joint_state: OutputPort,
 ) -> tuple[BlockSystem, BlockSystem]:
@@ -145,10 +162,7 @@ def add_waiting(
     Args:
         builder: Builder of the diagram.
         reference: The reference.
-        ahead: Where the arm will be.
-        shapes: The obstacles.
-        watch: How it keeps away from them.
-        pace: How the motion can be stopped.
+        waiting: How it waits.
         period: Sampling time [s].
         joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
 
@@ -156,7 +170,7 @@ def add_waiting(
         The reference and the watch, whose ports ``obstacles`` and ``asked`` are left open.
     """
     generator = builder.AddNamedSystem("reference_generator", BlockSystem(reference, period))
-    block = ObstacleWatch(ahead, shapes, watch, pace, period)
+    block = ObstacleWatch(waiting.ahead, waiting.shapes, waiting.watch, waiting.pace, period)
     watches = builder.AddNamedSystem("obstacle_watch", BlockSystem(block, period))
     builder.Connect(generator.GetOutputPort("clock"), watches.GetInputPort("clock"))
     builder.Connect(joint_state, watches.GetInputPort("joint_state"))
@@ -164,40 +178,16 @@ def add_waiting(
     return generator, watches
 
 
-@dataclass(frozen=True)
-class WaitingMotion:
-    """A motion that waits for obstacles, with its ports.
-
-    Attributes:
-        reference: Derivatives of the virtual output's reference.
-        watch: What is seen of obstacles.
-        obstacles: Where they are, as measured.
-        asked: The pace that is asked for.
-    """
-
-    reference: OutputPort
-    watch: OutputPort
-    obstacles: InputPort
-    asked: InputPort
-
-
-def add_waiting_motion(
-    builder: DiagramBuilder,
-    named: tuple[FollowingLaw, str],
-    followed: Followed,
-    options: FollowerOptions,
-    q_J: np.ndarray,
-    joint_state: OutputPort,
-) -> WaitingMotion:
-    """Add a motion along a path that waits for obstacles.
+def plan_waiting(
+    named: tuple[FollowingLaw, str], followed: Followed, options: FollowerOptions, q_J: np.ndarray
+) -> Waiting:
+    """Return how a motion along a path waits for obstacles.
 
     Args:
-        builder: Builder of the diagram.
         named: The law, and its name.
         followed: What is followed.
         options: What is chosen, with obstacles.
         q_J: Joints' coordinates at the start, shape (N,).
-        joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
 
     Raises:
         InputError: If what is followed or chosen cannot wait, or the joints cannot follow.
@@ -207,23 +197,19 @@ def add_waiting_motion(
     allowed = "None unless a path at rest is followed by a motion over time, without yielding"
     waits = motion is not None and followed.projection is not None and options.stream is None
     waits = waits and options.frame is None and not options.compliance.is_given
+    waits = waits and not options.swings
     require(waits, "obstacles", "given", allowed)
     assert motion is not None
     planned = "0 with obstacles, which are avoided along the path alone; bring the tool there first"
     require(options.transition == 0.0, "transition", options.transition, planned)
-    chain, watch, period = law.robot, obstacles.watch, options.controller.sampling_time
+    chain, watch = law.robot, obstacles.watch
     if not isinstance(chain, SerialChain):
         raise InputError("obstacles: given; must be None for a robot that is no chain of links")
+    if obstacles.elbow is not None:
+        allowed = "None for an arm without joints to spare, and one whose posture yields to forces"
+        spare = law.posture is not None and options.controller.posture.yields == "none"
+        require(spare, "obstacles.elbow", "given", allowed)
     joints = joint_course(named, followed, q_J, options.friction, watch.reserve)
-    order, m = law.linearization.relative_degree, law.linearization.num_outputs
+    order = law.linearization.relative_degree
     ahead, pace = waiting_motion(chain, watch, motion, order, joints)
-    reference = WaitingReference(motion, pace, m, period)
-    generator, watches = add_waiting(
-        builder, reference, ahead, obstacles.shapes, watch, pace, period, joint_state
-    )
-    return WaitingMotion(
-        generator.GetOutputPort("reference"),
-        watches.GetOutputPort("record"),
-        watches.GetInputPort("obstacles"),
-        watches.GetInputPort("asked"),
-    )
+    return Waiting(obstacles.shapes, watch, ahead, pace, obstacles.elbow)

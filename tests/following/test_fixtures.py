@@ -10,8 +10,8 @@ from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following import fixtures as fixtures_module
 from pfsc_drake.following.fixtures import _robot_limits, make_lead, near_expression
-from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.options.follower import FixtureOptions
+from pfsc_drake.following.task import Guided
 from pfsc_drake.geometry import torus
 from pfsc_drake.geometry.regions.shapes import SphereRegion
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion

@@ -18,6 +18,7 @@ from pfsc_drake import (
     GainParameters,
     LawGains,
     StreamLimits,
+    Swing,
     WaypointTable,
     add_actuators,
     add_path_following,
@@ -256,6 +257,38 @@ def test_it_starts_where_the_robot_is_with_a_transition(path):
     np.testing.assert_allclose(error, 0.0, atol=1e-12)
     simulator.AdvanceTo(0.8)
     assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
+
+
+def test_a_path_that_oscillates_along_its_normal_is_followed(path):
+    swing = Swing(coordinate=2, amplitude=0.012, frequency=2.0, begin=0.05, ramp=0.2)
+    simulator, follower = closed_loop(
+        path, "comau_racer_1_4", "rigid", FollowerOptions(swings=[swing])
+    )
+    for time in (0.6, 0.7):
+        simulator.AdvanceTo(time)
+        xi = read(simulator, follower, "manifold_state")[1:3]
+        expected = 0.012 * np.sin(2.0 * np.pi * 2.0 * (time - 0.05))
+        np.testing.assert_allclose(xi, [0.0, expected], atol=2e-4)
+        assert abs(expected) > 5e-3
+
+
+def test_a_trajectory_is_tracked_for_comparison(path):
+    """The tool comes back to where time prescribes it to be, not to the closest point."""
+    options = FollowerOptions(controller=ControllerParameters(manifold="trajectory"))
+    simulator, follower = closed_loop(path, "comau_racer_1_4", "rigid", options)
+    plant = simulator.get_system().GetSystems()[0]
+    own = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositions(own, follower.start_posture + 0.01)
+    planned = follower.followed.motion.derivatives(np.array([0.0, 1.2]), 0)[:, 0, 0]
+    distances = []
+    for time, eta in zip((0.0, 1.2), planned, strict=True):
+        simulator.AdvanceTo(time)
+        tool = plant.GetFrameByName("tool_point").CalcPoseInWorld(own).translation()
+        point = path.position.derivatives(np.array([path.arc_length.parameter(eta)]), 0)[0, 0]
+        distances.append(np.linalg.norm(tool - point))
+        errors = read(simulator, follower, "manifold_state")[:3]
+        assert np.linalg.norm(errors) == pytest.approx(distances[-1], abs=1e-6)
+    assert distances[0] > 5e-3 and distances[1] < 1e-5
 
 
 def test_it_steps_without_drake(path):

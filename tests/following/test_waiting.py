@@ -10,6 +10,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 import pfsc_drake
 from pfsc_drake import (
+    ElbowParameters,
     FollowerOptions,
     ObstacleOptions,
     ObstacleShape,
@@ -131,3 +132,26 @@ def test_what_cannot_wait_is_refused():
         options = dc.replace(OPTIONS, **change)
         with pytest.raises(InputError, match="obstacles = given"):
             add_path_following(builder, plant, "tool_point", path, "rigid", options=options)
+
+
+def test_an_elbow_avoids_obstacles_where_there_is_one():
+    """The torques that push it away are in the loop; three joints leave none to spare."""
+    path = path_from_waypoints(WaypointTable(POINTS), smoothness=6)
+    obstacles = dc.replace(OPTIONS.obstacles, elbow=ElbowParameters(room=2.0, stiffness=400.0))
+    options = dc.replace(OPTIONS, obstacles=obstacles)
+
+    def follower(model, chosen):
+        builder = DiagramBuilder()
+        plant = load(builder, f"comau_racer_1_4{model}")
+        return add_path_following(builder, plant, "tool_point", path, "rigid", options=chosen)
+
+    with pytest.raises(InputError, match=r"obstacles\.elbow = given; .*without joints to spare"):
+        follower("_3r", options)
+    torques = []
+    for made in (follower("", OPTIONS), follower("", options)):
+        step = made.stepper().step
+        place = [0.2, 0.6, 0.8, 0.0, 0.0, 0.0]
+        for _ in range(100):
+            told = step(plant_state=made.start_state, obstacles=place)
+        torques.append(told["drive_torque"])
+    assert np.abs(torques[1] - torques[0]).max() > 1.0

@@ -6,7 +6,9 @@ import numpy as np
 
 from pfsc_drake.checks import require, require_between, require_not_negative, require_positive
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters, RobotLimitParameters
+from pfsc_drake.control.law.swing import Swing
 from pfsc_drake.control.law.timed_reference import StreamLimits
+from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
 from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.following.options.compliance import ComplianceParameters
@@ -111,10 +113,12 @@ class ObstacleOptions:
     Attributes:
         shapes: What they look like.
         watch: How progress waits for them.
+        elbow: How the elbow of an arm with joints to spare avoids them; it does not if omitted.
     """
 
     shapes: list[ObstacleShape]
     watch: WatchParameters = dc.field(default_factory=WatchParameters)
+    elbow: ElbowParameters | None = None
 
     def __post_init__(self) -> None:
         require(bool(self.shapes), "shapes", "none", "one or more")
@@ -149,6 +153,7 @@ class FollowerOptions:
             ``joint_state``, ``[q_J, v_J, q_M, v_M]``.
         frame: Of a path or surface that moves: the pose of its frame at the start, ``[p_WC, R_WC
             by rows]``, shape (12,) [m, 1]; there is a port for the motion then. None if it rests.
+        swings: Oscillations of the manifold along its normals (5.1), (5.2).
     """
 
     bandwidth: float = BANDWIDTH
@@ -163,3 +168,4 @@ class FollowerOptions:
     obstacles: ObstacleOptions | None = None
     measures: str = "plant_state"
     frame: np.ndarray | None = None
+    swings: list[Swing] = dc.field(default_factory=list)
