@@ -7,11 +7,11 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, System
 
 from diagrams.holder_station import HOLDER
-from diagrams.robots.joint_state import DEVIATION
 from diagrams.station import Station
 from pfsc_drake.blocks.network import Network, Wiring
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.link_state import DEVIATION
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import network_of
 

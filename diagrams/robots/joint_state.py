@@ -1,26 +1,16 @@
 """What a controller knows of joints: by encoders, and the links' side of elastic ones."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import SensorFailureParameters
 from diagrams.scenario.checks import require
-from pfsc_drake.blocks.block import Block
-from pfsc_drake.blocks.wiring_blocks import Constant, Sum
-from pfsc_drake.control.estimation.link_deviation import LinkDeviation
-from pfsc_drake.control.estimation.link_errors import (
-    MotorEncoders,
-    errors_of_measured_torques,
-    errors_of_observed_torques,
-)
-from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
-from pfsc_drake.control.estimation.robot_state import LinkState
+from pfsc_drake.control.estimation.link_errors import MotorEncoders
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import Coefficients
+from pfsc_drake.following.link_state import FoundLinks, add_links
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.physics.force_torque_sensor import SensorFailure
 from pfsc_drake.physics.joint_sensors import (
@@ -29,7 +19,7 @@ from pfsc_drake.physics.joint_sensors import (
     JointTorqueSensor,
     encoder_resolution,
 )
-from pfsc_drake.robot.robot_model import RobotModel, gravity_function
+from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 
@@ -41,27 +31,6 @@ _NEEDED = {
     "from_torque": ("motor_and_torque",),
     "observed": ("motor", "motor_and_torque"),
 }
-
-
-# name of the block that tells how sure links are
-DEVIATION = "link_deviation"
-
-
-@dataclass(frozen=True)
-class FoundLinks:
-    """What a controller has instead of the links' side of elastic joints.
-
-    Attributes:
-        joint_state: ``[q_J, v_J, q_M, v_M]`` as the controller takes it.
-        drive_torque: Port that wants to know what the drives are told, if there is one.
-        signals: For the log: ``found_joint_state``, unless that is all that is known of the
-            robot, ``joint_torque`` where that is measured, and standard deviations, see
-            :class:`LinkDeviation`; none where nothing is found.
-    """
-
-    joint_state: OutputPort
-    drive_torque: InputPort | None = None
-    signals: dict[str, OutputPort] = field(default_factory=dict)
 
 
 def add_joint_state(
@@ -183,81 +152,19 @@ def add_link_state(
     robot, source, sides = part.belief.robot, controller.state, encoders.sides
     if robot.is_rigid or (source == "measured" and controller.law in _OF_MOTORS):
         return FoundLinks(measured)
-    if not isinstance(part, RemoteArm):  # else the robot knows what it measures
+    remote = isinstance(part, RemoteArm)
+    if not remote:  # else the robot knows what it measures
         require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
     if source == "measured":
         return FoundLinks(measured)
-    period, wants = controller.sampling_time, None
+    torque, resolution = None, encoder_resolution(robot.numeric, encoders)[1]
     if source == "from_torque":
-        torque = _measured_torque(builder, part, encoders, period, true_state)
-    else:
-        torque, wants = _add_torque_observer(builder, robot, controller, measured, start, friction)
-    found = LinkState(robot, controller.state_bandwidth, period)
-    system = builder.AddNamedSystem("link_state", BlockSystem(found, period))
-    builder.Connect(measured, system.GetInputPort("joint_state"))
-    builder.Connect(torque, system.GetInputPort("joint_torque"))
-    joint_state = system.GetOutputPort("joint_state")
-    signals = _add_deviation(builder, robot, controller, encoders, joint_state, start, friction)
-    if source == "from_torque":
-        signals |= {"joint_torque": torque}
-    if not isinstance(part, RemoteArm):
-        signals |= {"found_joint_state": joint_state}
-    return FoundLinks(joint_state, wants, signals)
-
-
-def _add_deviation(
-    builder: DiagramBuilder,
-    robot: RobotModel,
-    controller: ControllerParameters,
-    encoders: EncoderOptions,
-    joint_state: OutputPort,
-    start: np.ndarray,
-    friction: Coefficients | None,
-) -> dict[str, OutputPort]:
-    """Add what tells how far the links may be from where they were found; its outputs by name."""
-    robot, period = robot.numeric, controller.sampling_time
-    uncertainty, rate = controller.state_uncertainty, controller.state_bandwidth
-    motors = MotorEncoders(
-        encoder_resolution(robot, encoders)[1], encoders.difference_quotient, encoders.filter_time
-    )
-    if controller.state == "from_torque":
-        errors = errors_of_measured_torques(robot, uncertainty, motors, start, rate, period)
-    else:
-        errors = errors_of_observed_torques(
-            robot, uncertainty, motors, start, rate, period, friction
-        )
-    block = LinkDeviation(robot, errors)
-    system = builder.AddNamedSystem(DEVIATION, BlockSystem(block, period))
-    builder.Connect(joint_state, system.get_input_port())
-    return {name: system.GetOutputPort(name) for name in block.outputs}
-
-
-def _add_torque_observer(
-    builder: DiagramBuilder,
-    robot: RobotModel,
-    controller: ControllerParameters,
-    measured: OutputPort,
-    start: np.ndarray,
-    friction: Coefficients | None,
-) -> tuple[OutputPort, InputPort]:
-    """Add what observes springs from their motors; at the start they bear the weight."""
-    period, known = controller.sampling_time, friction or (np.zeros(robot.dimension),) * 2
-
-    def add(name: str, block: Block) -> BlockSystem:
-        return builder.AddNamedSystem(name, BlockSystem(block, period))
-
-    model = motor_momentum(robot, known)
-    observer = add(
-        "spring_torque_observer", MomentumObserver(model, controller.state_bandwidth, period)
-    )
-    weight = gravity_function(robot.numeric)(start).full().ravel()
-    borne = add("weight_at_start", Constant(weight)).GetOutputPort("value")
-    total = add("spring_torque", Sum(2, robot.dimension))
-    builder.Connect(measured, observer.GetInputPort("joint_state"))
-    builder.Connect(borne, observer.GetInputPort("known_torque"))
-    builder.Connect(borne, total.GetInputPort("term_0"))
-    builder.Connect(observer.GetOutputPort("estimate"), total.GetInputPort("term_1"))
-    return total.GetOutputPort("sum"), observer.GetInputPort("drive_torque")
+        torque = _measured_torque(builder, part, encoders, controller.sampling_time, true_state)
+    motors = MotorEncoders(resolution, encoders.difference_quotient, encoders.filter_time)
+    links = add_links(builder, robot, controller, measured, start, friction, torque, motors)
+    if remote:  # that is all that is known of the robot
+        del links.signals["found_joint_state"]
+    return links
 
 
 def _measured_torque(

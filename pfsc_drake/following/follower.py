@@ -27,6 +27,7 @@ from pfsc_drake.following.carried import placed, resting_point
 from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe
 from pfsc_drake.following.law import Believed, make_law, sampled_robot
 from pfsc_drake.following.law_warnings import law_warnings, observed_force_warnings
+from pfsc_drake.following.link_state import FoundLinks, add_links
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
     ControllerParameters,
@@ -63,7 +64,11 @@ class Follower(Diagram):
 
     Ports:
         plant_state (input): State ``[q, v]`` of the plant; or instead of it
-        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s]; of
+            elastic joints the motors' side alone is read if ``controller.state`` is not
+            ``measured``.
+        joint_torque (input): With ``controller.state`` = ``from_torque``: torques that are measured
+            in elastic joints, shape (N,) [Nm or N].
         override (input, optional): Pace of the motion, shape (1,); see :class:`TimedReference`.
         goal (input): With ``stream``: arc length of the last way point [m], shape (1,), and
         obstacles (input): With ``obstacles``: position and velocity of each as measured, shape
@@ -283,7 +288,8 @@ class Follower(Diagram):
             self.start_posture,
             waiting,
         )
-        assembly.add_place(self._measured(options), self._frame_jet())
+        links = self._links(chosen, options)
+        assembly.add_place(links.joint_state, self._frame_jet())
         for name, (port, *others) in assembly.inputs.items():
             if name != "override" or options.override:
                 builder.ExportInput(port, name)
@@ -296,6 +302,8 @@ class Follower(Diagram):
         controller = self._controller
         drive = controller.GetOutputPort(controller.drive_port)
         builder.ExportOutput(drive, controller.drive_port)
+        if links.drive_torque is not None:
+            builder.Connect(drive, links.drive_torque)
         if self._actuation is not None:
             hold = self._add("hold", Hold(self.robot.dimension))
             builder.Connect(drive, hold.GetInputPort("value"))
@@ -308,6 +316,18 @@ class Follower(Diagram):
                 builder.ExportOutput(outputs[signal], name)
         for name in ("manifold_state", "status", "fault", "stop_category"):
             builder.ExportOutput(controller.GetOutputPort(name), name)
+
+    def _links(self, chosen: ControllerParameters, options: FollowerOptions) -> FoundLinks:
+        """Return the joint state as the law takes it, its links' side found if not measured."""
+        measured, torque = self._measured(options), None
+        if chosen.state == "measured":
+            return FoundLinks(measured)
+        if chosen.state == "from_torque":
+            sensors = self._add("joint_torque", Collect({"joint_torque": self.robot.dimension}))
+            self._builder.ExportInput(sensors.GetInputPort("joint_torque"), "joint_torque")
+            torque = sensors.GetOutputPort("all")
+        start, friction = self.start_posture, options.friction
+        return add_links(self._builder, self.robot, chosen, measured, start, friction, torque)
 
     def _frame_jet(self) -> OutputPort | None:
         """Export the motion of the frame that carries the manifold, if one does."""

@@ -56,6 +56,7 @@ def refuse_unused(
     changed = dict(_changed(options, type(options)()))
     rules = [
         *_law_rules(options, law, followed),
+        *_state_rules(options, law, robot),
         *_posture_rules(options, is_redundant),
         *_friction_rules(options, law),
         *_compliance_rules(options.compliance, followed, kinds),
@@ -96,10 +97,6 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
             f"the call follows a {followed.manifold.name}",
         ),
         Rule("controller.model", False, "the plant of the call is the model"),
-        *(
-            Rule(f"controller.{key}", False, "the link side is measured, see the option measures")
-            for key in ("state", "state_bandwidth", "state_uncertainty")
-        ),
         Rule(
             "controller.boundary_layer_damping",
             law == "singular_perturbation",
@@ -125,6 +122,17 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
             bool(np.isfinite([c.ends for c in followed.manifold.coordinates]).any()),
             "needs a path with ends",
         ),
+    ]
+
+
+def _state_rules(options: FollowerOptions, law: str, robot: RobotModel) -> list[Rule]:
+    finds = not robot.is_rigid and law not in ("rigid", "velocity_servo")
+    elastic = "needs elastic joints, and a law that knows their links' side"
+    bandwidth = finds and options.controller.state != "measured"
+    return [
+        Rule("controller.state", finds, elastic),
+        Rule("controller.state_bandwidth", bandwidth, "needs a state that is not measured"),
+        Rule("controller.state_uncertainty", False, "it is for standard deviations in runs"),
     ]
 
 

@@ -10,6 +10,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import MatrixGain
 
 import pfsc_drake
 from pfsc_drake import (
@@ -28,6 +29,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from tests.compilers import needs_gcc
 
 POINTS = [[0.9, -0.3, 0.8], [1.0, 0.0, 0.9], [0.9, 0.3, 0.8], [0.8, 0.0, 0.75]]
@@ -289,6 +291,37 @@ def test_a_trajectory_is_tracked_for_comparison(path):
         errors = read(simulator, follower, "manifold_state")[:3]
         assert np.linalg.norm(errors) == pytest.approx(distances[-1], abs=1e-6)
     assert distances[0] > 5e-3 and distances[1] < 1e-5
+
+
+@pytest.mark.parametrize("state", ["observed", "from_torque"])
+def test_links_are_found_where_motors_alone_are_measured(path, state):
+    """The links' side of what is measured is wrong; torques are those of the springs."""
+    builder = DiagramBuilder()
+    plant = load(builder, "comau_racer_1_4_elastic_3r")
+    chain, coordinates = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
+    controller = ControllerParameters(state=state, state_bandwidth=700.0)
+    options = FollowerOptions(controller=controller, measures="joint_state")
+    follower = add_path_following(builder, plant, "tool_point", path, "elastic", options=options)
+    rows = np.array(coordinates.rows)
+    motors = builder.AddSystem(MatrixGain(np.vstack([0.0 * rows[:6], rows[6:]])))
+    springs = np.hstack([-np.diag(chain.K_s), -np.diag(chain.K_d)])
+    sensors = builder.AddSystem(MatrixGain(np.hstack([springs, -springs]) @ rows))
+    for system in (motors, sensors):
+        builder.Connect(plant.get_state_output_port(), system.get_input_port())
+    builder.Connect(motors.get_output_port(), follower.GetInputPort("joint_state"))
+    if state == "from_torque":
+        port = follower.GetInputPort("joint_torque")
+        builder.Connect(sensors.get_output_port(), port)
+    builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
+    simulator = Simulator(builder.Build())
+    own = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositionsAndVelocities(own, follower.start_state)
+    simulator.AdvanceTo(0.6)
+    assert read(simulator, follower, "fault")[0] == Fault.NONE
+    eta = follower.followed.motion.derivatives(np.array([0.6]), 0)[0, 0, 0]
+    tool = plant.GetFrameByName("tool_point").CalcPoseInWorld(own).translation()
+    point = path.position.derivatives(np.array([path.arc_length.parameter(eta)]), 0)[0, 0]
+    assert eta > 0.03 and np.linalg.norm(tool - point) < 2e-4
 
 
 def test_it_steps_without_drake(path):

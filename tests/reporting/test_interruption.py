@@ -12,6 +12,17 @@ import pytest
 from reporting.interruption import noticed_interruption, raised_interruption
 from reporting.provenance import PROJECT_ROOT
 
+_ENDING = (signal.SIGHUP, signal.SIGTERM)
+
+
+@pytest.fixture(autouse=True)
+def obeyed():
+    """Signals as in a terminal, also where the suite runs in the background of one."""
+    handlers = {number: signal.signal(number, signal.SIG_DFL) for number in _ENDING}
+    yield
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
 
 def press():
     """Ctrl-C, as this process gets it."""

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.robots import joint_state
-from diagrams.scenario import ControllerParameters
 from experiments.results.found_links import found_links_metrics
 from experiments.results.run_signals import collect_log
 from experiments.scenario_file import find_scenario
@@ -69,23 +67,6 @@ def test_a_law_on_the_motors_wants_no_links(load_scenario):
     settings = load_scenario("pfc_elastic_3r")
     settings.controller.law, settings.encoders.sides = "rigid", "motor"
     assert build_station(settings, FOLDER).on_motors
-
-
-def test_friction_that_is_believed_is_no_torque_of_a_spring(load_arm, monkeypatch):
-    told = []
-
-    def note(robot, friction):
-        told.append(friction)
-        raise InputError("enough")
-
-    monkeypatch.setattr(joint_state, "motor_momentum", note)
-    robot, f_c, f_v = load_arm("comau_racer_1_4_elastic_3r").chain, np.ones(3), 2.0 * np.ones(3)
-    for friction in ((f_c, f_v), None):
-        with pytest.raises(InputError, match="enough"):
-            joint_state._add_torque_observer(
-                None, robot, ControllerParameters(), None, np.zeros(3), friction
-            )
-    np.testing.assert_array_equal(told, [[f_c, f_v], np.zeros((2, 3))])
 
 
 def drawn(load_scenario, sides, state, seed, errors=1.0):
