@@ -5,7 +5,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
 
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
@@ -13,12 +12,14 @@ from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.piecewise_fit import chebyshev_nodes, power_coefficients
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 
-# The dense output of the method is a polynomial of degree 7 on each of its steps.
-_DENSE_DEGREE = 7
-_RELATIVE, _ABSOLUTE = 1e-13, 1e-14
+# of e_perp on an interval; by Gauss' points for its rate
+_DEGREE = 8
+_STAGES = 0.5 * (np.polynomial.legendre.leggauss(_DEGREE)[0] + 1.0)
+# places where the solution is checked, the residual that is allowed there times an interval's
+# length, and the shortest interval as a share of the domain
+_BETWEEN = 0.5 * (np.append(_STAGES, 1.0) + np.insert(_STAGES, 0, 0.0))
+_RESIDUAL, _SHORTEST = 1e-12, 1e-12
 _VERTICAL = 0.9
-
-Vector = tuple[float, float, float]
 
 
 class ParallelTransportFrame:
@@ -102,46 +103,94 @@ class ParallelTransportFrame:
 @once_per_content()
 def _transport(curve: Curve, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Solution of (3.4): breakpoints, power coefficients, and e_perp at the last end."""
-    sample = curve.flat_sampler(2)
-    breaks: list[np.ndarray] = [curve.breakpoints[:1]]
-    tables: list[np.ndarray] = []
-    for begin, end in zip(curve.breakpoints[:-1], curve.breakpoints[1:], strict=True):
-        # The curvature may jump at a breakpoint; the segment's own value counts.
-        inside = math.nextafter(float(end), float(begin))
+    begins, lengths, turns = _turns(curve)
+    ends = np.append(begins[1:], curve.breakpoints[-1])
+    # the curvature may jump at a breakpoint; the interval's own value counts
+    tangents = _unit(curve.derivatives(np.nextafter(ends, begins), 1)[:, 1])
+    nodes = chebyshev_nodes(np.zeros(1), np.ones(1), _DEGREE + 1)[0]
+    at_nodes = np.tensordot(_integrals(nodes), turns, axes=(1, 1)).swapaxes(0, 1)
+    at_end = np.tensordot(_integrals(np.ones(1)), turns, axes=(1, 1))[0]
+    values = np.empty((len(begins), len(nodes), 3))
+    for k, (whole, parts, tangent) in enumerate(zip(at_end, at_nodes, tangents, strict=True)):
+        values[k] = normal + parts @ normal
+        normal = normal + whole @ normal
+        normal = normal - (normal @ tangent) * tangent
+        normal = normal / math.sqrt(normal @ normal)
+    return np.append(begins, ends[-1]), power_coefficients(values, lengths), normal
 
-        def rate(theta: float, e_perp: np.ndarray, inside: float = inside) -> Vector:
-            _, _, _, dx, dy, dz, cx, cy, cz = sample(min(theta, inside)).tolist()
-            x, y, z = e_perp.tolist()
-            square = dx * dx + dy * dy + dz * dz
-            along = (dx * cx + dy * cy + dz * cz) / square
-            # e_par' = (sigma'' - along sigma') / |sigma'|
-            bend = (cx - along * dx) * x + (cy - along * dy) * y + (cz - along * dz) * z
-            gamma = -bend / square
-            return gamma * dx, gamma * dy, gamma * dz
 
-        solution = solve_ivp(
-            rate,
-            (begin, end),
-            normal,
-            method="DOP853",
-            rtol=_RELATIVE,
-            atol=_ABSOLUTE,
-            dense_output=True,
-        )
-        if not solution.success:
+def _turns(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Solve (3.4) for every normal, on intervals that are as short as that takes.
+
+    With ``Omega = e_par x e_par'`` the normal obeys ``e_perp' = Omega x e_perp``, linear and with
+    coefficients that are known: so ``Phi' = [Omega]x Phi`` with ``Phi = 1`` at the begin of an
+    interval is solved by collocation on all intervals at once, and halves of those whose residual
+    is too large are tried again.
+
+    Returns:
+        Begins and lengths of the intervals, each (n,), and ``Phi'`` times the length at the
+        collocation points, (n, s, 3, 3).
+    """
+    begins, ends = curve.breakpoints[:-1], curve.breakpoints[1:]
+    shortest = _SHORTEST * (ends[-1] - begins[0])
+    looked_at = np.concatenate([_STAGES, _BETWEEN])
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    while len(begins):
+        lengths = ends - begins
+        A = _angular_rate(curve, begins[:, None] + lengths[:, None] * looked_at)
+        A = A * lengths[:, None, None, None]
+        stages, between = A[:, : len(_STAGES)], A[:, len(_STAGES) :]
+        system = -np.einsum("ij,niab->niajb", _integrals(_STAGES), stages)
+        size = 3 * len(_STAGES)
+        system = system.reshape(-1, size, size) + np.eye(size)
+        K = np.linalg.solve(system, stages.reshape(-1, size, 3)).reshape(stages.shape)
+        Phi = np.eye(3) + np.einsum("ij,njab->niab", _integrals(_BETWEEN), K)
+        rate = np.einsum("ij,njab->niab", _values(_BETWEEN), K)
+        residual = np.abs(rate - between @ Phi).max(axis=(1, 2, 3))
+        good = residual <= _RESIDUAL
+        if not np.isfinite(residual).all() or (lengths[~good] < shortest).any():
+            worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
             raise InputError(
-                f"frame: no solution between theta = {begin:.9g} and {end:.9g};"
+                f"frame: no solution between theta = {begins[worst]:.9g} and {ends[worst]:.9g};"
                 " a regular curve is required"
             )
-        steps = np.diff(solution.t)
-        nodes = chebyshev_nodes(solution.t[:-1], steps, _DENSE_DEGREE + 1)
-        values = solution.sol(nodes.ravel()).T.reshape(*nodes.shape, 3)
-        tables.append(power_coefficients(values, steps))
-        breaks.append(solution.t[1:])
-        tangent = _unit(sample(inside)[3:6])
-        normal = solution.y[:, -1]
-        normal = _unit(normal - (normal @ tangent) * tangent)
-    return np.concatenate(breaks), np.concatenate(tables), normal
+        found.append((begins[good], lengths[good], K[good]))
+        middles = 0.5 * (begins + ends)[~good]
+        begins = np.concatenate([begins[~good], middles])
+        ends = np.concatenate([middles, ends[~good]])
+    parts = [np.concatenate(part) for part in zip(*found, strict=True)]
+    order = np.argsort(parts[0])
+    begins, lengths, K = (part[order] for part in parts)
+    return begins, lengths, K
+
+
+def _angular_rate(curve: Curve, theta: np.ndarray) -> np.ndarray:
+    """Cross product matrix of ``e_par x e_par'``, [..., 3, 3]."""
+    slope, bend = np.moveaxis(curve.derivatives(theta, 2)[..., 1:, :], -2, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x, y, z = np.moveaxis(
+            np.cross(slope, bend) / np.sum(slope**2, axis=-1, keepdims=True), -1, 0
+        )
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def _values(places: np.ndarray) -> np.ndarray:
+    """Lagrange's polynomials of the collocation points at places in [0, 1], (places, s)."""
+    degree = len(_STAGES) - 1
+    basis = np.polynomial.legendre.legvander(2.0 * _STAGES - 1.0, degree)
+    return np.linalg.solve(
+        basis.T, np.polynomial.legendre.legvander(2.0 * places - 1.0, degree).T
+    ).T
+
+
+def _integrals(places: np.ndarray) -> np.ndarray:
+    """Their integrals from 0 on, (places, s)."""
+    nodes, weights = np.polynomial.legendre.leggauss(len(_STAGES))
+    within = places[:, None] * 0.5 * (nodes + 1.0)
+    values = _values(within.ravel()).reshape(*within.shape, -1)
+    return 0.5 * places[:, None] * np.einsum("k,pks->ps", weights, values)
 
 
 def _initial_normal(tangent: np.ndarray, wanted: ArrayLike | None) -> np.ndarray:

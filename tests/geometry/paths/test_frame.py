@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
@@ -209,3 +209,28 @@ def test_closed_spline_returns_after_a_lap() -> None:
     assert abs(frame.holonomy) > 1e-3
     np.testing.assert_allclose(frame.normals(curve.period)[0], expected[-1], atol=1e-9)
     assert thetas[-1] == curve.period
+
+
+def test_noisy_waypoints_agree_with_an_integration_step_by_step() -> None:
+    """Segments from short to long, bends as narrow as noise makes them, jumps of curvature."""
+    random = np.random.default_rng(7)
+    steps = random.uniform(0.002, 0.05, 25)
+    points = np.stack([np.cumsum(steps), np.zeros(25), np.zeros(25)], axis=1)
+    curve = interpolate(points + 2e-3 * random.normal(size=points.shape), smoothness=2)
+    frame = ParallelTransportFrame(curve)
+    normal = frame.normals(curve.domain[0])[0]
+
+    def rate(theta: float, e_perp: np.ndarray, inside: float) -> np.ndarray:
+        slope, bend = curve.derivatives(min(theta, inside), 2)[1:]
+        change = bend - (bend @ slope) / (slope @ slope) * slope
+        return np.asarray(-(change @ e_perp) / (slope @ slope) * slope)
+
+    for begin, end in itertools.pairwise(curve.breakpoints):
+        inside = np.nextafter(end, begin)
+        theta = np.linspace(begin, inside, 7)
+        options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14, "args": (inside,)}
+        expected = solve_ivp(rate, (begin, end), normal, t_eval=theta, **options).y.T
+        np.testing.assert_allclose(frame.normals(theta)[0], expected, rtol=0, atol=1e-11)
+        normal = expected[-1]
+    # it has turned far from where it began
+    assert np.linalg.norm(normal - frame.normals(curve.domain[0])[0]) > 0.1
