@@ -21,6 +21,9 @@ from diagrams.robots.model import locate_model
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import packages_for
+from pfsc_drake.robot.models.mjcf_meshes import is_converted
+from pfsc_drake.robot.models.model_text import usable_text
+from pfsc_drake.robot.models.model_xml import read_model_xml
 from pfsc_drake.systems.drawing.robot_visualizer import BodyPart
 
 # where the parser reads text, by the model's suffix; other kinds are read as they are
@@ -98,7 +101,11 @@ def _visual_parts(
     parser.package_map().AddMap(packages)
     kind, missing = _TEXTS.get(file.suffix.lower()), list[NotDrawn]()
     if kind is None:
-        parser.AddModels(str(file))
+        usable = usable_text(read_model_xml(file))
+        if usable is None:
+            parser.AddModels(str(file))
+        else:
+            parser.AddModelsFromString(usable, file.suffix[1:].lower())
     else:
         text, missing = drawable_text(file, lambda address: _resolve(address, file, packages))
         parser.AddModelsFromString(text, kind)
@@ -109,7 +116,8 @@ def _visual_parts(
         assert body is not None  # every frame of this source is one of the plant's bodies
         try:
             shape = inspector.GetShape(geometry)
-            if isinstance(shape, Mesh):  # of kinds that are read as they are, too
+            # of kinds that are read as they are, too
+            if isinstance(shape, Mesh) and not is_converted(FilePath(shape.source().path())):
                 _within(FilePath(shape.source().path()), file, packages)
             parts.append(_part(inspector, geometry, _same_body(plant, shown, body)))
         except InputError as error:

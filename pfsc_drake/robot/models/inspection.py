@@ -6,6 +6,7 @@ and lets the rest through. Here each is refused in one line that names file, lin
 
 from dataclasses import dataclass, field
 
+from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import Mimic, mimics_of
 from pfsc_drake.robot.models.mjcf_drives import MjcfDrive, mjcf_drives
 from pfsc_drake.robot.models.model_parts import (
@@ -64,6 +65,15 @@ def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -
             facts.mimics |= mimics_of(model)
     facts.drives = mjcf_drives(models)
     facts.effort_limits |= {name: drive.effort_limit for name, drive in facts.drives.items()}
+    for name, drive in facts.drives.items():
+        if drive.stiffness > 0.0 and drive.actuated:
+            raise InputError(
+                f"{models[0].file}: joint '{name}': stiffness = {drive.stiffness:g} beside an "
+                "actuator; allowed: 0, or a joint of its own behind the driven one; of an elastic "
+                "gear write robot.elastic"
+            )
+        if drive.stiffness > 0.0:
+            facts.springs[name] = drive.stiffness
     facts.friction += [name for name, drive in facts.drives.items() if drive.friction > 0.0]
     return facts
 

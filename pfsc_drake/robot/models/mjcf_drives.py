@@ -8,19 +8,16 @@ joint's side. The control bounds the force where there is no bias; of servos (``
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.mjcf_classes import (
+    MAIN,
+    Attributes,
+    DefaultClasses,
+    servo_attributes,
+)
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
-
-# shortcuts of actuators, which share one set of defaults in a class
-_ACTUATORS = {
-    *("general", "motor", "position", "velocity", "intvelocity"),
-    *("damper", "cylinder", "muscle", "adhesion", "dcmotor"),
-}
-_MAIN = "main"
-
-Attributes = dict[str, str]
 
 
 @dataclass
@@ -30,6 +27,8 @@ class MjcfDrive:
     Attributes:
         armature: Inertia of the rotor, on the joint's side [kg m^2 or kg].
         friction: Dry friction, ``frictionloss`` [Nm or N].
+        stiffness: Stiffness of a spring at the joint [Nm/rad or N/m].
+        actuated: Whether an actuator of the model drives the joint.
         effort_limit: Largest magnitude of the force on the joint, infinite if nothing limits it
             [Nm or N]; of an uneven range its smaller side.
         source: Attributes that the limit is from.
@@ -37,32 +36,10 @@ class MjcfDrive:
 
     armature: float = 0.0
     friction: float = 0.0
+    stiffness: float = 0.0
+    actuated: bool = False
     effort_limit: float = math.inf
     source: str = "no limit in the model"
-
-
-@dataclass
-class _Classes:
-    """Attributes of default classes, by class and kind of element."""
-
-    known: dict[str, dict[str, Attributes]] = field(default_factory=dict)
-
-    def read(self, default: Element, above: str | None = None) -> None:
-        """Add a class and those in it."""
-        name = default.attributes.get("class", _MAIN)
-        inherited = {} if above is None else self.known[above]
-        own = self.known.setdefault(name, {kind: dict(given) for kind, given in inherited.items()})
-        for element in default.children:
-            if element.name != "default":
-                kind = "actuator" if element.name in _ACTUATORS else element.name
-                own.setdefault(kind, {}).update(element.attributes | _servo(element))
-        for element in default.all("default"):
-            self.read(element, name)
-
-    def resolved(self, element: Element, kind: str, inherited: str = _MAIN) -> Attributes:
-        """Return the attributes of an element with those of its class."""
-        name = element.attributes.get("class", inherited)
-        return self.known.get(name, {}).get(kind, {}) | element.attributes
 
 
 def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
@@ -75,10 +52,8 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
         InputError: If a range, a gear or a gain is not made of numbers; one line.
     """
     roots = [model.root for model in models if model.root.name.startswith("mujoco")]
-    classes, limits_by_range = _Classes(), True
+    classes, limits_by_range = DefaultClasses.of(models), True
     for root in roots:
-        for default in root.all("default"):
-            classes.read(default)
         for compiler in root.all("compiler"):
             limits_by_range = compiler.attributes.get("autolimits", "true") != "false"
     places = {id(e): model for model in models for e in model.root.within()}
@@ -86,21 +61,24 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
         attributes["name"]: (element, attributes)
         for root in roots
         for body in root.all("worldbody")
-        for element, attributes in _joints(body, _MAIN, classes)
+        for element, attributes in _joints(body, MAIN, classes)
         if "name" in attributes
     }
     drives: dict[str, MjcfDrive] = {}
     for name, (element, given) in joints.items():
         numbers = _Numbers(places[id(element)], element, given, limits_by_range)
-        drives[name] = MjcfDrive(numbers.of("armature", 0.0), numbers.of("frictionloss", 0.0))
+        drives[name] = MjcfDrive(
+            numbers.of("armature", 0.0), numbers.of("frictionloss", 0.0), numbers.stiffness
+        )
     driven: dict[str, list[tuple[float, str]]] = {}
     for root in roots:
         for element in (e for group in root.all("actuator") for e in group.children):
-            given = classes.resolved(element, "actuator") | _servo(element)
+            given = classes.resolved(element, "actuator") | servo_attributes(element)
             joint = given.get("joint", given.get("jointinparent"))
             if joint in drives:
                 numbers = _Numbers(places[id(element)], element, given, limits_by_range)
                 driven.setdefault(joint, []).append(_limit_of_actuator(numbers))
+                drives[joint].actuated = True
     for name, (element, given) in joints.items():
         numbers = _Numbers(places[id(element)], element, given, limits_by_range)
         limits = driven.get(name, [])
@@ -115,7 +93,7 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
 
 
 def _joints(
-    body: Element, inherited: str, classes: _Classes
+    body: Element, inherited: str, classes: DefaultClasses
 ) -> Iterator[tuple[Element, Attributes]]:
     """Yield the joints below a body, with the attributes of their classes."""
     inherited = body.attributes.get("childclass", inherited)
@@ -123,15 +101,6 @@ def _joints(
         yield element, classes.resolved(element, "joint", inherited)
     for child in body.all("body"):
         yield from _joints(child, inherited, classes)
-
-
-def _servo(element: Element) -> Attributes:
-    """Return what a shortcut says of gain and bias, in the words of a general actuator."""
-    if element.name == "motor":
-        return {"biastype": "none", "gainprm": "1"}
-    if element.name in _ACTUATORS - {"general"}:
-        return {"biastype": "affine"}
-    return {}
 
 
 @dataclass(frozen=True)
@@ -155,6 +124,19 @@ class _Numbers:
 
     def of(self, key: str, otherwise: float) -> float:
         return next(iter(self.all(key)), otherwise)
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of a joint's spring; one that is bent at zero is refused."""
+        stiffness = self.of("stiffness", 0.0)
+        bent = self.of("springref", 0.0) - self.of("ref", 0.0)
+        if stiffness > 0.0 and bent != 0.0:
+            raise InputError(
+                f"{self.model.place(self.element)}: joint '{self.given.get('name', '')}': "
+                f"springref = {self.given.get('springref', '0')}; allowed: that of ref, so that "
+                "the spring rests at zero"
+            )
+        return stiffness
 
     def limit(self, kind: str) -> float:
         """Return the smaller side of a range that limits, else infinity."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 from pfsc_drake.robot.models.joint_edits import mimic_elements
+from pfsc_drake.robot.models.mjcf_meshes import mesh_files, mesh_name
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
 _GREY = '<color rgba="0.7 0.7 0.7 1"/>'
@@ -22,7 +23,8 @@ def usable_text(
     """Return a model in another text, or None if Drake can use the file as it is.
 
     ROS tools repeat a material wherever it is used, and let the colour differ; Drake refuses
-    that, so such materials are named apart; textures go, for it refuses missing ones. That joints
+    that, so such materials are named apart; textures go, for it refuses missing ones. STL meshes of
+    MJCF models become OBJ meshes, missing ones go, and a model without a name gets one. That joints
     follow others is left out: they are fixed
     where these stand. Springs can be left out, since Drake gives up no joint of a plant with
     springs. Lines stay where they are. Relative file names become absolute,
@@ -36,6 +38,8 @@ def usable_text(
     edits = list(distinct_materials(model))
     edits += [(mimic, "") for _, mimic in mimic_elements(model)]
     edits += without_textures(model)
+    edits += (nameless := list(_named_mjcf(model)))
+    edits += _usable_meshes(model, always=bool(nameless))
     if without_springs:
         edits += [
             (element, f"<{element.name}>0</{element.name}>")
@@ -46,6 +50,28 @@ def usable_text(
         left_out = [*model.root.all("link", "inertial"), *model.root.all("transmission")]
         edits += [(element, "") for element in left_out]
     return edited_text(model, [*edits, *absolute_names(model)]) if edits else None
+
+
+def _named_mjcf(model: ModelXml) -> Iterator[Edit]:
+    """Yield the first tag of an MJCF model without a name, which Drake requires, with one."""
+    root = model.root
+    if root.name == "mujoco" and not root.attributes.get("model") and root.children:
+        # its first tag alone
+        yield replace(root, end=root.children[0].start), '<mujoco model="robot">'
+
+
+def _usable_meshes(model: ModelXml, *, always: bool) -> Iterator[Edit]:
+    """Yield meshes of an MJCF model with files that Drake can read; those without go."""
+    missing = set()
+    for mesh, file in mesh_files(model, always=always):
+        if file is not None:
+            yield with_attributes(mesh, file=str(file))
+        else:
+            missing.add(mesh_name(mesh))
+            yield mesh, ""
+    for geometry in (element for element in model.root.within() if element.name == "geom"):
+        if geometry.attributes.get("mesh") in missing:
+            yield geometry, ""
 
 
 def edited_text(model: ModelXml, edits: Iterable[Edit]) -> str:

@@ -37,6 +37,7 @@ from pfsc_drake.robot.models.joint_edits import (
     with_followers,
 )
 from pfsc_drake.robot.models.masses import require_inertia, require_regular_mass_matrix
+from pfsc_drake.robot.models.mjcf_sites import add_sites
 from pfsc_drake.robot.models.model_text import (
     DrakeMessages,
     collected_messages,
@@ -47,6 +48,8 @@ from pfsc_drake.robot.models.model_xml import ModelXml, read_model_xml
 from pfsc_drake.robot.models.placement import fix_joints, place_base
 
 _ROOTS = {".urdf": "robot", ".sdf": "sdf", ".xml": "mujoco"}
+# in an MJCF model
+_OF_NO_ACCOUNT = ("site", "light", "camera", "keyframe", "sensor", "visual", "statistic")
 # Drake says so when it takes another inertia than the model's
 _REPLACED = ("While re-expressing as central inertia", "While parsing inertia", "invalid inertia")
 
@@ -127,10 +130,11 @@ def read_model(
         _parse(plant, model, options, packages, without_masses=massless)
         _refuse_replaced_inertia(file, messages)
         with _named(file, "cannot be simulated"):
+            add_sites(plant, models)
             _take_constraints(plant, file, facts)
             fix_joints(plant, options.fixed_joints)
             place_base(plant, options.base, options.base_pose)
-            if options.moves_joints:
+            if options.moves_joints or facts.drives:  # Drake reads no springs of MJCF
                 springs = facts.springs.items()
                 add_springs(plant, [(plant.GetJointByName(j), K_s) for j, K_s in springs])
             if not massless:
@@ -157,7 +161,8 @@ def read_model(
     # or of no account, since all that follows others is fixed
     said_below = ["joint friction", "mimic", "equality"]
     if facts.drives:
-        said_below += ["actuatorfrcrange", "frictionloss", "child of 'actuator'"]
+        said_below += ["actuatorfrcrange", "frictionloss", "child of 'actuator'", "'stiffness'"]
+        said_below += ["'springref'", *(f"'{tag}'" for tag in _OF_NO_ACCOUNT)]
     warnings = [m for m in messages.warnings if not any(text in m for text in said_below)]
     if rubbing and not massless:
         warnings.append(

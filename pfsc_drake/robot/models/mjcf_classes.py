@@ -1,0 +1,61 @@
+"""Default classes of an MJCF model, and what its elements inherit from them."""
+
+from dataclasses import dataclass, field
+from typing import Self
+
+from pfsc_drake.robot.models.model_xml import Element, ModelXml
+
+# shortcuts of actuators, which share one set of defaults in a class
+ACTUATORS = {
+    *("general", "motor", "position", "velocity", "intvelocity"),
+    *("damper", "cylinder", "muscle", "adhesion", "dcmotor"),
+}
+MAIN = "main"
+
+Attributes = dict[str, str]
+
+
+@dataclass
+class DefaultClasses:
+    """Attributes of default classes, by class and kind of element."""
+
+    known: dict[str, dict[str, Attributes]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, models: list[ModelXml]) -> Self:
+        """Return the classes of a model.
+
+        Args:
+            models: The model and what it includes.
+        """
+        classes = cls()
+        for root in (model.root for model in models if model.root.name.startswith("mujoco")):
+            for default in root.all("default"):
+                classes.read(default)
+        return classes
+
+    def read(self, default: Element, above: str | None = None) -> None:
+        """Add a class and those in it."""
+        name = default.attributes.get("class", MAIN)
+        inherited = {} if above is None else self.known[above]
+        own = self.known.setdefault(name, {kind: dict(given) for kind, given in inherited.items()})
+        for element in default.children:
+            if element.name != "default":
+                kind = "actuator" if element.name in ACTUATORS else element.name
+                own.setdefault(kind, {}).update(element.attributes | servo_attributes(element))
+        for element in default.all("default"):
+            self.read(element, name)
+
+    def resolved(self, element: Element, kind: str, inherited: str = MAIN) -> Attributes:
+        """Return the attributes of an element with those of its class."""
+        name = element.attributes.get("class", inherited)
+        return self.known.get(name, {}).get(kind, {}) | element.attributes
+
+
+def servo_attributes(element: Element) -> Attributes:
+    """Return what a shortcut says of gain and bias, in the words of a general actuator."""
+    if element.name == "motor":
+        return {"biastype": "none", "gainprm": "1"}
+    if element.name in ACTUATORS - {"general"}:
+        return {"biastype": "affine"}
+    return {}
