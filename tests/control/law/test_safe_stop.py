@@ -134,6 +134,18 @@ def test_the_link_side_may_be_lost(robot):
     check(stop(robot, lost=[1, N + 1])[0])
 
 
+@pytest.mark.parametrize("left", [1, 2 * N + 1])
+def test_one_position_of_a_rigid_joint_may_be_all_that_is_left(left):
+    """Its rate is that position's, whichever side it is of; the other joint stops as planned."""
+    robot = Robot("comau_racer_1_4_3r")
+    every = [1, N + 1, 2 * N + 1, 3 * N + 1]
+    states, torques = stop(robot, lost=[i for i in every if i != left])
+    check(states)
+    planned = stop(robot)[0]
+    assert np.abs(states[:, N + 1] - planned[:, N + 1]).max() < 0.12
+    assert np.abs(np.diff(torques[50:, 1])).max() < 0.05 * robot.limits[1]
+
+
 def test_of_the_motor_side_nothing_may_be_left(robot):
     """A soft joint is then held by what its motor is thought to do: it creeps, by less than 5."""
     states, _ = stop(robot, lost=[2 * N + 1, 3 * N + 1])
