@@ -53,6 +53,7 @@ class _Checked:
     times: np.ndarray
     demand: np.ndarray
     limiting: Limiting
+    postures: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -260,7 +261,7 @@ class FastestPlanner(MotionDemand):
             speed / self._velocity,
             self.held_back(motion, longest, course),
         )
-        return _Checked(motion, begins, times, demand, limiting)
+        return _Checked(motion, begins, times, demand, limiting, course[:, 0])
 
     def _tightened(
         self, tight: list[np.ndarray], moves: list[Move], checked: _Checked
@@ -302,7 +303,8 @@ class FastestPlanner(MotionDemand):
         return np.inf if given is None else given
 
     def _told(self, checked: _Checked) -> DrivePlan:
-        ones, said = np.ones(len(checked.times)), []
+        ones = np.ones(len(checked.times))
+        said = self.beyond_limits(checked.motion, float(checked.times[1]), checked.postures)
         largest = checked.limiting.largest.max()
         if largest > 1.0 + _MISSED:
             said.append(

@@ -327,6 +327,14 @@ def _refuse_swapped(shape: Fitted, points: np.ndarray) -> None:
         )
 
 
+def _normal_in_the_middle(surface: Surface) -> np.ndarray:
+    """Return the unit normal (4.3) at the middle of the domain, shape (3,)."""
+    middle = [sum(ends) / 2.0 for ends in surface.domain]
+    first, second = surface.partials(middle, 1)[1:3]
+    normal = np.cross(first, second)
+    return np.asarray(np.round(normal / np.linalg.norm(normal), 3) + 0.0)
+
+
 def _scattered(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurface:
     base: BaseChoice = cast(Literal["auto", "plane", "cylinder"], shape.base)
     if shape.base_axis:
@@ -342,9 +350,15 @@ def _scattered(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurfac
     )
     fit = fit_scattered(points, options)
     notes: tuple[str, ...] = ()
+    if not shape.seen_from:
+        normal = ", ".join(f"{value:.3g}" for value in _normal_in_the_middle(fit.surface))
+        notes = (
+            f"{shape.file}: the normal of the surface points to [{normal}] in its middle, as no "
+            "seen_from says which side it is (upwards from a plane, outwards from a cylinder)",
+        )
     if fit.hole > _HOLE * fit.spacing:
         place = ", ".join(f"{value:.4g}" for value in fit.hole_at)
-        notes = (
+        notes += (
             f"{shape.file}: no point within {1e3 * fit.hole:.3g} mm of [{place}] m, others are "
             f"{1e3 * fit.spacing:.3g} mm apart: the surface bridges that hole; largest_hole (m) "
             "refuses it",

@@ -14,6 +14,7 @@ from pfsc_drake.control.law.swing import Swing
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.serial.chain import SerialChain
 
 ARM, DWELL, RESERVE = "pfc_elastic_3r", 0.05, 0.3
 GAINS = GainParameters(coefficients=[900.0, 60.0])
@@ -180,3 +181,30 @@ def test_what_is_refused(changes, key):
 def test_velocity_is_as_it_was_unless_given():
     assert ReferenceParameters().largest_velocity == 0.1
     assert ReferenceParameters(velocity=0.3).largest_velocity == 0.3
+
+
+def test_a_joint_that_passes_its_limit_is_named_beforehand(fastest, load_arm, monkeypatch):
+    """Of a robot whose first axis ends within the motion."""
+    settings = fastest()
+    free = build(settings)
+    assert not [said for said in free.warnings if "passes its limit" in said]
+    reach = free.log  # the same motion, with the first axis in its log
+    simulator = Simulator(free.diagram)
+    free.set_start(simulator.get_mutable_context())
+    simulator.AdvanceTo(free.reference_duration)
+    _, raw = reach.read(simulator.get_context())
+    q_1 = raw["joint_state"][:, 0]
+    limit = 0.5 * (q_1[0] + q_1[-1])
+    gather = SerialChain.gather
+
+    def tight(self, name):
+        values = gather(self, name)
+        if name == "position_limits":
+            values = np.array(values)
+            values[0, int(q_1[-1] > q_1[0])] = limit
+        return values
+
+    monkeypatch.setattr(SerialChain, "gather", tight)
+    settings.reference.dwell *= 1.01  # another content than before
+    (said,) = [line for line in build(settings).warnings if "passes its limit" in line]
+    assert said.startswith(f"joint 1 passes its limit, q_1 = {np.rad2deg(limit):.1f} deg, at eta")

@@ -261,8 +261,22 @@ def test_a_hole_that_is_bridged_is_said(tmp_path):
     for name, rows in {"whole": points, "holed": left}.items():
         text = "\n".join(",".join(map(repr, row)) for row in rows.tolist())
         (tmp_path / f"{name}.csv").write_text(f"x,y,z\n{text}\n")
-        shape = Fitted(file=f"{name}.csv", largest_hole=0.05)
+        shape = Fitted(file=f"{name}.csv", largest_hole=0.05, seen_from=[0.1, 0.1, 1.0])
         made[name] = surface_from_shape(shape, 3, tmp_path).notes
     assert made["whole"] == ()
     (note,) = made["holed"]
     assert re.search(r"holed\.csv: no point within 2[3456].* mm of \[0\.(19|2).*, 0\.(09|1)", note)
+
+
+def test_the_side_of_the_normal_is_said_where_nobody_chose_it(tmp_path):
+    """A plane that leans: upwards, along the normal that a scenario's lines are told in."""
+    rng = np.random.default_rng(3)
+    flat = np.column_stack([rng.uniform(0.0, 0.3, (900, 2)), 1e-5 * rng.normal(size=900)])
+    R = Rotation.from_euler("xyz", [2.6, 0.3, 0.4]).as_matrix()
+    text = "\n".join(",".join(map(repr, row)) for row in (flat @ R.T).tolist())
+    (tmp_path / "scan.csv").write_text(f"x,y,z\n{text}\n")
+    (note,) = surface_from_shape(Fitted(file="scan.csv"), 3, tmp_path).notes
+    said = re.search(r"scan\.csv: the normal .* to \[(.*)\] in its middle, as no seen_from", note)
+    normal = np.array([float(value) for value in said[1].split(",")])
+    np.testing.assert_allclose(normal, -R[:, 2], atol=2e-3)
+    assert normal[2] > 0.5
