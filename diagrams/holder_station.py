@@ -41,7 +41,7 @@ from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame, PlannedFrame
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size

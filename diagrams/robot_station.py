@@ -204,7 +204,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         fuse_blocks(builder)
     diagram = builder.Build()
     diagram.set_name("robot")
-    torques = scenario.controller.law != "velocity_servo"
+    torques = scenario.controller.law_record.commands_torque
     return RobotStation(
         diagram,
         part,

@@ -29,7 +29,7 @@ from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import free_motion, make_lead
 from pfsc_drake.following.options.compliance import ComplianceParameters
@@ -223,7 +223,7 @@ def belief_source(scenario: Scenario, folder: FilePath) -> BeliefSource:
         controller.model,
         scenario.model_error,
         folder,
-        by_velocity=controller.law == "velocity_servo",
+        by_velocity=not controller.law_record.commands_torque,
     )
 
 
@@ -250,7 +250,7 @@ def servo_options(scenario: Scenario) -> ServoOptions | None:
     Args:
         scenario: The scenario.
     """
-    if scenario.controller.law != "velocity_servo":
+    if scenario.controller.law_record.commands_torque:
         return None
     return ServoOptions(scenario.servo, scenario.controller, scenario.faults, scenario.encoders)
 

@@ -56,7 +56,7 @@ def controller_warnings(
     sampled = cache(lambda: sampled_robot(parameters, robot, law.linearization, rest, law.posture))
     bearable = bearable_way(parameters.manifold, scenario.fixtures, scenario.compliance)
     said = law_warnings(parameters, robot, law, link_state, sampled)
-    if parameters.law == "velocity_servo":
+    if not parameters.law_record.commands_torque:
         said += servo_warnings(scenario.servo.bandwidth, robot, link_state)
     q_J, period = link_state[: robot.dimension], parameters.sampling_time
     said += coarse_encoders(scenario.encoders, period, robot, law, q_J)

@@ -23,8 +23,6 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 
-# laws that act on the motors of elastic joints alone
-_OF_MOTORS = ("rigid", "velocity_servo")
 # which sides must be measured where the controller has its state from
 _NEEDED = {
     "measured": ("both",),
@@ -150,7 +148,7 @@ def add_link_state(
         InputError: If what the controller wants is not measured.
     """
     robot, source, sides = part.belief.robot, controller.state, encoders.sides
-    if robot.is_rigid or (source == "measured" and controller.law in _OF_MOTORS):
+    if robot.is_rigid or (source == "measured" and not controller.law_record.knows_links):
         return FoundLinks(measured)
     remote = isinstance(part, RemoteArm)
     if not remote:  # else the robot knows what it measures

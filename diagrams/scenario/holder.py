@@ -126,6 +126,6 @@ class HolderParameters:
         require(manifold == "path", "controller.manifold", manifold, "path, of a robot that holds")
         law = self.controller.law
         allowed = "a law of torques, of a robot that holds"
-        require(law != "velocity_servo", "controller.law", law, allowed)
+        require(self.controller.law_record.commands_torque, "controller.law", law, allowed)
         delay = self.controller.delay
         require(delay is None, "controller.delay", delay, "null, of a robot that holds")

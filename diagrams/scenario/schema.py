@@ -35,7 +35,7 @@ from diagrams.scenario.surface import SurfaceParameters
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.scenario.turntable import TurntableParameters
 from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
@@ -168,7 +168,8 @@ class Scenario:
     def encoder_period(self) -> float:
         """Sampling time of the encoders, which servos may read more often than the law [s]."""
         period = self.controller.sampling_time
-        return self.servo.period or period if self.controller.law == "velocity_servo" else period
+        has_servos = not self.controller.law_record.commands_torque
+        return self.servo.period or period if has_servos else period
 
     @property
     def needs_sensor(self) -> bool:
@@ -189,8 +190,6 @@ _OF_THE_PLANT = (
     "notch",
     "workpiece",
 )
-# laws that want no more of a joint than a driver tells
-_OF_ONE_SIDE = ("rigid", "velocity_servo")
 _ONE_SIDE = "from_torque or observed: a robot tells one side of its joints"
 _TRANSITION = 0.5  # s
 
@@ -218,7 +217,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         bus = scenario.teleoperation.lcm
         require(bool(bus), "teleoperation.lcm", repr(bus), "the bus of a leader (lead)")
     controller = scenario.controller
-    finds_links = controller.law in _OF_ONE_SIDE or controller.state != "measured"
+    finds_links = not controller.law_record.knows_links or controller.state != "measured"
     require(finds_links, "controller.state", controller.state, _ONE_SIDE)
     known = not isinstance(scenario.path.shape, Streamed)
     beforehand = "a path that is known beforehand, where the robot stands elsewhere"
@@ -247,7 +246,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
             "them nothing moves"
         )
     faults = left.faults
-    rigid = controller.law in _OF_ONE_SIDE
+    rigid = not controller.law_record.knows_links
     holding = _HOLD_BANDWIDTH if rigid else _HOLD_OF_SPRINGS
     if faults.effort_share > _STOP_SHARE or faults.hold_bandwidth > holding:
         faults.effort_share = min(faults.effort_share, _STOP_SHARE)

@@ -19,7 +19,7 @@ from diagrams.scenario import (
     Waypoints,
 )
 from diagrams.tasks.surface import make_surface
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     Curve,

@@ -19,7 +19,7 @@ from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
 from diagrams.tasks.surface import followed_angles, require_joints
 from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint
 from pfsc_drake.control.manifolds.path import PathManifold

@@ -8,7 +8,7 @@ import numpy as np
 from diagrams.scenario import OnSurface, PathParameters, SurfaceParameters
 from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.tasks.surface import given_quaternion, make_surface, normal_offset
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Curve, OrientationCurve, Path, read_waypoints
 from pfsc_drake.geometry.files.unit import Unit

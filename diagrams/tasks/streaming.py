@@ -13,7 +13,7 @@ from diagrams.tasks.drawn_plane import SIDE, StreamDrawing, border
 from diagrams.tasks.surface import followed_angles
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.block import Block
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import PlaceEvaluator, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.streams.course import POSE, POSITION

@@ -21,7 +21,7 @@ from diagrams.tasks.surface import (
     require_joints,
 )
 from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import straight_lines, together
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError

@@ -119,7 +119,7 @@ def _lag(loop: SensorLoop) -> tuple[float, float]:
     """Return the delay in a loop over the sensor [s], and the bandwidth of its servos [rad/s]."""
     period, sensor = loop.controller.sampling_time, loop.sensor
     delay = _LOST_TICKS * period + sensor.delay + 1.0 / (2.0 * np.pi * sensor.bandwidth)
-    if loop.controller.law != "velocity_servo":
+    if loop.controller.law_record.commands_torque:
         return delay, np.inf
     return delay + loop.servo.bus_delay, loop.servo.bandwidth
 

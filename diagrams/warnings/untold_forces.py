@@ -9,6 +9,7 @@ import numpy as np
 from diagrams.scenario import ComplianceParameters, ControllerParameters, ForcePulse
 from diagrams.scenario.fixtures import FixtureParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.laws import LAWS
 from pfsc_drake.control.law.linearization import Linearization, decoupling_function
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
@@ -183,7 +184,7 @@ def largest_force(
 
 def _is_exact(law: str, robot: RobotModel) -> bool:
     """Return whether a law makes of bending joints what accelerates the links."""
-    return law in ("elastic", "visco_elastic") and robot.is_elastic
+    return LAWS[law].inverts_springs and robot.is_elastic
 
 
 def _yield(sampled: SampledRobot, robot: RobotModel, law: FollowingLaw, rest: RestPosture) -> float:

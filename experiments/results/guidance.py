@@ -253,7 +253,7 @@ def observed_lag(log: RunLog, believed: float) -> float | None:
 
 def _late_servos(log: RunLog, settings: Scenario) -> list[str]:
     fixtures, servo = settings.fixtures, settings.servo
-    if fixtures is None or settings.controller.law != "velocity_servo":
+    if fixtures is None or settings.controller.law_record.commands_torque:
         return []
     believed = fixtures.lag_behind(servo.bandwidth)
     lag = observed_lag(log, believed)

@@ -11,7 +11,7 @@ import numpy as np
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require_between
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import LawGains

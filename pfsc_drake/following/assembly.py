@@ -8,6 +8,7 @@ from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.laws import LAWS
 from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
 from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
 from pfsc_drake.control.law.waiting_reference import WaitingReference
@@ -270,4 +271,4 @@ def acts_on_motors(law: str, believed: Believed) -> bool:
         law: Name of the law.
         believed: Nominal model of the robot.
     """
-    return law == "rigid" and not believed.robot.is_rigid
+    return LAWS[law].on_motors and not believed.robot.is_rigid

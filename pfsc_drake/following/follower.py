@@ -15,7 +15,7 @@ from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Linear
 from pfsc_drake.control.compliance.measured_wrench import MeasuredWrench
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import SampledRobot
 from pfsc_drake.control.manifolds.manifold import PlaceManifold

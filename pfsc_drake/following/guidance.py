@@ -13,7 +13,7 @@ from pfsc_drake.checks import require_not_negative
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.parameters import Fixture
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.fixtures import free_motion, make_lead

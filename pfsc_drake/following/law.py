@@ -11,12 +11,8 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.estimation.robot_state import MOST_TICKS
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.linearization import (
-    RELATIVE_DEGREE,
-    ActuationOptions,
-    Linearization,
-    linearize,
-)
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE, ActuationOptions
+from pfsc_drake.control.law.linearization import Linearization, linearize
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.robust_gains import SampledRobot, choose_fast_pole, rule_of_poles

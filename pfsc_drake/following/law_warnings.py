@@ -12,7 +12,7 @@ from pfsc_drake.control.compliance.tuned_impedance import (
 )
 from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.linearization import FASTEST_DAMPING
+from pfsc_drake.control.law.laws import FASTEST_DAMPING
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
@@ -26,8 +26,6 @@ from pfsc_drake.yaml.typed import spread
 
 # relative, of masses and of stiffnesses, which gains should bear
 _BORNE_ERROR = 0.05
-# rad per sampling interval, up to which the exact elastic law keeps its accuracy
-_FASTEST_RESONANCE = 1.0
 # m per m/s^2, from which on joints are soft for laws that take them for stiff. Of the arms of
 # `experiments study`, the errors that linear theory tells as 5, 0.36 and 0.08 are 1.1, 0.2 and
 # 0.07 mm at accelerations up to 2 m/s^2; where it tells that the loop is unstable, they are 90 mm
@@ -62,16 +60,16 @@ def law_warnings(
 def _fast_resonance(
     parameters: ControllerParameters, robot: RobotModel, link_state: np.ndarray
 ) -> list[str]:
-    if parameters.law != "elastic":
+    period, fastest = parameters.sampling_time, parameters.law_record.fastest_resonance
+    if np.isinf(fastest):
         return []
-    period = parameters.sampling_time
     resonance = joint_resonances(robot, link_state[: robot.dimension])[-1]
-    if resonance * period <= _FASTEST_RESONANCE:
+    if resonance * period <= fastest:
         return []
     return [
         f"the joints resonate at up to {resonance / (2.0 * np.pi):.3g} Hz, "
         f"{resonance * period:.2f} rad per sampling interval; above "
-        f"{_FASTEST_RESONANCE:g} rad the law 'elastic' loses accuracy and then "
+        f"{fastest:g} rad the law '{parameters.law}' loses accuracy and then "
         "oscillates: sample faster, or take the law 'visco_elastic' or 'singular_perturbation'"
     ]
 
@@ -101,7 +99,7 @@ def _fragile_gains(
 
 
 def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[str]:
-    if parameters.law != "singular_perturbation":
+    if not parameters.law_record.damps_springs:
         return []
     damping = np.array(spread(parameters.boundary_layer_damping, robot.dimension))
     # rigid joints among elastic ones have nothing to damp
@@ -121,7 +119,8 @@ def _soft_joints(
 ) -> list[str]:
     """Warn of joints that are too soft for a law that takes them for stiff."""
     manifold = law.linearization.manifold
-    if parameters.law not in ("singular_perturbation", "rigid") or not robot.is_elastic:
+    record = parameters.law_record
+    if not (record.damps_springs or record.on_motors) or not robot.is_elastic:
         return []
     q_J = link_state[: robot.dimension]
     turns = any(coordinate.kind is Kind.ROTATIONAL for coordinate in manifold.coordinates)
@@ -129,7 +128,7 @@ def _soft_joints(
     joints = soft_joints(
         robot, q_J, oriented=turns, tool_axis=tool.tool_axis, yaw_axis=tool.yaw_axis
     )
-    if parameters.law == "rigid":
+    if record.on_motors:
         softness = bending(joints)
         what = "acts on the motors, and bending joints let the tool leave the path"
     else:
@@ -196,7 +195,7 @@ def unused_parameters(parameters: ControllerParameters, law: FollowingLaw) -> li
 
 
 def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
-    if parameters.law != "velocity_servo" or not parameters.friction.is_given:
+    if parameters.law_record.commands_torque or not parameters.friction.is_given:
         return []
     return [
         "controller.friction is not used: the servos of the law 'velocity_servo' overcome friction "

@@ -35,9 +35,9 @@ def add_prediction(
     """
     if options.delay is None:
         return joint_state, believed, None
-    law, period = options.law, options.sampling_time
+    period = options.sampling_time
     allowed = "null with the law 'velocity_servo', which commands no torques"
-    require(law != "velocity_servo", "controller.delay", options.delay, allowed)
+    require(options.law_record.commands_torque, "controller.delay", options.delay, allowed)
     ticks = ticks_of(options)
     block = StatePredictor(believed.robot, ticks, period, believed.velocity_delay)
     predictor = builder.AddNamedSystem("state_predictor", BlockSystem(block, period))

@@ -9,7 +9,7 @@ import numpy as np
 
 from pfsc_drake.compiled.content import content
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import LAWS, RELATIVE_DEGREE
 from pfsc_drake.control.law.robust_gains import rule_of_poles
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.path import PathManifold
@@ -99,7 +99,7 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
         Rule("controller.model", False, "the plant of the call is the model"),
         Rule(
             "controller.boundary_layer_damping",
-            law == "singular_perturbation",
+            LAWS[law].damps_springs,
             "needs the law singular_perturbation",
         ),
         Rule(
@@ -126,7 +126,7 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
 
 
 def _state_rules(options: FollowerOptions, law: str, robot: RobotModel) -> list[Rule]:
-    finds = not robot.is_rigid and law not in ("rigid", "velocity_servo")
+    finds = not robot.is_rigid and LAWS[law].knows_links
     elastic = "needs elastic joints, and a law that knows their links' side"
     bandwidth = finds and options.controller.state != "measured"
     return [

@@ -21,7 +21,8 @@ from pfsc_drake.control.estimation.momentum import (
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE, ActuationOptions
+from pfsc_drake.control.law.linearization import linearize
 from pfsc_drake.control.law.reference import SmoothStart, rest_to_rest
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles

@@ -6,7 +6,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from pfsc_drake.blocks.linear_algebra import solve
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE, ActuationOptions
+from pfsc_drake.control.law.linearization import linearize
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains, PostureParameters
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 
 ELASTIC = "franka_emika_panda_elastic"
 # the elbow is at the side

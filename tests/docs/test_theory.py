@@ -24,7 +24,8 @@ from pfsc_drake.control.fixtures.guidance import approach_speed
 from pfsc_drake.control.law import actuation
 from pfsc_drake.control.law.actuation import DriveState, joint_jets
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare
-from pfsc_drake.control.law.linearization import ActuationOptions, linearize
+from pfsc_drake.control.law.laws import ActuationOptions
+from pfsc_drake.control.law.linearization import linearize
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization, gains_from_poles

@@ -10,7 +10,7 @@ from diagrams.scenario import (
     GainParameters,
     LawGains,
 )
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError

@@ -8,7 +8,8 @@ from scipy.optimize import least_squares
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE, ActuationOptions
+from pfsc_drake.control.law.linearization import linearize
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.path import PathManifold

@@ -14,7 +14,8 @@ from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
+from pfsc_drake.control.law.linearization import linearize
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters

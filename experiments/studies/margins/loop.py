@@ -21,7 +21,7 @@ from diagrams.station import Station
 from diagrams.station_parts import belief_source
 from experiments.simulation import configure
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.margins import in_loop
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 

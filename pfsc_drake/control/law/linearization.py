@@ -3,48 +3,18 @@
 from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.law import actuation
-from pfsc_drake.control.law.actuation import DrivenMotion, DriveState, joint_jets
+from pfsc_drake.control.law.actuation import DriveState, joint_jets
+from pfsc_drake.control.law.laws import LAWS, ActuationOptions
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel
 
-RELATIVE_DEGREE = {
-    "velocity_servo": 1,
-    "rigid": 2,
-    "singular_perturbation": 2,
-    "visco_elastic": 3,
-    "elastic": 4,
-}
-# sampling intervals by which the held part of the drive input is extrapolated
-_LEAD = {"visco_elastic": 1.0, "elastic": 0.5}
+# sampling intervals by which torques lead to the middle of their hold
 _MIDDLE = 0.5
-# K_s epsilon D_b T_s / D_M, up to which the damping (3.71) only damps; sampled, it is unstable
-# from 2 on. Six axes of pfc_comau_6r leave the path by 0.41 mm at 1.56, by 0.06 mm at 0.3
-FASTEST_DAMPING = 0.3
-
-
-@dataclass
-class ActuationOptions:
-    """What some of the actuation models need besides the robot.
-
-    Attributes:
-        sampling_time: Sampling time ``T_s`` of the controller [s] (``visco_elastic``,
-            ``elastic``); 0 for a continuous controller.
-        boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], shape (N,)
-            (``singular_perturbation``).
-        leads_torque: Whether torques lead to the middle of their hold (``rigid``), as those of the
-            sampled elastic laws always do.
-    """
-
-    sampling_time: float = 1e-3
-    boundary_layer_damping: np.ndarray | None = None
-    leads_torque: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,7 +73,7 @@ def linearize(
 
     Args:
         robot: The robot.
-        law: Actuation model that the law is made for, a key of ``RELATIVE_DEGREE``.
+        law: Actuation model that the law is made for, a key of ``LAWS``.
         manifold: What to follow; its order is the relative degree of the law.
         options: What the actuation model needs besides.
 
@@ -111,11 +81,13 @@ def linearize(
         InputError: If the law is unknown, or does not suit the robot or the manifold.
     """
     options = options or ActuationOptions()
-    if law not in RELATIVE_DEGREE:
-        raise InputError(f"law '{law}': unknown; allowed are {', '.join(RELATIVE_DEGREE)}")
-    if options.leads_torque and law != "rigid":
-        raise InputError(f"law '{law}': torques lead with the law 'rigid' only")
-    r, n, m = RELATIVE_DEGREE[law], robot.dimension, len(manifold.coordinates)
+    if law not in LAWS:
+        raise InputError(f"law '{law}': unknown; allowed are {', '.join(LAWS)}")
+    record = LAWS[law]
+    if options.leads_torque and not record.can_lead:
+        leading = [name for name, known in LAWS.items() if known.can_lead]
+        raise InputError(f"law '{law}': torques lead with the law '{leading[0]}' only")
+    r, n, m = record.relative_degree, robot.dimension, len(manifold.coordinates)
     if manifold.layout.order != r:
         raise InputError(
             f"law '{law}': manifold of order {manifold.layout.order}; must be {r}, the relative "
@@ -126,9 +98,9 @@ def linearize(
         raise InputError(
             f"law '{law}': {n} joints for {m} outputs ({names}); there must be as many or more"
         )
-    lead = _MIDDLE if options.leads_torque else _LEAD.get(law, 0.0)
+    lead = _MIDDLE if options.leads_torque else record.lead
     ahead = lead if options.sampling_time > 0.0 else 0.0
-    on_motors = law == "rigid" and not robot.is_rigid
+    on_motors = record.on_motors and not robot.is_rigid
     velocity = slice(3 * n, 4 * n) if on_motors else slice(n, 2 * n)
     function = _linearizing_function(robot, law, manifold, options)
     return Linearization(function, r, manifold, n, ahead, velocity)
@@ -139,13 +111,13 @@ def _linearizing_function(
     robot: RobotModel, law: str, manifold: Manifold, options: ActuationOptions
 ) -> ca.Function:
     """Return the function of a :class:`Linearization`."""
-    r, n = RELATIVE_DEGREE[law], robot.dimension
+    r, n = LAWS[law].relative_degree, robot.dimension
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
     point = ca.SX.sym("manifold_point", manifold.layout.size)
     progress = ca.SX.sym("progress", (r + 1) * tangential_count(manifold))
     external = ca.vertsplit(tau_ext, n) if r > 1 else []
     q_J, v_J, q_M, v_M = ca.vertsplit(state, n)
-    motion = _driven_motion(robot, law, DriveState(q_J, v_J, q_M, v_M, external), options)
+    motion = LAWS[law].drive(robot, DriveState(q_J, v_J, q_M, v_M, external), options)
     rows = [ca.vertsplit(row) for row in ca.vertsplit(progress, tangential_count(manifold))]
     lead = [Jet.from_derivatives(column) for column in zip(*rows, strict=True)]
 
@@ -219,50 +191,3 @@ def tangential_count(manifold: Manifold) -> int:
 def _standing(manifold: Manifold) -> list[Jet]:
     """Return references of tangential coordinates that stand at zero."""
     return [Jet([ca.SX(0)] * (manifold.layout.order + 1))] * tangential_count(manifold)
-
-
-def _driven_motion(
-    robot: RobotModel, law: str, state: DriveState, options: ActuationOptions
-) -> DrivenMotion:
-    if law in ("visco_elastic", "elastic") and not 0.0 <= options.sampling_time < np.inf:
-        raise InputError(
-            f"sampling_time: {options.sampling_time}; must be zero or a positive number of seconds"
-        )
-    if law == "visco_elastic":
-        if options.sampling_time == 0.0 and not np.all(robot.K_d > 0.0):
-            raise InputError(
-                f"joint damping: {robot.K_d}; the law 'visco_elastic' needs positive values "
-                "when sampling_time is 0"
-            )
-        return actuation.visco_elastic(robot, state, options.sampling_time)
-    if law == "elastic":
-        return actuation.elastic(robot, state, options.sampling_time)
-    if law == "singular_perturbation":
-        damping = options.boundary_layer_damping
-        if damping is None or np.shape(damping) != (robot.dimension,) or not np.min(damping) > 0:
-            raise InputError(
-                f"controller.boundary_layer_damping: {damping}; the law 'singular_perturbation' "
-                f"needs {robot.dimension} positive values [s], {_damping_hint(robot, options)}"
-            )
-        return actuation.singular_perturbation(robot, state, damping)
-    if law == "rigid":
-        return actuation.rigid(robot, state, changes=options.leads_torque)
-    return actuation.velocity_servo(robot, state)
-
-
-def _damping_hint(robot: RobotModel, options: ActuationOptions) -> str:
-    """Return values of ``epsilon D_b`` to begin with.
-
-    They damp each motor against a link that stands still by sqrt(1/2), where sampling allows that
-    much.
-    """
-    elastic = robot.elastic_joints
-    if not elastic.any():
-        return "and elastic joints"
-    K_s, D_M = robot.K_s[elastic], robot.D_M[elastic]
-    damping = np.sqrt(2.0 * D_M / K_s)
-    if options.sampling_time > 0.0:
-        damping = np.minimum(damping, FASTEST_DAMPING * D_M / (K_s * options.sampling_time))
-    values = np.full(robot.dimension, damping.min())
-    values[elastic] = damping
-    return f"perhaps [{', '.join(f'{value:.2g}' for value in values)}]"

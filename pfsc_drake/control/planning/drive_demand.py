@@ -10,17 +10,10 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.actuation import joint_jets
+from pfsc_drake.control.law.laws import LAWS
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 
-# highest derivative of the joint coordinates that decides over the drives' torques, by law
-_DERIVATIVES = {
-    "velocity_servo": 2,
-    "rigid": 2,
-    "singular_perturbation": 3,
-    "visco_elastic": 4,
-    "elastic": 4,
-}
 # at constant speed everything is a polynomial of the speed of this degree
 _DEGREE = 4
 
@@ -79,7 +72,7 @@ class DriveDemand:
         viscous: np.ndarray | None = None,
         boundary_layer_damping: np.ndarray | None = None,
     ) -> None:
-        self.derivatives = _DERIVATIVES[law]
+        self.derivatives = LAWS[law].demand_order
         self._function = BoundFunction(
             _demand_function(robot, law, viscous, boundary_layer_damping)
         )
@@ -124,16 +117,17 @@ def _demand_function(
     boundary_layer_damping: np.ndarray | None,
 ) -> ca.Function:
     """Return ``motion -> demand``, see :class:`DriveDemand`, shapes ((K + 1) N,) and (2N,)."""
-    derivatives, n = _DERIVATIVES[law], robot.dimension
+    record, n = LAWS[law], robot.dimension
+    derivatives = record.demand_order
     motion = ca.SX.sym("motion", (derivatives + 1) * n)
     q = ca.vertsplit(motion, n)
     jets = robot.inverse_dynamics(joint_jets(q))
     tau_J = [ca.vertcat(*[tau.derivative(k) for tau in jets]) for k in range(derivatives - 1)]
     velocity, acceleration, fast = q[1], q[2], ca.SX(n, 1)
-    if law in ("visco_elastic", "elastic"):
+    if record.inverts_springs:
         K_s = ca.DM(robot.K_s)
         velocity, acceleration = velocity + tau_J[1] / K_s, acceleration + tau_J[2] / K_s
-    elif law == "singular_perturbation":
+    elif record.damps_springs:
         assert boundary_layer_damping is not None  # the law has refused that
         elastic = robot.elastic_joints
         fast = -ca.DM(np.where(elastic, boundary_layer_damping, 0.0)) * tau_J[1]

@@ -14,7 +14,7 @@ from pfsc_drake.checks import (
 )
 from pfsc_drake.control.estimation.link_deviation import StateUncertainty
 from pfsc_drake.control.law.following_law import BEYOND_END_RANGE, MAX_BEYOND_END
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import LAWS, Law
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.yaml.reading import NAME_OR_FILE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_FOR_ALL
@@ -281,16 +281,21 @@ class ControllerParameters:
     delay: float | None = None
     torque_lead: bool = False
 
+    @property
+    def law_record(self) -> Law:
+        """What follows from the choice of the law."""
+        return LAWS[self.law]
+
     def __post_init__(self) -> None:
         require_one_of("state", self.state, STATES)
         require_positive("state_bandwidth", self.state_bandwidth)
         require_not_negative("delay", self.delay or 0.0)
-        require_one_of("law", self.law, RELATIVE_DEGREE)
+        require_one_of("law", self.law, LAWS)
         allowed = "false but with the law 'rigid'; the elastic laws lead their torques anyway"
-        require(self.law == "rigid" or not self.torque_lead, "torque_lead", True, allowed)
+        require(self.law_record.can_lead or not self.torque_lead, "torque_lead", True, allowed)
         require_one_of("manifold", self.manifold, MANIFOLDS)
         for law in self.gains:
-            require_one_of("gains", law, RELATIVE_DEGREE)
+            require_one_of("gains", law, LAWS)
         in_range = 1e-5 <= self.sampling_time <= 0.1
         require(
             in_range, "sampling_time", self.sampling_time, "a positive number from 1e-5 to 0.1 s"

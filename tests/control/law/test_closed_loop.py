@@ -8,7 +8,7 @@ closes the loop, the differential equation is integrated tightly, and the result
 import numpy as np
 import pytest
 
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.path import PathManifold
 from tests.control.law.closed_loop import ClosedLoop, assert_linear_dynamics, simulate, start
 from tests.control.manifolds.surfaces import euler_difference, path_on_cylinder

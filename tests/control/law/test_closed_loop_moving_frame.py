@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, MovingFrameManifold
 from pfsc_drake.control.manifolds.path import PathManifold
 from tests.control.law.closed_loop import (

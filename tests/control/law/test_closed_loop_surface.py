@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator

@@ -6,7 +6,7 @@ import pytest
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.exact_linearization import ExactLinearization
 from pfsc_drake.control.law.joint_jet import JointJet
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from tests.control.law.closed_loop import rest_of_state
 
 CASES = {

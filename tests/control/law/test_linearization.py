@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.law.linearization import (
-    RELATIVE_DEGREE,
-    ActuationOptions,
-    decoupling_function,
-    linearize,
-)
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE, ActuationOptions
+from pfsc_drake.control.law.linearization import decoupling_function, linearize
 from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError

@@ -6,7 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.actuation import joint_jets
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, decoupling_function
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
+from pfsc_drake.control.law.linearization import decoupling_function
 from pfsc_drake.control.manifolds.manifold import manifold_force_function
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import (

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.law.linearization import (
-    RELATIVE_DEGREE,
-    ActuationOptions,
-    linearize,
-)
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE, ActuationOptions
+from pfsc_drake.control.law.linearization import linearize
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind

@@ -7,7 +7,8 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
+from pfsc_drake.control.law.linearization import linearize
 from pfsc_drake.control.manifolds.orientation import ToolOrientation
 from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, path_coordinates
 from pfsc_drake.geometry import (

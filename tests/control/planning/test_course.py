@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.planning.course import CourseFinder, CourseStart

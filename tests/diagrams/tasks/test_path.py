@@ -18,7 +18,7 @@ from diagrams.scenario import (
 from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.surface import followed_angles
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import shape_report
 from pfsc_drake.geometry.paths.path_warnings import path_warnings

@@ -7,7 +7,7 @@ from diagrams.scenario import Intersection, PathParameters
 from diagrams.scenario.surface import Extruded
 from diagrams.scenario.surface_shapes import Plane, Sphere, Torus
 from diagrams.tasks.path import make_path
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 
 
 def make(shape, law="rigid", folder=None):

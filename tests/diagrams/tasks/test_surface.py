@@ -16,7 +16,7 @@ from diagrams.tasks.surface import (
     make_surface_manifold,
     surface_from_shape,
 )
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix
 from tests.experiments import scanned_panel as panel
