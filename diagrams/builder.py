@@ -45,7 +45,6 @@ from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.obstacles import add_obstacles, add_told_obstacles
 from diagrams.surroundings.operator import add_operator
-from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.held_frame import law_manifold
 from diagrams.tasks.streaming import StreamTask
 from diagrams.tasks.waiting import Approach, plan_waiting
@@ -55,6 +54,7 @@ from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.following.assembly import ControllerAssembly
 from pfsc_drake.following.law import make_law
 from pfsc_drake.following.law_warnings import MODES
+from pfsc_drake.following.planning.drive_limits import keep_drive_limits
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess

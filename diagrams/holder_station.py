@@ -33,9 +33,7 @@ from diagrams.station_parts import (
 from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.held_reaction import HeldReaction, add_held_reaction
-from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.held_frame import HeldFrame
-from diagrams.tasks.motion_demand import MotionDemand
 from diagrams.tasks.planned_frame import planned_frame
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Hold
@@ -50,6 +48,8 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.assembly import ControllerAssembly
 from pfsc_drake.following.fault_description import FaultScene, FoundFault, describe
 from pfsc_drake.following.law import make_law
+from pfsc_drake.following.planning.drive_limits import keep_drive_limits
+from pfsc_drake.following.planning.motion_demand import MotionDemand
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.robot_model import pose_function

@@ -103,6 +103,7 @@ from pfsc_drake.following.options.friction import (
 from pfsc_drake.following.options.friction import (
     KalmanParameters as KalmanParameters,
 )
+from pfsc_drake.following.options.motion import MotionLimits as MotionLimits
 from pfsc_drake.following.path_following import add_path_following as add_path_following
 from pfsc_drake.following.streaming import add_path_streaming as add_path_streaming
 from pfsc_drake.following.surface_following import add_surface_following as add_surface_following

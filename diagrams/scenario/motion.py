@@ -9,9 +9,9 @@ from diagrams.scenario.checks import (
     require,
     require_between,
     require_numbers,
-    require_one_of,
 )
 from pfsc_drake.control.law.swing import Swing
+from pfsc_drake.following.options.motion import MotionLimits
 from pfsc_drake.yaml.typed import NUMBERS_OR_END, ONE_FOR_ALL, equal
 
 # beyond, durations have no digits left, or none at all
@@ -21,9 +21,6 @@ _FARTHEST = 1e6  # m, many rounds of a closed path
 _LONGEST_REST = 1e6  # s
 _SHORTEST_REST = 1e-6  # s
 _TRANSITIONS = (1e-3, 1e3)  # s
-_LIMITS = ("respect", "warn")
-_SPEEDS = ("asked", "fastest")
-_VELOCITY = 0.1  # m/s
 
 
 @dc.dataclass
@@ -45,7 +42,7 @@ class SecondReference:
 
 
 @dc.dataclass
-class ReferenceParameters:
+class ReferenceParameters(MotionLimits):
     """Motion along the path, or along a surface, resting at every point.
 
     Attributes:
@@ -74,16 +71,9 @@ class ReferenceParameters:
     points: list[float | str] = dc.field(
         default_factory=lambda: [0.0, 0.1], metadata=NUMBERS_OR_END
     )
-    velocity: float | None = None
-    acceleration: float = 1.0
-    dwell: float = 0.3
     swings: list[Swing] = dc.field(default_factory=list)
     places: list[list[float]] = dc.field(default_factory=list)
     second: SecondReference | None = None
-    limits: str = "respect"
-    reserve: float = 0.3
-    speed: str = "asked"
-    torque_rate: float = 1000.0
 
     def __post_init__(self) -> None:
         _check_motion(self)
@@ -97,10 +87,7 @@ class ReferenceParameters:
         good = self.dwell == 0.0 or _SHORTEST_REST <= self.dwell <= _LONGEST_REST
         allowed = f"zero or a positive number, {_SHORTEST_REST:g} to {_LONGEST_REST:g} s"
         require(good, "dwell", self.dwell, allowed)
-        require_one_of("limits", self.limits, _LIMITS)
-        require(0.0 <= self.reserve < 1.0, "reserve", self.reserve, "from 0 to below 1")
-        require_one_of("speed", self.speed, _SPEEDS)
-        require(self.torque_rate > 0.0, "torque_rate", self.torque_rate, "a positive number")
+        super().__post_init__()
         if self.speed == "fastest":
             self._check_fastest()
 
@@ -109,11 +96,6 @@ class ReferenceParameters:
         allowed = "none with speed: fastest"
         require(self.second is None, "second", "given", f"{allowed}; write places")
         require(not self.swings, "swings", f"{len(self.swings)} given", allowed)
-
-    @property
-    def largest_velocity(self) -> float:
-        """Largest velocity of a motion as it is asked for [m/s]."""
-        return _VELOCITY if self.velocity is None else self.velocity
 
     def arc_lengths(self, length: float | None) -> list[float]:
         """Return the points [m].

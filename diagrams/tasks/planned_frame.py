@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagrams.tasks.motion_demand import MotionDemand
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.planning.motion_demand import MotionDemand
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.robot_model import pose_function
 

@@ -8,7 +8,6 @@ import numpy as np
 from diagrams.scenario import ReferenceParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.obstacles import CrossingParameters
-from diagrams.tasks.drive_limits import DrivePlanner
 from diagrams.tasks.path_following import TrajectoryTask
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
@@ -18,6 +17,7 @@ from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.planning.drive_limits import DrivePlanner
 from pfsc_drake.following.waiting import COURSE_STEP, JointCourse, Waiting, waiting_motion
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain

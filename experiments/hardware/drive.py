@@ -27,10 +27,10 @@ from experiments.hardware.drive_options import (
 from experiments.hardware.drive_record import DrivenTick, DriveRecord
 from experiments.hardware.told_obstacles import ToldObstacles
 from experiments.simulation import SimulationResult
-from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
+from pfsc_drake.physics.driver import torque_rates
 from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6

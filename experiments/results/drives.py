@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.station import Station
-from diagrams.tasks.task import DrivePlan
 from experiments.results.fastest import fastest_metrics
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.estimation.momentum import drive_momentum
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.supervision import DRIVE_MEMORY
+from pfsc_drake.following.planning.drive_plan import DrivePlan
 from pfsc_drake.robot.coordinate_text import coordinate_text
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from reporting.metrics import Metrics

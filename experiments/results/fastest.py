@@ -3,10 +3,10 @@
 import numpy as np
 
 from diagrams.scenario import ReferenceParameters
-from diagrams.tasks.task import DrivePlan
 from experiments.results.run_log import FloatArray, RunLog, Signal
 from pfsc_drake.control.planning.limiting import KINDS
-from pfsc_drake.drivers.driver_rules import torque_rates
+from pfsc_drake.following.planning.drive_plan import DrivePlan
+from pfsc_drake.physics.driver import torque_rates
 from reporting.metrics import Metrics
 
 

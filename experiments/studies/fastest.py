@@ -16,13 +16,13 @@ from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.station_parts import make_task
 from diagrams.station_start import find_rest
-from diagrams.tasks.fastest_motion import FastestPlanner
-from diagrams.tasks.task import DrivePlan
 from experiments.scenario_file import find_scenario, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import RunRow
 from pfsc_drake.control.planning.course import CourseStart
+from pfsc_drake.following.planning.drive_plan import DrivePlan
+from pfsc_drake.following.planning.fastest_motion import FastestPlanner
 from pfsc_drake.geometry import FourierCurve
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import open_results

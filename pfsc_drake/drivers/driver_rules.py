@@ -7,9 +7,7 @@ import numpy as np
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.driver import low_pass_share
-
-_OF_EFFORT = 10.0  # 1/s
+from pfsc_drake.physics.driver import low_pass_share, torque_rates
 
 
 @dataclass(frozen=True)
@@ -34,16 +32,6 @@ class DriverOptions:
         require_between("--low-pass", self.low_pass, 0.0, 1e5, "Hz")
         require_between("torque_rate", self.torque_rate, 1e-3, 1e9, "Nm/s")
         require_between("--damping", self.damping, 0.0, 1e4, "1/s")
-
-
-def torque_rates(rate: float, effort: np.ndarray) -> np.ndarray:
-    """Return how fast torques may change [Nm/s], shape (N,).
-
-    Args:
-        rate: Of joints like a Panda's [Nm/s].
-        effort: Largest torques [Nm], shape (N,).
-    """
-    return np.maximum(rate, _OF_EFFORT * np.where(np.isfinite(effort), effort, 0.0))
 
 
 class DriverRules:

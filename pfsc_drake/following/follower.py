@@ -20,6 +20,7 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import SampledRobot
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, MovingFrameManifold, frame_size
+from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.control.streams.messages import WaypointLayout
 from pfsc_drake.errors import InputError, require, require_one_of
 from pfsc_drake.following.assembly import ControllerAssembly, acts_on_motors
@@ -35,7 +36,9 @@ from pfsc_drake.following.options.controller import (
     LawGains,
 )
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.task import Followed
+from pfsc_drake.following.options.motion import MotionLimits
+from pfsc_drake.following.planning.drive_limits import keep_drive_limits
+from pfsc_drake.following.task import Followed, Task
 from pfsc_drake.following.unused_options import refuse_unused
 from pfsc_drake.following.waiting import plan_waiting
 from pfsc_drake.geometry.rotation import check_rotation_matrix
@@ -49,6 +52,8 @@ Ports = dict[str, OutputPort]
 _logger = logging.getLogger("pfsc_drake")
 # what sentences on faults tell of besides
 _DESCRIBED = ("reference", "manifold_force", "press")
+# samples of a motion whose largest rates are looked for, and the least of these [m/s, m/s^2]
+_SAMPLES, _SLOWEST = 2001, 1e-6
 # names of outputs, and of what they put out
 _OUTPUTS = {name: name for name in ("reference", "manifold_force", "limit_force", "mode", "guides")}
 _OUTPUTS |= {"record": "guidance", "stream": "stream", "watch": "watch"}
@@ -160,6 +165,11 @@ class Follower(Diagram):
         self.period = chosen.sampling_time
         rest = RestPosture(self.start_posture, point)
         self.law = make_law(chosen, self.robot, manifold, lambda: rest, options.faults)
+        if options.reference is not None:
+            begun = CourseStart(self.start_posture, point[followed.place.layout.memory])
+            limits = _of_motion(options.reference, followed)
+            known = self.law, begun, options.friction
+            keep_drive_limits(limits, chosen, 0.0, followed, *known)
         self._builder = DiagramBuilder()
         self._wire(chosen, options)
         self._builder.BuildInto(self)
@@ -233,8 +243,10 @@ class Follower(Diagram):
         def sampled() -> SampledRobot:
             return sampled_robot(chosen, robot, law.linearization, rest, law.posture)
 
+        plan = self.followed.drive_plan
         return [
             *self.followed.warnings,
+            *([] if plan is None else plan.said),
             *law_warnings(chosen, robot, law, link_state, sampled),
             *observed_force_warnings(compliance, robot, law, rest),
         ]
@@ -351,6 +363,17 @@ class Follower(Diagram):
         measured = wrench.GetOutputPort("measured")
         made |= {"wrench_measured": measured} if sensed else {}
         return made | ({"wrench_ext": measured} if known else {})
+
+
+def _of_motion(limits: MotionLimits, task: Task) -> MotionLimits:
+    """Return limits with the velocity and the acceleration of a motion as it is asked for."""
+    assert task.motion is not None  # as refuse_unused requires
+    if limits.speed == "fastest":
+        return limits
+    times = np.linspace(*task.motion.domain, _SAMPLES)
+    rates = np.abs(task.motion.derivatives(times, 2)[:, 1:]).max(axis=(0, 2))
+    velocity, acceleration = np.maximum(rates, _SLOWEST).tolist()
+    return dc.replace(limits, velocity=velocity, acceleration=acceleration)
 
 
 def _frame_of(frame: np.ndarray, compliance: ComplianceParameters) -> np.ndarray:

@@ -133,7 +133,7 @@ def add_guidance(
         guided = Guided(place, fixtures, speeds, motion, lead, chosen.fixtures, guides)
         target = ToolTarget(y_t, R_e if oriented else None)
         return Followed(
-            place, Projector(place), None, target, place.point(y_t.tolist()), guided=guided
+            place, place, Projector(place), None, target, place.point(y_t.tolist()), guided=guided
         )
 
     follower = Follower(plant, tool, law, followed, chosen)

@@ -72,32 +72,39 @@ def add_path_following(
     def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         oriented = path.orientation is not None
         tracks = chosen.controller.manifold == MovingPoint.name
-        manifold = (MovingPoint if tracks else PathManifold)(
-            relative_degree,
-            oriented=oriented,
-            turning=path.frame.turns,
-            length=None if path.closed else path.length,
-        )
+
+        def made(kind: type[PathManifold]) -> PathManifold:
+            return kind(
+                relative_degree,
+                oriented=oriented,
+                turning=path.frame.turns,
+                length=None if path.closed else path.length,
+            )
+
+        place = made(PathManifold)
+        manifold = made(MovingPoint) if tracks else place
         evaluator = path.evaluator(relative_degree)
         eta = float(along.derivatives(np.array([along.domain[0]]), 0)[0, 0, 0])
         point = evaluator.evaluate_at(path.arc_length.parameter(eta))
         R_e = None
         if oriented:
             R_e = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
-        start = ToolTarget(point[manifold.layout.position][:3], R_e)
+        start, shape = ToolTarget(point[manifold.layout.position][:3], R_e), shape_report(path)
         return Followed(
             manifold,
+            place,
             Projector(evaluator),
             along,
             start,
             point,
             path_length=path.length,
             closed=path.closed,
-            projection=None if tracks else lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+            projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
             prescribed_point=TrajectoryPoint(path, relative_degree, len(manifold.coordinates))
             if tracks
             else None,
-            warnings=path_warnings(path, shape_report(path), "path_from_waypoints: "),
+            shape=shape,
+            warnings=path_warnings(path, shape, "path_from_waypoints: "),
         )
 
     follower = Follower(plant, tool, law, followed, chosen)

@@ -64,7 +64,9 @@ def add_path_streaming(
     def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         path = StreamedPath(start, stream or StreamParameters(), relative_degree)
         manifold = PathManifold(relative_degree, oriented=path.is_oriented)
-        return Followed(manifold, path.projector, None, path.target, path.point, streamed=path)
+        return Followed(
+            manifold, manifold, path.projector, None, path.target, path.point, streamed=path
+        )
 
     follower = Follower(plant, tool, law, followed, options or FollowerOptions())
     builder.AddSystem(follower)

@@ -69,7 +69,15 @@ def add_surface_following(
         point = evaluator(y_t.tolist(), list(theta), eta.tolist())
         R_e = manifold.orientation(point[None])[0] if manifold.is_oriented else None
         projector = Projector(evaluator, np.append([0.0, 0.0], eta))
-        return Followed(manifold, projector, motion, ToolTarget(y_t, R_e), point)
+        return Followed(
+            manifold,
+            manifold,
+            projector,
+            motion,
+            ToolTarget(y_t, R_e),
+            point,
+            projection=lambda y_t, memory: evaluator(y_t.tolist(), memory),
+        )
 
     follower = Follower(plant, tool, law, followed, chosen)
     builder.AddSystem(follower)

@@ -11,13 +11,15 @@ from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
-from pfsc_drake.control.manifolds.manifold import Manifold
+from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.control.manifolds.moving_point import TrajectoryPoint
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.planning.course import Projection
 from pfsc_drake.following.options.follower import FixtureOptions
+from pfsc_drake.following.planning.drive_plan import DrivePlan
 from pfsc_drake.following.streamed_path import StreamedPath
-from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
+from pfsc_drake.geometry.surfaces.regularity import SurfaceReport
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
 
@@ -50,26 +52,42 @@ class Task:
     Attributes:
         projector_name: Name of the system that finds the closest point.
         manifold: Manifold that the law linearizes; in its own frame, where that moves.
+        place: Manifold in whose coordinates the tool's position is measured: the same but where a
+            trajectory is tracked.
         motion: Tangential coordinates of the reference over time [m]; None where a hand guides the
             tool, and where waypoints come while it moves.
         warnings: Doubts about manifold and motion, one sentence each.
         guided: Regions and paths of a tool that a hand guides through space.
         streamed: Path whose waypoints come while the tool moves.
         prescribed_point: Block with the point that the law acts on, where time prescribes it.
+        shape: Numbers of the manifold that decide whether it can be followed, if they are known.
+        drive_plan: Demand of the motion on the drives, once it is planned.
     """
 
     projector_name: ClassVar[str] = "projector"
 
     manifold: Manifold
+    place: PlaceManifold
     motion: PiecewisePolynomialCurve | None
     warnings: Sequence[str] = ()
     guided: Guided | None = None
     streamed: StreamedPath | None = None
     prescribed_point: TrajectoryPoint | None = None
+    shape: ShapeReport | SurfaceReport | None = None
+    drive_plan: DrivePlan | None = None
 
     @property
     def projecting(self) -> Block:
         """Block that finds the closest point on the manifold."""
+        raise NotImplementedError
+
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Return the point of ``place`` next to a tool, shape (size,).
+
+        Args:
+            y_t: Tool point [m], shape (3,).
+            memory: Position from which it is looked for, as the projector remembers it.
+        """
         raise NotImplementedError
 
     @property
@@ -94,6 +112,7 @@ class Followed(Task):
 
     Attributes:
         manifold: See :class:`Task`.
+        place: See :class:`Task`.
         projector: Finds the closest point on it.
         motion: See :class:`Task`.
         start: Pose of the tool when the motion begins.
@@ -102,12 +121,14 @@ class Followed(Task):
         closed: Whether the path is closed.
         guided: See :class:`Task`.
         streamed: See :class:`Task`.
-        projection: Finds the closest point on a path beforehand.
+        projection: Finds the closest point on the manifold beforehand.
         prescribed_point: See :class:`Task`.
+        shape: See :class:`Task`.
         warnings: See :class:`Task`.
     """
 
     manifold: Manifold
+    place: PlaceManifold
     projector: Block
     motion: PiecewisePolynomialCurve | None
     start: ToolTarget
@@ -118,12 +139,18 @@ class Followed(Task):
     streamed: StreamedPath | None = None
     projection: Projection | None = None
     prescribed_point: TrajectoryPoint | None = None
+    shape: ShapeReport | SurfaceReport | None = None
     warnings: Sequence[str] = ()
 
     @property
     def projecting(self) -> Block:
         """Block that finds the closest point on the manifold."""
         return self.projector
+
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Return the point of ``place`` next to a tool, shape (size,)."""
+        assert self.projection is not None  # as the motion is known beforehand
+        return self.projection(y_t, memory)
 
     @property
     def lap(self) -> float | None:

@@ -17,6 +17,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import GainParameters
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.options.motion import MotionLimits
 from pfsc_drake.following.task import Followed
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -61,6 +62,7 @@ def refuse_unused(
         *_friction_rules(options, law),
         *_compliance_rules(options.compliance, followed, kinds),
         *_motion_rules(followed),
+        *_plan_rules(options, followed),
         *_fixture_rules(options, law, followed),
         Rule(
             "bandwidth",
@@ -74,6 +76,8 @@ def refuse_unused(
                 shown = value if isinstance(value, str | float | int | list) else "given"
                 raise InputError(f"{key} = {shown}: has no effect; {rule.reason}")
     _refuse_unused_gains(options, law, used)
+    if options.reference is not None:
+        _refuse_unused_limits(options.reference)
 
 
 def _changed(value: Any, default: Any, key: str = "") -> Iterator[tuple[str, Any]]:
@@ -237,6 +241,23 @@ def _motion_rules(followed: Followed) -> list[Rule]:
         Rule("swings", followed.guided is None and not tracks, "needs a path or surface"),
         Rule("transition", not tracks, "the reference of a trajectory is a point that moves"),
     ]
+
+
+def _plan_rules(options: FollowerOptions, followed: Followed) -> list[Rule]:
+    motion = "needs a path or surface at rest with a motion over time, and no stream"
+    planned = followed.motion is not None and options.stream is None and options.frame is None
+    return [Rule("reference", planned and not options.swings, motion)]
+
+
+def _refuse_unused_limits(limits: MotionLimits) -> None:
+    """Refuse numbers of a motion that is as it is asked for."""
+    fastest = limits.speed == "fastest"
+    unused = {"velocity": fastest, "dwell": fastest, "torque_rate": fastest, "acceleration": False}
+    for key, is_used in unused.items():
+        given = getattr(limits, key)
+        if not is_used and given != getattr(MotionLimits(), key):
+            reason = "the motion has its own" if key == "acceleration" else "needs speed fastest"
+            raise InputError(f"reference.{key} = {given:g}: has no effect; {reason}")
 
 
 def _fixture_rules(options: FollowerOptions, law: str, followed: Followed) -> list[Rule]:

@@ -195,7 +195,9 @@ def plan_waiting(
     law, obstacles, motion = named[0], options.obstacles, followed.motion
     assert obstacles is not None
     allowed = "None unless a path at rest is followed by a motion over time, without yielding"
-    waits = motion is not None and followed.projection is not None and options.stream is None
+    manifold = followed.manifold
+    on_path = isinstance(manifold, PathManifold) and not manifold.follows_time
+    waits = motion is not None and on_path and options.stream is None
     waits = waits and options.frame is None and not options.compliance.is_given
     waits = waits and not options.swings
     require(waits, "obstacles", "given", allowed)

@@ -1,9 +1,13 @@
-"""What a drive makes of the torques that it is told: the low pass."""
+"""Driver model: low pass and rates of commanded torques."""
 
 import math
 from typing import Any
 
+import numpy as np
+
 from pfsc_drake.blocks.block import Block, Port, Values
+
+_OF_EFFORT = 10.0  # 1/s
 
 
 def low_pass_share(cutoff: float, period: float) -> float:
@@ -15,6 +19,16 @@ def low_pass_share(cutoff: float, period: float) -> float:
     """
     w = 2.0 * math.pi * cutoff * period
     return w / (1.0 + w) if cutoff > 0.0 else 1.0
+
+
+def torque_rates(rate: float, effort: np.ndarray) -> np.ndarray:
+    """Return how fast torques may change [Nm/s], shape (N,).
+
+    Args:
+        rate: Of joints like a Panda's [Nm/s].
+        effort: Largest torques [Nm], shape (N,).
+    """
+    return np.maximum(rate, _OF_EFFORT * np.where(np.isfinite(effort), effort, 0.0))
 
 
 class DriveLowPass(Block):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.drivers.driver_rules import DriverOptions, DriverRules, torque_rates
+from pfsc_drake.drivers.driver_rules import DriverOptions, DriverRules
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.driver import torque_rates
 
 PERIOD = 1e-3
 STILL = np.zeros(2)

@@ -13,6 +13,7 @@ from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.options.motion import MotionLimits
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 
@@ -154,6 +155,8 @@ class FollowerOptions:
         frame: Of a path or surface that moves: the pose of its frame at the start, ``[p_WC, R_WC
             by rows]``, shape (12,) [m, 1]; there is a port for the motion then. None if it rests.
         swings: Oscillations of the manifold along its normals (5.1), (5.2).
+        reference: What the motion may take of the drives: where it takes more it is slowed, or
+            there is a warning; or it is made as fast as they allow. None to leave it as it is.
     """
 
     bandwidth: float = BANDWIDTH
@@ -169,3 +172,4 @@ class FollowerOptions:
     measures: str = "plant_state"
     frame: np.ndarray | None = None
     swings: list[Swing] = dc.field(default_factory=list)
+    reference: MotionLimits | None = None

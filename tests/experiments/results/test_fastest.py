@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import ReferenceParameters
-from diagrams.tasks.task import DrivePlan
 from experiments.figures.fastest import draw_fastest
 from experiments.results.drives import plan_metrics
 from experiments.results.fastest import add_limits, given_metrics, rate_warnings
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.planning.limiting import Limiting
+from pfsc_drake.following.planning.drive_plan import DrivePlan
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 
 STEP, LIMITS = 0.01, np.array([10.0, 20.0, 3.0, 3.0])

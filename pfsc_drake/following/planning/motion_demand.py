@@ -4,8 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from diagrams.scenario import ReferenceParameters
-from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.planning.course import CourseError, CourseFinder, CourseStart
 from pfsc_drake.control.planning.drive_demand import (
@@ -16,6 +14,8 @@ from pfsc_drake.control.planning.drive_demand import (
 )
 from pfsc_drake.following.fault_description import describe_singularity
 from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.options.motion import MotionLimits
+from pfsc_drake.following.task import Task
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.robot_model import largest_speeds
@@ -50,7 +50,7 @@ class MotionDemand:
 
     def __init__(
         self,
-        reference: ReferenceParameters,
+        reference: MotionLimits,
         controller: ControllerParameters,
         task: Task,
         law: FollowingLaw,
@@ -77,6 +77,12 @@ class MotionDemand:
         # of speeds only servos run short; with torques, nothing but the motion decides over them
         of_speeds = reserve if law.linearization.relative_degree == 1 else _SPEED_RESERVE
         self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
+
+    @property
+    def _motion(self) -> PiecewisePolynomialCurve:
+        """Motion that is planned."""
+        assert self._task.motion is not None  # else a hand guides the tool, or waypoints come
+        return self._task.motion
 
     def course_of(
         self,

@@ -6,8 +6,6 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import maximum_filter1d
 
-from diagrams.tasks.motion_demand import MotionDemand
-from diagrams.tasks.task import DrivePlan
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.planning.demand_polynomial import DemandPolynomial
 from pfsc_drake.control.planning.drive_demand import find_pace
@@ -15,10 +13,12 @@ from pfsc_drake.control.planning.fastest_pace import PaceLimits, find_fastest_pa
 from pfsc_drake.control.planning.limiting import Limiting
 from pfsc_drake.control.planning.moves import Move, one_after_another, straight_moves
 from pfsc_drake.control.planning.pace_spline import PaceSpline
-from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.planning.drive_plan import DrivePlan
+from pfsc_drake.following.planning.motion_demand import MotionDemand
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.physics.driver import torque_rates
 
 # s, between the knots of a pace: at first, and at last unless a motion has more; of one move
 _COARSE, _FINE, _FINEST, _KNOTS = 16e-3, 4e-3, 2e-3, (200, 1000)
@@ -91,7 +91,7 @@ class FastestPlanner(MotionDemand):
     @once_per_content()
     def _plan(self, finer: int, tell: _Listener) -> DrivePlan:
         tell(0.0)
-        moves = self._first(straight_moves(self._task.motion, self.demand.derivatives + 1))
+        moves = self._first(straight_moves(self._motion, self.demand.derivatives + 1))
         tight = [np.ones((2, 2))] * len(moves)
         tell(0.05)
         moves = self._faster(moves, _COARSE, tight, 0.0)

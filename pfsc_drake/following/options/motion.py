@@ -1,0 +1,47 @@
+"""How a motion is adapted to the drives."""
+
+import dataclasses as dc
+
+from pfsc_drake.errors import require, require_one_of
+
+_LIMITS = ("respect", "warn")
+_SPEEDS = ("asked", "fastest")
+_VELOCITY = 0.1  # m/s
+
+
+@dc.dataclass(kw_only=True)
+class MotionLimits:
+    """What a motion may take of the drives.
+
+    Attributes:
+        velocity: Largest velocity [m/s]; None for 0.1, and with ``speed`` = ``fastest`` for any.
+        acceleration: Largest acceleration [m/s^2]; with ``fastest`` the drives decide.
+        dwell: Rest before, between and after the moves [s].
+        limits: ``respect``: where the drives, by the nominal model, could not follow, the motion is
+            slowed; ``warn``: there is a warning.
+        reserve: Share of the drives' torques, and of the speeds of velocity servos, that the motion
+            leaves, from 0 to below 1.
+        speed: ``asked``: as velocity and acceleration say; ``fastest``: in the least time in which
+            the drives can follow, all but the reserve.
+        torque_rate: With ``fastest`` the largest rate of the drives' torques [Nm/s], of strong ones
+            ten times their largest torque in a second; infinite for any.
+    """
+
+    velocity: float | None = None
+    acceleration: float = 1.0
+    dwell: float = 0.3
+    limits: str = "respect"
+    reserve: float = 0.3
+    speed: str = "asked"
+    torque_rate: float = 1000.0
+
+    def __post_init__(self) -> None:
+        require_one_of("limits", self.limits, _LIMITS)
+        require(0.0 <= self.reserve < 1.0, "reserve", self.reserve, "from 0 to below 1")
+        require_one_of("speed", self.speed, _SPEEDS)
+        require(self.torque_rate > 0.0, "torque_rate", self.torque_rate, "a positive number")
+
+    @property
+    def largest_velocity(self) -> float:
+        """Largest velocity of a motion as it is asked for [m/s]."""
+        return _VELOCITY if self.velocity is None else self.velocity

@@ -1,0 +1,1 @@
+"""Motions that drives can follow: demand, slowing down, the fastest."""
