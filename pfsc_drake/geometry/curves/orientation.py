@@ -20,7 +20,7 @@ _SAME_ROTATION = 1e-6
 class OrientationCurve(Curve):
     """Orientation sigma_r(theta) as a curve of quaternions that need not have length one.
 
-    R(theta) = H(q(theta)) / |q(theta)|^2 with H homogeneous of degree two is as smooth as
+    ``R(theta) = H(q(theta)) / |q(theta)|^2`` with H homogeneous of degree two is as smooth as
     q and free of representation singularities, unlike the Euler angles of section 3.1.
     The period of a closed one may be two laps of the path: quaternions of the two laps
     then differ in sign, the orientations do not.
@@ -29,7 +29,7 @@ class OrientationCurve(Curve):
         curve: Quaternions (w, x, y, z), a curve of dimension 4.
 
     Raises:
-        InputError: dimension other than 4, or |q| <= 0.1 somewhere.
+        InputError: dimension other than 4, or ``|q| <= 0.1`` somewhere.
     """
 
     def __init__(self, curve: Curve) -> None:
@@ -112,7 +112,7 @@ def interpolate_orientation(
 
     Raises:
         InputError: values not finite or zero, neighbours more than 170 degrees apart, a
-            closed curve whose last keyframe is not the first, or |q| <= 0.1 in between.
+            closed curve whose last keyframe is not the first, or ``|q| <= 0.1`` in between.
     """
     q = _normalize(np.array(quaternions, dtype=float))
     check_smoothness(smoothness)

@@ -81,7 +81,7 @@ class PiecewisePolynomialCurve(Curve):
             end: Last point [dimension], m.
 
         Returns:
-            Open curve on the domain [0, |end - start|], m.
+            Open curve on the domain ``[0, |end - start|]``, m.
 
         Raises:
             InputError: the points coincide or are not finite.

@@ -63,7 +63,7 @@ class Region(ABC):
     """A part of space whose boundary a tool must not cross, at rest (Sec. 5.1.1).
 
     The distance is that to the nearest point of the whole boundary, not one found from a guess. So
-    it is 1-Lipschitz: a tool that moved by dz is not nearer than h - |dz|.
+    it is 1-Lipschitz: a tool that moved by dz is not nearer than ``h - |dz|``.
     """
 
     @abstractmethod
