@@ -94,6 +94,7 @@ def fixture_loop():
     return loop
 
 
+@pytest.mark.slow
 def test_closed_loop(benchmark):
     loop = Loop()
     benchmark.pedantic(

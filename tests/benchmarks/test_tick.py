@@ -187,6 +187,7 @@ def fixture_chain(request):
     return Chain(*CASES[request.param])
 
 
+@pytest.mark.slow(but="6R elastic oriented with all")
 def test_whole_tick(chain, benchmark):
     before = chain.tick().copy()
     drive = benchmark.pedantic(chain.tick, setup=chain.remember, rounds=3000, warmup_rounds=50)

@@ -85,6 +85,7 @@ def test_a_second_station_shares_functions_and_nothing_that_changes(settings, st
     assert again.diagram is not station.diagram
 
 
+@pytest.mark.slow
 def test_a_station_that_differs_in_one_number_has_functions_of_its_own(settings, station):
     settings.controller.max_alpha = np.nextafter(settings.controller.max_alpha, 0.0)
     other = build_station(settings, Path())

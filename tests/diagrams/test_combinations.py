@@ -101,6 +101,7 @@ def test_a_slide_that_is_not_measured_spoils_the_compensation_but_not_what_is_bo
     assert np.linalg.norm(load[:3]) == pytest.approx(weight, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_hand_leads_a_delta_robot(delta):
     delta.compliance = soft()
     delta.compliance.tangential = CoordinateImpedance(Profile(1.0), Profile(30.0), Profile(0.0))

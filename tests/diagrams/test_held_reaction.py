@@ -80,6 +80,7 @@ def test_told_both_arms_stay_where_they_are_to_be(known):
         assert np.linalg.norm(log[name].values[late], axis=1).max() < 2e-6
 
 
+@pytest.mark.slow(but="holder")
 @pytest.mark.parametrize("untold", ["both", "holder"])
 def test_untold_the_tool_leaves_the_seam(known, untold):
     settings = grinding("known")
@@ -92,6 +93,7 @@ def test_untold_the_tool_leaves_the_seam(known, untold):
     assert off["xi"] > 0.1e-3
 
 
+@pytest.mark.slow
 def test_the_holder_is_told_what_the_other_ones_sensor_measures(known):
     """As it is seen at the workpiece's frame; it has no sensor of its own."""
     settings = grinding("measured")

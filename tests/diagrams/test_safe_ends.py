@@ -87,6 +87,7 @@ def test_a_sensor_of_an_elastic_joint(soft, kind, component):
     check_rest(station, result, times, log, degrees=6.0)
 
 
+@pytest.mark.slow(but="jump-v_J_6")
 @pytest.mark.parametrize(
     ("kind", "name"),
     [
@@ -123,6 +124,7 @@ def test_a_fault_while_a_hand_holds_the_elbow(seven):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_lost_frames_of_a_light_arms_bus(seven):
     settings = seven("pfc_panda_7r")
     settings.controller.law = "velocity_servo"
@@ -252,12 +254,14 @@ def test_a_joint_at_its_limit(six_axes, monkeypatch):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_a_drive_at_its_limit_for_long(soft):
     soft.controller.effort_scale, soft.faults.saturation_time = 0.05, 0.02
     _, result, *_ = go_on(soft, 0.5, after=0.0)
     assert result.fault.startswith(f"{Fault.DRIVE_SATURATED.explanation}: ")
 
 
+@pytest.mark.slow
 def test_three_free_turns_about_the_tools_axis(six_axes):
     """The reference turns on and on, and the angles with it."""
     compliance = six_axes.compliance
@@ -281,6 +285,7 @@ def test_three_free_turns_about_the_tools_axis(six_axes):
     assert np.abs(drive[300:]).max() < 600.0
 
 
+@pytest.mark.slow(but="1")
 @pytest.mark.parametrize("end", [0, 1])
 def test_at_the_end_of_an_open_path(load_exact_scenario, end):
     """Pushed against the end at 0.4 m/s, which is a wall; the tool turned on the way to it."""

@@ -49,6 +49,7 @@ def test_joints_so_soft_that_the_law_is_unstable(scenario):
     assert "unstable" in warning and "slower gains" in warning
 
 
+@pytest.mark.slow
 def test_stiff_joints_suit_both_laws():
     """Deviations of 0.1 mm and less at 0.3 m/s; with the printed damping 0.4 mm."""
     scenario = shipped_scenario("pfc_comau_6r")
@@ -63,6 +64,7 @@ def test_stiff_joints_suit_both_laws():
     assert warnings(scenario) == []
 
 
+@pytest.mark.slow
 def test_servos_faster_than_the_joints(scenario):
     scenario.controller.law = "velocity_servo"
     slow = GainParameters(poles=[-5.0])
@@ -179,6 +181,7 @@ def test_refused_ways_to_choose_poles(wrong, key):
         GainParameters(**wrong)
 
 
+@pytest.mark.slow
 def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
     """From 3.5 % (still) to 4 % (swings at 13 Hz) on, simulated with all masses too high."""
     scenario = shipped_scenario("vf_soft_circle")

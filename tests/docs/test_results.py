@@ -72,6 +72,7 @@ def test_what_was_run_is_kept_for_its_revision(tmp_path, monkeypatch):
     assert docs.results._kept(case, "a" * 40 + "+dirty") is None
 
 
+@pytest.mark.slow
 def test_two_scenarios(tmp_path, monkeypatch):
     monkeypatch.setattr(docs.results, "KEPT", tmp_path)
     monkeypatch.setattr(docs.results, "count_cores", lambda: 1)

@@ -148,6 +148,7 @@ def test_a_fault_is_told_and_kept(tmp_path):
     assert f"fault: {faulty.fault.split()[0]}" in again._repr_html_()
 
 
+@pytest.mark.slow
 def test_a_temporary_folder_is_gone_with_its_run():
     result = run(
         "pfc_elastic_3r", CHANGES, duration=0.01, figures=False, recording=False, quiet=True
@@ -159,6 +160,7 @@ def test_a_temporary_folder_is_gone_with_its_run():
     assert not folder.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_figures_and_recording_are_shown(tmp_path, notebook, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -272,6 +274,7 @@ def test_a_table_of_pandas(short):
     assert table.attrs["units"]["xi"] == "m"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_margins():
     told = margins(

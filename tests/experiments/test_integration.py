@@ -53,6 +53,7 @@ def whole_trials(monkeypatch):
     monkeypatch.setattr(integration, "_TICKS", TICKS)
 
 
+@pytest.mark.slow(but="pfc_elastic_3r-changes1-runge_kutta3-runge_kutta2")
 @pytest.mark.parametrize(
     ("name", "changes", "scheme", "without"),
     [
@@ -137,6 +138,7 @@ def test_steps_that_are_short_already_take_no_long_trial(step):
     assert (chosen.scheme, chosen.step) == ("runge_kutta2", step)
 
 
+@pytest.mark.slow
 def test_a_discrete_plant_has_steps_of_its_own():
     chosen = choose("pfc_delta_notch")
     assert "time steps of its own, 0.5 ms" in chosen.reason
@@ -168,6 +170,7 @@ def test_a_run_says_it_and_its_copy_gives_the_same(run_scenario, tmp_path):
             np.testing.assert_array_equal(one[name][:], two[name][:])
 
 
+@pytest.mark.slow
 def test_friction_is_made_for_a_step_that_had_to_be_shorter(run_scenario, tmp_path, stiff):
     """The copy, which names the step, gives the same."""
     changes = ("simulation.integrator=auto", "friction.f_c=[20, 20, 10]", *stiff)

@@ -59,6 +59,7 @@ def _told(follower, context, place):
     follower.GetInputPort("obstacles").FixValue(context, np.array([*place, 0.0, 0.0, 0.0, 0.0]))
 
 
+@pytest.mark.slow
 def test_it_waits_for_one_who_stands_on_its_way_and_goes_on_when_he_has_gone(loop):
     follower, start = loop
     simulator, context = start()

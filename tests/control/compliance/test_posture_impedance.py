@@ -72,6 +72,7 @@ def test_every_row_is_the_rate_of_the_row_above(relative_degree):
         assert np.allclose(rate, now[k + 1], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_constant_torque_bends_it_by_the_spring():
     impedance = NullSpaceImpedance(PARAMETERS, 4, PERIOD)
     motion = Motion(impedance, [0.5])
@@ -81,6 +82,7 @@ def test_a_constant_torque_bends_it_by_the_spring():
     assert np.abs(state[1:]).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_without_a_spring_it_stays_where_it_is_left():
     impedance = NullSpaceImpedance(NullSpaceImpedanceParameters(1.0, 20.0, 0.0, 70.0), 4, PERIOD)
     motion = Motion(impedance, [0.5])

@@ -122,6 +122,7 @@ def followed(loop, x, path, virtual_output):
 SLOW = {"visco_elastic": [pytest.mark.slow]}
 
 
+@pytest.mark.slow(but="velocity_servo")
 @pytest.mark.parametrize("name", [pytest.param(n, marks=SLOW.get(n, [])) for n in CASES])
 def test_outputs_obey_the_predicted_linear_dynamics(
     name, load_robot, make_law, virtual_output, oriented_path, position_path
@@ -131,6 +132,7 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     assert_linear_dynamics(*followed(loop, x, path, virtual_output))
 
 
+@pytest.mark.slow
 def test_without_the_highest_derivative_they_do_not(
     load_robot, make_law, virtual_output, oriented_path
 ):

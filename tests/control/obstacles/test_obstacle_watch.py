@@ -150,6 +150,7 @@ def test_the_way_is_free_ahead_of_one_who_comes_slowly_later():
 BOUNDED = dc.replace(PARAMETERS, largest_acceleration=5.0, velocity_uncertainty=0.1)
 
 
+@pytest.mark.slow(but="0-parameters0")
 @pytest.mark.parametrize("parameters", [PARAMETERS, BOUNDED, dc.replace(BOUNDED, retreat=1.0)])
 @pytest.mark.parametrize("seed", [0, 2, 4])
 def test_nobody_within_his_limits_finds_the_tool_moving(seed, parameters):

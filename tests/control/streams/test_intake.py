@@ -117,6 +117,7 @@ def test_derivatives_are_those_of_the_whole_spline(run):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_laws_of_other_orders_get_the_same_end(order):
     w, parameters = bend(20), {1: THROUGH, 2: BEND, 3: SMOOTHER}[order]
@@ -302,6 +303,7 @@ def test_what_was_refused_is_remembered_at_rest():
     np.testing.assert_allclose(run.sigma[-1], w[25], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow(but="3")
 @pytest.mark.parametrize("seed", range(4))
 def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
     random = np.random.default_rng(seed)

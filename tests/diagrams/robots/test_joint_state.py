@@ -112,6 +112,7 @@ def within(log):
     return share, np.mean(ratio**2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sides", "state"), [("motor_and_torque", "from_torque"), ("motor", "observed")]
 )

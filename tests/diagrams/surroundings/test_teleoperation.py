@@ -46,6 +46,7 @@ def region(**teleoperation):
     return settings
 
 
+@pytest.mark.slow
 def test_the_tool_goes_where_the_hand_is_a_channel_later():
     settings = region()
     settings.teleoperation.channel.jitter = settings.teleoperation.channel.loss = 0.0
@@ -62,6 +63,7 @@ def test_the_tool_goes_where_the_hand_is_a_channel_later():
     assert metrics["energy_margin"].value >= 0.0
 
 
+@pytest.mark.slow
 def test_along_a_path_the_follower_moves_farther_by_the_scale():
     """And not while the clutch is open."""
     settings = shipped_scenario("teleop_path")

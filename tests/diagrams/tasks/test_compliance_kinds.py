@@ -109,6 +109,7 @@ def test_a_torque_turns_the_tool(settings, axis):
     np.testing.assert_allclose(log["phi"].values[-1], zyx, atol=1e-6)
 
 
+@pytest.mark.slow(but="0.001")
 @pytest.mark.parametrize("width", [0.06, 0.001])
 def test_stiffness_that_changes_on_the_way_moves_nothing_at_once(arm, load_scenario, width):
     """Under a constant force, from 600 to 3000 N/m within ``width`` of the way."""

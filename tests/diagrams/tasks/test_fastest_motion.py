@@ -43,6 +43,7 @@ def build(settings, name=ARM):
     return build_station(settings, find_scenario(name).parent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "way", "leads"),
     [(ARM, 0.15, False), ("pfc_elastic_7r", -0.5, False), ("pfc_scara_4r", -0.2, True)],
@@ -70,6 +71,7 @@ def test_limits_are_met_on_the_path(name, way, leads, fastest):
     assert sum(parts.values()) == pytest.approx(1.0) and parts["none"] < 0.8
 
 
+@pytest.mark.slow
 def test_it_is_faster_than_a_motion_that_is_slowed(fastest):
     """By a tenth at least, whatever was asked for: with the same reserve, and rates left alone."""
     shortest = build(fastest(torque_rate=np.inf)).reference_duration - 2.0 * DWELL
@@ -89,12 +91,14 @@ def test_from_rest_to_rest_as_smooth_as_the_law_needs(fastest):
     assert np.all(np.abs(values[:, 1:]) < 1e-6 * scale[1:])
 
 
+@pytest.mark.slow
 def test_a_largest_velocity_is_kept(fastest):
     plan = build(fastest(velocity=0.3)).task.drive_plan
     assert 0.29 < plan.speed.max() < 0.302
     assert plan.limiting.of_the_way(plan.speed)["velocity"] > 0.5
 
 
+@pytest.mark.slow(but="pfc_delta--0.05")
 @pytest.mark.parametrize(
     ("name", "way"),
     [("sfc_elastic_6r", 0.03), ("pfc_panda_7r", -0.1), ("pfc_delta", -0.05)],
@@ -114,6 +118,7 @@ def test_surfaces_redundant_arms_and_other_laws(name, way, fastest):
     assert np.allclose(places, begin + np.outer(along, direction), rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_a_posture_that_moves_is_told_of(fastest):
     """It stays where it is in the plan."""
     settings = fastest("pfc_panda_7r", -0.05)

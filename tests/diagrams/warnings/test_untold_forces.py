@@ -29,6 +29,7 @@ def said(scenario):
     return [line for line in build_station(scenario, SCENARIOS).warnings if "forces act" in line]
 
 
+@pytest.mark.slow
 def test_a_law_that_is_told_or_a_servo_or_soft_regions_need_no_word(scenario):
     (line,) = said(scenario)
     assert "45 N" in line and "fixtures.bound = 0.5 mm" in line and "'measured'" in line

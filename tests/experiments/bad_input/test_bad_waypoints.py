@@ -26,6 +26,7 @@ def spline(more=""):
     return [f"path.shape=!Waypoints {{file: points.csv{more}}}", "reference.points=[0.05, 0.1]"]
 
 
+@pytest.mark.slow
 def test_these_waypoints_are_fine(mine, tmp_path):
     csv(tmp_path)
     overrides = [argument for change in spline() for argument in ("--set", change)]

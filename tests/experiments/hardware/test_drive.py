@@ -116,6 +116,7 @@ def test_both_sides_repeat_to_the_last_bit():
     np.testing.assert_array_equal(*joints)
 
 
+@pytest.mark.slow
 def test_a_robot_with_servos():
     settings = shipped_scenario("pfc_panda_7r")
     settings.controller.law, settings.controller.gains = "velocity_servo", {}
@@ -295,6 +296,7 @@ def test_the_robots_drives_have_limits_of_their_own():
         )
 
 
+@pytest.mark.slow
 def test_forces_are_measured_by_the_robot_and_told():
     """60 N deflect by 30 mm, with friction, encoders and a believed tool of another mass."""
     settings = shipped_scenario("pfc_compliant_6r")
@@ -322,6 +324,7 @@ def test_a_law_for_elastic_joints_needs_both_sides_of_them():
         driven(elastic(state="measured"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ticks", [1, 2])
 def test_elastic_joints_whose_torques_act_late(ticks):
     """The law knows of the delay, a tick of which is the link's; the other is the driver's."""
@@ -338,6 +341,7 @@ def test_elastic_joints_whose_torques_act_late(ticks):
     assert bent > 3e-4
 
 
+@pytest.mark.slow
 def test_a_delay_that_the_law_does_not_know_is_a_fault_that_ends_at_rest():
     settings = elastic()
     settings.driver.delay = 3e-3

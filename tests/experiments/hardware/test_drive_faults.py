@@ -98,6 +98,7 @@ FAULTS = {
 OF_ELASTIC_JOINTS = ("controller killed", "100 ms of silence", "no number", "jump")
 
 
+@pytest.mark.slow(but="panda-wrong mode")
 @pytest.mark.parametrize(
     ("kind", "fault"),
     [("panda", fault) for fault in FAULTS] + [("elastic", fault) for fault in OF_ELASTIC_JOINTS],

@@ -68,6 +68,7 @@ def run(settings):
     return station.part.model, result.root, log
 
 
+@pytest.mark.slow
 def test_of_rigid_joints_it_is_that_of_arm_and_rotors(settings):
     settings.robot.model = "comau_racer_1_4_3r"
     settings.controller.law = "rigid"

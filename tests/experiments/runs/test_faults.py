@@ -156,6 +156,7 @@ def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
     assert metrics["saturated_samples"]["value"] > 20
 
 
+@pytest.mark.slow
 def test_torque_saturation_is_counted_and_survived(mine, tmp_path, capfd):
     """The first torque wants 202 Nm of axis 1; a tenth of its limit is 180 Nm."""
     out = tmp_path / "out"
@@ -175,6 +176,7 @@ def test_torque_saturation_is_counted_and_survived(mine, tmp_path, capfd):
     assert np.linalg.norm(xi[-1]) < 1e-4  # nevertheless on the path in the end
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limited", ["speed", "torque"])
 def test_saturation_of_servos(run_scenario, tmp_path, limited):
     """Beside the path by 50 mm the law asks slow servos for 5 m/s; or weak ones do not obey."""

@@ -104,6 +104,7 @@ def test_a_run_that_fails_leaves_the_earlier_results_whole(tmp_path):
     assert names == {"manifest.json", "scenario.yaml", "log.h5"} < before.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     out, temporary = tmp_path / "out", tmp_path / "temporary"
@@ -203,6 +204,7 @@ def test_targets_of_laws_that_are_not_run(run_scenario, mine, tmp_path):
     assert run_scenario(tmp_path / "out", mine(), *arguments).status == 0
 
 
+@pytest.mark.slow
 def test_no_hand_by_null(run_scenario, tmp_path):
     """``hand: null`` means the same as no key: the shipped hand can be taken off."""
     arguments = ["--duration", "0.02", "--set", "hand=null"]

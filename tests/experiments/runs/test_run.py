@@ -147,6 +147,7 @@ def test_the_resolved_scenario_gives_the_same_run(run_scenario, three_axes, tmp_
     assert again.attributes["scenario"] == "pfc_elastic_3r"
 
 
+@pytest.mark.slow
 def test_files_of_an_earlier_run_are_replaced(run_scenario, tmp_path):
     out = tmp_path / "out"
     run_scenario(
@@ -161,6 +162,7 @@ def test_files_of_an_earlier_run_are_replaced(run_scenario, tmp_path):
     assert "recording.html" not in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow(but="0.001")
 @pytest.mark.parametrize("duration", ["0.001", "0.0305", "0.35", "1.4"])
 def test_duration_is_kept_to_the_sample(three_axes, duration):
     """Also where the sum of the steps between two looks at the run is not exact."""

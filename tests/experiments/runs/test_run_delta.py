@@ -26,6 +26,7 @@ def run(request, tmp_path_factory):
     return request.param, out, log, units
 
 
+@pytest.mark.slow(but="no friction")
 def test_deviation(run):
     friction, out, log, _ = run
     late = log["t"] >= DWELL

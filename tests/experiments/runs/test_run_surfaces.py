@@ -40,6 +40,7 @@ def fixture_surface_run(tmp_path_factory, run_scenario):
     return get
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHORT)
 def test_signals_and_targets(surface_run, name):
     run = surface_run(name, complete=name == "sfc_scan")
@@ -79,6 +80,7 @@ def test_exact_laws_follow_to_micrometres(surface_run, name, bound):
     assert np.abs(run["eta"] - run["eta_p"])[late].max() < 20.0 * bound
 
 
+@pytest.mark.slow(but="sfc_viscoelastic_3r")
 @pytest.mark.parametrize("name", ["sfc_viscoelastic_3r", "sfc_elastic_6r", "sfc_delta_cylinder"])
 def test_the_coordinates_are_those_of_the_tool(surface_run, name):
     """The distance of y_t from the closed form of the surface is |xi|."""
@@ -112,6 +114,7 @@ def test_the_normal_is_kept(surface_run):
     np.testing.assert_allclose(turned, np.broadcast_to(turned[-1], turned.shape), atol=1e-4)
 
 
+@pytest.mark.slow(but="True")
 @pytest.mark.parametrize("friction", [True, False])
 def test_the_delta_robot_with_and_without_friction(surface_run, friction):
     run = surface_run("sfc_delta_cylinder", *([] if friction else ["drive_friction=false"]))

@@ -22,6 +22,7 @@ def check(figure):
     assert struct.unpack(">I", figure.png[16:20])[0] == round(WIDTH * DPI)
 
 
+@pytest.mark.slow(but="options0")
 @pytest.mark.parametrize(
     "options",
     [

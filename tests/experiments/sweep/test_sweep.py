@@ -163,6 +163,7 @@ def test_a_value_that_is_wrong_in_some_samples_is_the_business_of_their_rows():
     assert len(sweep.tasks) == 2
 
 
+@pytest.mark.slow
 def test_surfaces_that_differ(address, tmp_path):
     out = tmp_path / "out"
     vary = ("surface.shape.coefficient=1.4,1.667",)

@@ -136,6 +136,7 @@ def identified(comau, tmp_path_factory):
     return write_model(comau, nearest_to_printed(comau).parameters, folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pfc_comau_6r", "pfc_compliant_6r"])
 def test_a_scenario_believes_what_was_identified(name, identified, comau):
     """The plant stays the true robot, with rigid as with elastic joints."""

@@ -41,6 +41,7 @@ def data(comau, measure, other_trajectory):
     return of_friction
 
 
+@pytest.mark.slow
 def test_plain_friction_stays_plain(comau, data):
     """In all of ten experiments."""
     for seed in range(10):

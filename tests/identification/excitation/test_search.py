@@ -65,6 +65,7 @@ def test_keeps_all_limits_of_the_cell(arm, found, verified):
     assert again.clearance.guaranteed >= 0.018
 
 
+@pytest.mark.slow
 def test_condition_number(arm, found):
     by_condition = search(arm, "condition", cell=CELL, **QUICK)
     assert by_condition.information.condition_number < found.information.condition_number
@@ -164,6 +165,7 @@ def add_at_last(common, task):
     return task
 
 
+@pytest.mark.slow
 def test_processes(tmp_path):
     """They are replaced where they are killed: with nothing to do, and in the middle of work."""
     with side_by_side(2, 3) as run:

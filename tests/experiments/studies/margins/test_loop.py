@@ -66,6 +66,7 @@ def test_a_fast_joint_is_no_fault():
     assert linearize(loop, root, loop.variables_in_loop([root])) is not None
 
 
+@pytest.mark.slow(but="limits")
 @pytest.mark.parametrize("task", ["reference", "limits", "conditioning"])
 def test_a_posture_that_is_pulled_is_in_the_loop(task):
     """What pulls it depends on the joints, and they follow it; a spring to a goal knows neither."""
@@ -191,6 +192,7 @@ def test_the_station_moves_like_its_linear_loop(three):
     np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_delay_margin_is_what_the_station_bears(three):
     loop, _, linear = three
     period = loop.map.period
@@ -209,6 +211,7 @@ def test_the_delay_margin_is_what_the_station_bears(three):
         assert (late > early) == bool(extra)
 
 
+@pytest.mark.slow
 def test_gains_within_the_disc_margin_are_borne_and_others_need_not_be(three):
     loop, _, linear = three
     margins = disc_margins(BrokenLoop(linear.A, linear.holds, loop.map.period))

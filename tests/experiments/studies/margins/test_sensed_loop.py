@@ -122,6 +122,7 @@ def test_what_is_pressed_on_is_a_spring_that_may_be_stiffer_but_not_at_will(ship
     assert not found.is_stable
 
 
+@pytest.mark.slow
 def test_plant_and_spring_are_the_same_for_a_loop_that_errs(shipped):
     loop, section = shipped
     assert loop.rest_is_physics
