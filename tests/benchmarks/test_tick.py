@@ -198,6 +198,7 @@ def test_whole_tick(chain, benchmark):
     assert not np.array_equal(drive, before)
 
 
+@pytest.mark.slow(but="3R elastic")
 def test_updates(chain, benchmark):
     """What comes on top of a tick, once the drives have their torques."""
 

@@ -122,6 +122,7 @@ def test_two_robots_that_are_too_fast_are_warned_of():
     assert not built(3.0 * pace - 0.03).task.drive_plan.said
 
 
+@pytest.mark.slow
 def test_an_error_of_placement_is_seen_one_to_one(known):
     """No controller knows of it: as measured the tool is on the seam, and in truth beside it."""
     error = PoseParameters(position=[0.1e-3, 0.2e-3, -0.1e-3], zyx_deg=[0.0, 0.02, 0.0])

@@ -111,6 +111,7 @@ def test_a_sensor_of_a_light_arm_with_more_joints_than_outputs(seven, kind, name
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_a_fault_while_a_hand_holds_the_elbow(seven):
     """Held with 250 N/m, the arm stands; the hand moves on for a while."""
     settings = seven("pfc_elbow_7r")
@@ -139,6 +140,7 @@ def test_lost_frames_of_a_light_arms_bus(seven):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_brakes_hold_a_joint_of_which_nothing_is_measured(six_axes):
     failure = six_axes.simulation.sensor_failure
     failure.time, failure.component, failure.whole_joint = 0.35, 1, True
@@ -146,6 +148,7 @@ def test_brakes_hold_a_joint_of_which_nothing_is_measured(six_axes):
     check_rest(*go_on(six_axes, 1.0))
 
 
+@pytest.mark.slow
 def test_brakes_hold_an_elastic_joint_of_which_nothing_is_measured(soft):
     """By default, with friction in the drives; of a robot without brakes they are requested."""
     failure = soft.simulation.sensor_failure
@@ -221,6 +224,7 @@ def test_a_sensor_that_is_not_tared_may_be_at_the_end_of_its_range(six_axes):
     assert told == SensorFault.SATURATED
 
 
+@pytest.mark.slow
 def test_lost_frames_of_a_bus(six_axes):
     """Short losses are bridged; the servos stop when nothing has come for 10 ms."""
     six_axes.controller.law = "velocity_servo"
@@ -236,6 +240,7 @@ def test_lost_frames_of_a_bus(six_axes):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_a_joint_at_its_limit(six_axes, monkeypatch):
     """Axis 1 sets off to more than 5 deg beside where it starts."""
     six_axes.compliance = type(six_axes.compliance)()

@@ -29,6 +29,7 @@ def test_the_shipped_settings_give_no_warning(scenario):
     assert warnings(scenario) == []
 
 
+@pytest.mark.slow
 def test_joints_too_soft_for_the_law(scenario):
     """The tool then leaves the path by tens of millimetres at 1.5 m/s."""
     scenario.controller.boundary_layer_damping = [0.03, 0.03, 0.02]
@@ -87,6 +88,7 @@ def test_resonances_too_fast_for_the_elastic_law(scenario):
     assert "Hz" in warning and "singular_perturbation" in warning
 
 
+@pytest.mark.slow
 def test_damping_too_strong_for_the_sampling(scenario):
     scenario.controller.law = "singular_perturbation"
     # 35000 Nm/rad * 0.06 s * 1 ms / 4.95 kg m^2 = 0.42
@@ -122,6 +124,7 @@ def with_gains(scenario, **kinds):
     return scenario
 
 
+@pytest.mark.slow
 def test_gains_that_do_not_bear_an_error_of_the_model():
     """Four equal poles on six axes: unstable with masses 5 % off, by simulation as well."""
     scenario = shipped_scenario("pfc_elastic_6r")

@@ -19,6 +19,7 @@ def _outcome(status: str = COMPLETED, reason: str = "", deviation: float = 7.04e
     return Outcome(RunRow(status, reason, metrics, revision="a" * 40), 0.02)
 
 
+@pytest.mark.slow
 def test_every_scenario_has_its_laws():
     every = cases()
     assert {case.scenario for case in every} == set(scenario_names())

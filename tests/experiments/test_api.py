@@ -86,6 +86,7 @@ def test_whatever_is_announced_is_there(name):
         experiments.runs  # noqa: B018
 
 
+@pytest.mark.slow
 def test_a_scenario_made_in_python_runs_again(short):
     scenario = short.scenario
     assert isinstance(scenario, Scenario)
@@ -97,6 +98,7 @@ def test_a_scenario_made_in_python_runs_again(short):
     assert abs(again.log["tau_d"].values[0] - short.log["tau_d"].values[0]).max() > 0.1  # Nm
 
 
+@pytest.mark.slow
 def test_changes_of_python_and_of_text(mine):
     changes = CHANGES | {
         "reference.points": np.array([0.1, 0.101]),

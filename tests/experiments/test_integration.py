@@ -84,6 +84,7 @@ def test_it_is_the_same_every_time():
     assert choices[0] == choices[1]
 
 
+@pytest.mark.slow
 def test_an_unstable_scheme_is_not_chosen_whatever_its_error(monkeypatch):
     """Second order makes undamped joints oscillate ever more, in the end."""
     monkeypatch.setattr(integration, "_TOLERANCE", 1.0)
@@ -112,6 +113,7 @@ def test_the_start_of_the_scenario_does_not_decide(start):
     assert choose("pfc_elastic_3r", start).scheme == "runge_kutta3"
 
 
+@pytest.mark.slow
 def test_stiff_joints_get_shorter_steps(stiff):
     settings, station = build("pfc_elastic_3r", *stiff)
     chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
@@ -132,6 +134,7 @@ def test_a_step_is_never_longer_than_a_tick():
     assert choose("pfc_elastic_6r", *RIGID, "simulation.max_step=0.01").step == 1e-3
 
 
+@pytest.mark.slow(but="1e-06")
 @pytest.mark.parametrize("step", [1e-5, 1e-6])
 def test_steps_that_are_short_already_take_no_long_trial(step):
     chosen = choose("pfc_elastic_6r", *RIGID, f"simulation.max_step={step}")

@@ -159,6 +159,7 @@ def test_without_the_hands_force_told_the_law_lets_it_push_the_tool():
     assert depths[1] > 1e-4
 
 
+@pytest.mark.slow(but="False-9")
 @pytest.mark.parametrize(
     ("tells", "fault"), [(True, Fault.INPUT_NOT_FINITE), (False, Fault.FORCE_SENSOR_LOST)]
 )
@@ -192,6 +193,7 @@ def test_it_steps_without_drake():
         tool.run((k + 1) * tool.follower.period)
 
 
+@pytest.mark.slow
 def test_servos_are_told_velocities_along_the_pull():
     builder = DiagramBuilder()
     plant = load(builder)

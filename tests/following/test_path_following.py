@@ -146,6 +146,7 @@ def fixture_undriven(tmp_path):
     return model
 
 
+@pytest.mark.slow
 def test_a_joint_without_actuator_is_named_where_torques_are_commanded(path, undriven):
     builder = DiagramBuilder()
     plant = MultibodyPlant(0.0)
@@ -179,6 +180,7 @@ def test_actuators_that_are_added_drive_their_joints(path, undriven):
     assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
 
 
+@pytest.mark.slow
 def test_doubts_that_a_scenario_has_are_told_and_logged_once(path, caplog):
     """Of gains that are unstable on a perfect model, and of waypoints in nearly one place."""
     close = np.array([*POINTS[:2], POINTS[1], *POINTS[2:]])
@@ -266,6 +268,7 @@ def test_it_starts_where_the_robot_is_with_a_transition(path):
     assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_path_that_oscillates_along_its_normal_is_followed(path):
     swing = Swing(coordinate=2, amplitude=0.012, frequency=2.0, begin=0.05, ramp=0.2)
     simulator, follower = closed_loop(
@@ -279,6 +282,7 @@ def test_a_path_that_oscillates_along_its_normal_is_followed(path):
         assert abs(expected) > 5e-3
 
 
+@pytest.mark.slow
 def test_a_trajectory_is_tracked_for_comparison(path):
     """The tool comes back to where time prescribes it to be, not to the closest point."""
     options = FollowerOptions(controller=ControllerParameters(manifold="trajectory"))
@@ -298,6 +302,7 @@ def test_a_trajectory_is_tracked_for_comparison(path):
     assert distances[0] > 5e-3 and distances[1] < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("state", ["observed", "from_torque"])
 def test_links_are_found_where_motors_alone_are_measured(path, state):
     """The links' side of what is measured is wrong; torques are those of the springs."""

@@ -135,6 +135,7 @@ def test_what_cannot_wait_is_refused():
             add_path_following(builder, plant, "tool_point", path, "rigid", options=options)
 
 
+@pytest.mark.slow
 def test_an_elbow_avoids_obstacles_where_there_is_one():
     """The torques that push it away are in the loop; three joints leave none to spare."""
     path = path_from_waypoints(WaypointTable(POINTS), smoothness=6)

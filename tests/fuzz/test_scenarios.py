@@ -67,6 +67,7 @@ def test_scenarios_are_prepared_or_refused_in_one_line(guarded, examples, base):
     check()
 
 
+@pytest.mark.slow(but="keys1")
 @pytest.mark.parametrize("keys", [{}, {"tolerance": 1e-3}, {"corner_distance": 0.01}])
 def test_tables_are_paths_or_refused_in_one_line(guarded, examples, tmp_path, keys):
     data = full_scenario("pfc_delta")

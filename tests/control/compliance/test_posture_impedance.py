@@ -60,6 +60,7 @@ def test_it_obeys_mass_damper_spring_behind_a_filter(relative_degree):
     assert np.allclose(state[1], x[-2:], rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow(but="1")
 @pytest.mark.parametrize("relative_degree", [1, 2, 3, 4])
 def test_every_row_is_the_rate_of_the_row_above(relative_degree):
     fine = 1e-5

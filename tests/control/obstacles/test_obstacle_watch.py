@@ -194,6 +194,7 @@ def test_who_accelerates_no_faster_than_is_known_lets_it_go_on_sooner():
     assert ways[1] > ways[0] + 0.1
 
 
+@pytest.mark.slow
 def test_it_goes_back_from_one_who_walks_up_to_it_and_on_when_he_has_gone():
     """He comes along the path to where it waits, and stops there before he turns round."""
     least = {}

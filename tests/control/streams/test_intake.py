@@ -63,6 +63,7 @@ def test_it_leads_by_all_way_points_and_ends_at_the_last(run):
     assert run.stream[-1, 1] == len(w) - 1
 
 
+@pytest.mark.slow
 def test_it_never_passes_what_it_knows_and_leaves_room_to_stop(run):
     assert run.overrun.max() <= 1e-12
     assert np.all(run.eta[:, 0] <= run.goal + 1e-12)
@@ -333,6 +334,7 @@ def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
     assert np.linalg.norm(run.sigma[-1] - points[-1]) < parameters.spacing
 
 
+@pytest.mark.slow
 def test_orientations_come_with_way_points():
     w = bend(40)
     angles = np.linspace(0.0, 1.2, 40)

@@ -61,6 +61,7 @@ def tool_pose(diagram):
     return tool.GetInputPort("tool_pose").Eval(tool.GetMyContextFromRoot(context))
 
 
+@pytest.mark.slow
 def test_an_arm_in_a_notch_is_drawn_with_workpiece_and_ball(arm_in_a_notch, meshcat):
     turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     y_t = [0.8, 0.01, 0.902]

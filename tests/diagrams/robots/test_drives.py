@@ -236,6 +236,7 @@ def test_friction_acts_against_the_motion(settings, increments):
     np.testing.assert_allclose(torque[moving], expected[moving], atol=1e-6)
 
 
+@pytest.mark.slow(but="0.004-1")
 @pytest.mark.parametrize(("step", "softness"), [(TICK / 4, 1 / 16), (TICK / 4, 1.0), (4 * TICK, 1)])
 def test_stuck_joints_give_way_by_their_presliding(settings, step, softness):
     """Steps change nothing; a presliding that is given does."""

@@ -44,6 +44,7 @@ def test_sensors_that_are_not_exact(deviation):
     assert 1e-5 < off < 5e-4
 
 
+@pytest.mark.slow
 def test_motors_alone_tell_of_the_springs(deviation):
     assert 1e-5 < deviation("motor", "observed") < 4e-4
 

@@ -147,6 +147,7 @@ def test_turns_need_a_tool_that_yields_and_a_hand_that_turns_a_wrist():
         build_station(settings, SCENARIOS)
 
 
+@pytest.mark.slow(but="position_force")
 @pytest.mark.parametrize("coupling", ["position_force", "four_channel"])
 def test_other_couplings_lead_the_tool_too(coupling):
     settings = region(coupling=coupling)
@@ -157,6 +158,7 @@ def test_other_couplings_lead_the_tool_too(coupling):
     assert log["y_t"].values[-1, 2] - log["y_t"].values[0, 2] < -0.02
 
 
+@pytest.mark.slow
 def test_what_leads_needs_a_tool_that_yields():
     settings = shipped_scenario("pfc_comau_6r")
     settings.teleoperation = TeleoperationParameters()

@@ -127,6 +127,7 @@ def test_a_posture_that_moves_is_told_of(fastest):
     assert "planned for a posture that stays" in said
 
 
+@pytest.mark.slow
 def test_as_fast_as_toppra_on_rigid_joints(fastest):
     """Drake's own optimum, whose torque may jump, is shorter, by few per cent."""
     settings = fastest("pfc_elastic_6r", -0.4, torque_rate=np.inf)

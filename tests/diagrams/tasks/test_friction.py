@@ -62,6 +62,7 @@ def test_every_source_keeps_the_tool_nearer_to_its_path(arm):
     assert max(found.values()) < without / 8.0
 
 
+@pytest.mark.slow
 def test_the_estimate_is_the_true_friction(arm):
     """Of the disturbance observer after its lag; of the filter the coefficients, too."""
     arm.controller.friction.source = "observer"
@@ -102,6 +103,7 @@ def test_forces_on_the_tool_that_are_known_are_no_friction_of_rigid_joints(load_
     assert ends["known"] < 1.5
 
 
+@pytest.mark.slow
 def test_the_belief_is_the_plants_with_its_error_or_what_is_written(arm):
     arm.controller.friction.source = "model"
     arm.model_error.friction = [0.5]

@@ -61,6 +61,7 @@ def test_friction_of_rigid_joints_is_no_force_if_it_is_known(soft):
     assert found["model"] < found["none"] / 4.0
 
 
+@pytest.mark.slow
 def test_the_elastic_law_is_told_what_is_observed(load_scenario):
     """With derivatives; friction of the drives is no force on the links."""
     settings = load_scenario("pfc_elastic_3r")

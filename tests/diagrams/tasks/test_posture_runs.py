@@ -71,6 +71,7 @@ def test_to_where_the_outputs_are_easy_to_move(run):
     assert deviation(station, log) < 5e-5
 
 
+@pytest.mark.slow(but="posture0")
 @pytest.mark.parametrize(
     "posture",
     [

@@ -201,6 +201,7 @@ def test_an_inverted_normal_is_named(refused, mine):
     refused(mine("sfc_elastic_6r"), "normal [0.0, 0.0, -1.0] inverted", "reach", changes=wrong)
 
 
+@pytest.mark.slow
 def test_starts_and_ways(wrong, tmp_path):
     csv(tmp_path, dish())
     wrong("start.theta", changes=[*fitted(), "start.theta=[0.9, 0]"])

@@ -90,6 +90,7 @@ def test_degrees_for_radians(refused, mine, tmp_path):
     refused(mine(), "line 2", "90 rad", "zyx_deg_1", changes=spline(), file=file)
 
 
+@pytest.mark.slow
 def test_a_tolerance_below_the_noise(refused, mine, tmp_path):
     angle = np.linspace(0.0, 1.5, 300)
     clean = np.stack([0.8 + 0.0 * angle, 0.2 * np.sin(angle), 1.0 + 0.1 * angle], axis=1)

@@ -118,6 +118,7 @@ def test_a_fault_ends_at_rest_within_5_deg(kind, fault):
     assert 0.5 < np.rad2deg(max(farthest)) < 5.0
 
 
+@pytest.mark.slow(but="10")
 @pytest.mark.parametrize("ticks", [1, 5, 10])
 def test_what_is_bridged_is_no_fault(ticks):
     loop = moving("panda")

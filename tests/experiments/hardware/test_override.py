@@ -74,6 +74,7 @@ def test_a_pause_costs_time_and_not_the_motion(changed):
     assert abs(changed.drive.motion_time - paces.mean() * changed.drive.time - lag) < 5e-3
 
 
+@pytest.mark.slow
 def test_a_motion_is_made_no_faster_than_drives_allow():
     settings = panda()
     settings.reference.velocity, settings.reference.acceleration = 3.0, 60.0

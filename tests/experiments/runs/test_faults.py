@@ -98,6 +98,7 @@ def test_a_wrong_time_after_a_fault(mine, capfd, seconds):
     assert f"--after-fault {seconds}: allowed: 0 to 100" in capfd.readouterr().err
 
 
+@pytest.mark.slow(but="pfc_elastic_3r")
 @pytest.mark.parametrize("name", [THREE, SIX])
 def test_nan_from_the_beginning(fault, name):
     place = "q_J_1 at t = 0.000 s"
@@ -107,6 +108,7 @@ def test_nan_from_the_beginning(fault, name):
     assert metrics["max_path_deviation"]["value"] is None
 
 
+@pytest.mark.slow
 def test_singularity_on_the_way(fault, tmp_path):
     """A line leads to where the arm is stretched, and axis 3 beyond its limit of 80 deg."""
     log, metrics = fault(

@@ -82,6 +82,7 @@ def test_interrupted_before_the_simulation_nothing_is_left(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_run_that_fails_leaves_the_earlier_results_whole(tmp_path):
     """Until there is a log of its own."""
@@ -123,6 +124,7 @@ def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     assert {path.name for path in (kept / "figures").iterdir()} >= {"path.png", "progress.png"}
 
 
+@pytest.mark.slow
 def test_results_beside_the_scenario(mine, tmp_path, capfd):
     """``--out .`` with everything of the user's in the same folder."""
     scenario = Path(mine())

@@ -66,6 +66,7 @@ def test_the_path_is_followed_on_the_dish(on_surface):
     assert all(metric["value"] < float(metric["target"].split()[1]) for metric in targets)
 
 
+@pytest.mark.slow
 def test_height_and_side_step_are_apart(on_surface):
     """A tool above the curve converges along the normal and leaves it alone sideways."""
     run = on_surface("start.offset=[0.02, 0.0]", "start.rotation_deg=[0, 0, 0]", duration="0.3")

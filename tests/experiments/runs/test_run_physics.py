@@ -205,6 +205,7 @@ def test_six_axes_obey_the_linear_dynamics(six_axes):
     assert np.abs(six_axes["eta"] - six_axes["eta_p"]).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_rigid_law_rests_beside_the_path_by_the_deflection(three_axes, arm):
     """The law sees motors only: the links hang lower by K_s^-1 g_L."""
     result = three_axes("controller.law=rigid", "reference.dwell=1", duration="0.9")

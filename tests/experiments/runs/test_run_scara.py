@@ -109,6 +109,7 @@ def test_a_torque_about_the_vertical_turns_the_tool_past_half_a_turn(scara):
     assert np.abs(steps).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_tilt_that_the_arm_cannot_have(tmp_path, run_scenario, capfd):
     def refused(*changes):
         arguments = [x for change in changes for x in ("--set", change)]

@@ -57,6 +57,7 @@ def test_the_arm_comes_to_rest(settings, component):
     assert raw["servo_fault"][-1, 0] == Fault.INPUT_NOT_FINITE
 
 
+@pytest.mark.slow
 def test_the_run_ends_and_keeps_its_log(tmp_path, capsys):
     changes = {
         "controller.law": "velocity_servo",

@@ -43,6 +43,7 @@ def test_parameters_of_all_kinds(rows, options):
     assert ("2 more parameters are in the table" in parameters.caption) == ("*" in options[0])
 
 
+@pytest.mark.slow
 def test_a_single_run_and_equal_values(rows):
     samples = draw_samples(parse_variations(["mass=0:1"]), 1, 0)
     for figure in drawn(samples, {0: rows[0]}):
@@ -52,6 +53,7 @@ def test_a_single_run_and_equal_values(rows):
         check(figure)
 
 
+@pytest.mark.slow
 def test_values_over_decades(rows):
     samples = draw_samples(parse_variations(["mass=0:1"]), 40, 0)
     spread = {}

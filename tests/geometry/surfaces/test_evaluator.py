@@ -194,6 +194,7 @@ def test_a_far_guess_finds_the_nearest_place():
         assert np.all(np.abs(row[:2] - guess) <= math.pi + 1e-9)
 
 
+@pytest.mark.slow
 def test_through_a_crossing():
     eight = FourierCurve([0, 0, 0], [[0.2, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0.1, 0]])
     evaluator = SurfaceEvaluator(extruded_surface(eight, (0.0, 0.0, 1.0), 0.3), 2)

@@ -68,6 +68,7 @@ def test_the_surface_is_within_the_noise_of_the_true_workpiece(scanned):
     assert scanned.base == "a plane"
 
 
+@pytest.mark.slow
 def test_residuals_are_the_noise_along_the_normal(scanned):
     points, left = scanned.points, scanned.residuals
     np.testing.assert_allclose(scanned.noise, NOISE, rtol=0.04)
@@ -131,6 +132,7 @@ def test_what_bends_over_is_seen_from_its_axis(span):
     assert np.all(outward > 0.0)
 
 
+@pytest.mark.slow
 def test_the_normal_points_to_where_the_surface_is_seen_from():
     inside = ScatteredFitOptions(seen_from=[0.01, 0.1, 0.0])
     rows = samples(fit_scattered(tube(2.0 * np.pi), inside).surface)
@@ -175,6 +177,7 @@ def test_a_patch_is_trimmed_to_what_is_covered():
     assert fit.hole < 0.04
 
 
+@pytest.mark.slow
 def test_a_hole_that_is_allowed_is_bridged():
     fit = fit_scattered(with_hole(), ScatteredFitOptions(largest_hole=0.05))
     assert np.abs(off_workpiece(samples(fit.surface)[:, 0])).max() < 3.0 * NOISE

@@ -170,6 +170,7 @@ def test_a_scenario_takes_the_written_robot(identified):
     np.testing.assert_allclose(station.robot.gather("mass")[:5], masses[:5], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_scenario_believes_an_identified_delta_robot(delta, tmp_path):
     parameters = true_parameters(delta) * [1.1, 1.1, 1.1, 0.9, *[1.5] * 6]
     written = write_model(delta, parameters, tmp_path)

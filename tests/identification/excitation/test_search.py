@@ -72,6 +72,7 @@ def test_condition_number(arm, found):
     assert by_condition.information.log_determinant < found.information.log_determinant
 
 
+@pytest.mark.slow
 def test_delta(delta):
     found = search(delta, limits={"acceleration": 30.0}, **QUICK)
     assert found.information.base_parameters == 10

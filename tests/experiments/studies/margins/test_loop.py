@@ -46,6 +46,7 @@ def fixture_three():
     return loop, section, linearize(loop, section, chosen)
 
 
+@pytest.mark.slow
 def test_a_fast_joint_is_no_fault():
     """In one tick it moves by more than positions and velocities may contradict each other."""
     changes = ["reference={points: [0.96, 0.7], velocity: 1.5, acceleration: 8, dwell: 0.02}"]
@@ -93,6 +94,7 @@ def differences(loop, section, chosen):
     return np.column_stack(columns)
 
 
+@pytest.mark.slow(but="pfc_elastic_3r-overrides3")
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
@@ -141,6 +143,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow(but="pfc_elastic_3r-overrides6")
 @pytest.mark.parametrize(("name", "overrides"), CASES)
 def test_the_loop_at_rest_is_that_of_the_whole_station(name, overrides):
     """Two ways that share the law's own function only, with masses believed too low."""

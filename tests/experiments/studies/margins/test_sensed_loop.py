@@ -107,6 +107,7 @@ def test_the_shipped_one_bears_three_kilograms_more(shipped):
     assert size[40:].max() < 0.5 * size[:20].max()
 
 
+@pytest.mark.slow
 def test_what_is_pressed_on_is_a_spring_that_may_be_stiffer_but_not_at_will(shipped):
     loop, section = shipped
     free = loop.pressed_force(section)
