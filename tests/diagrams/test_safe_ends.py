@@ -172,6 +172,7 @@ def test_brakes_hold_an_elastic_joint_of_which_nothing_is_measured(soft):
     assert requested[first] == 2.0 and requested[-1] == 0.0
 
 
+@pytest.mark.slow
 def test_brakes_stop_servos_that_have_lost_a_joint(seven):
     settings = seven("pfc_panda_7r")
     settings.controller.law = "velocity_servo"

@@ -116,6 +116,7 @@ def test_a_posture_yields_to_what_is_observed_of_forces(load_scenario):
     assert len(reads) == 3
 
 
+@pytest.mark.slow
 def test_the_walk_finds_a_truth_that_is_told(load_scenario):
     settings = load_scenario("pfc_comau_6r_elastic")
     settings.controller.external_torque.source = "known"

@@ -84,6 +84,7 @@ def test_a_reference_that_is_too_fast_waits(settings):
     assert speed.max() <= fastest * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_told_only_it_leaves_the_path(settings):
     station, _, law, deviation = run(settings(limits="warn"), 0.6)
     assert not station.task.drive_plan.is_slowed

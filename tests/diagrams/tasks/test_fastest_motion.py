@@ -82,6 +82,7 @@ def test_it_is_faster_than_a_motion_that_is_slowed(fastest):
         assert shortest < 0.9 * moved
 
 
+@pytest.mark.slow
 def test_from_rest_to_rest_as_smooth_as_the_law_needs(fastest):
     motion = build(fastest(way=0.15)).task.motion
     assert motion.first_discontinuity(4) is None

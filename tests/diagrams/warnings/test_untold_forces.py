@@ -42,6 +42,7 @@ def test_a_law_that_is_told_or_a_servo_or_soft_regions_need_no_word(scenario):
     assert said(scenario) == []
 
 
+@pytest.mark.slow
 def test_friction_that_is_not_compensated_takes_a_tool_into_hard_regions(scenario):
     """1.3 mm untold of the hand, 0.85 mm told; servos and soft regions need no word."""
 

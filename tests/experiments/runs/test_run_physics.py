@@ -147,6 +147,7 @@ def test_orientation_of_the_tool(six_axes, six_axes_rigid, law):
     assert error < 1e-3 * np.abs(result["phi_dot"]).max()
 
 
+@pytest.mark.slow(but="rigid")
 @pytest.mark.parametrize("law", LAWS)
 def test_rates_are_derivatives(three_axes, law):
     result = three_axes(f"controller.law={law}")

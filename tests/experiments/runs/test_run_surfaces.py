@@ -69,6 +69,7 @@ def _met(metric):
     return compare(metric["value"], float(number))
 
 
+@pytest.mark.slow(but="sfc_viscoelastic_3r-5e-06")
 @pytest.mark.parametrize(
     ("name", "bound"),
     [("sfc_viscoelastic_3r", 5e-6), ("sfc_elastic_6r", 2e-6), ("sfc_scan", 2e-6)],
@@ -99,6 +100,7 @@ def test_the_coordinates_are_those_of_the_tool(surface_run, name):
     np.testing.assert_allclose(foot + xi[:, None] * normal, run["y_t"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_normal_is_kept(surface_run):
     """The tool leads by 60 deg: its frame is that of tangents and normal, turned by a constant."""
     run = surface_run("sfc_elastic_6r", DISH)
@@ -125,6 +127,7 @@ def test_the_delta_robot_with_and_without_friction(surface_run, friction):
     assert run["eta"][late].max() > 0.15
 
 
+@pytest.mark.slow
 def test_a_hand_leads_the_tool_over_the_paraboloid(surface_run):
     run = surface_run("sfc_comau_paraboloid")
     assert run["manifold_force"].shape == (len(run.t), 6)

@@ -158,6 +158,7 @@ def test_without_the_extra(tmp_path, capfd, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_value_that_is_wrong_in_some_samples_is_the_business_of_their_rows():
     sweep = define_sweep("pfc_elastic_3r", ["reference.velocity=-1,1"])
     assert len(sweep.tasks) == 2
