@@ -136,6 +136,7 @@ def test_a_hand_leads_the_tool_over_the_paraboloid(surface_run):
     np.testing.assert_allclose(run["xi"], run["xi_p"], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_scanned_panel_is_followed_within_the_scans_noise(surface_run):
     run = surface_run("sfc_scan", complete=True)
     late = run.after(SHORT["sfc_scan"][1])
