@@ -317,22 +317,35 @@ def _reduced(value: Any) -> list[Any]:
     ]
 
 
-@functools.cache
+def _once_per_type(tell: Callable[[type], bool]) -> Callable[[type], bool]:
+    """Return a function of types that calculates once for each."""
+    kept: dict[type, bool] = {}
+
+    def told(kind: type) -> bool:
+        found = kept.get(kind)
+        if found is None:
+            found = kept[kind] = tell(kind)
+        return found
+
+    return told
+
+
+@_once_per_type
 def _is_sequence(kind: type) -> bool:
     return issubclass(kind, tuple | list) and not issubclass(kind, enum.Enum)
 
 
-@functools.cache
+@_once_per_type
 def _never_changes(kind: type) -> bool:
     return issubclass(kind, _UNCHANGING)
 
 
-@functools.cache
+@_once_per_type
 def _never_holds_else(kind: type) -> bool:
     return _is_frozen(kind) or issubclass(kind, tuple | frozenset | types.FunctionType)
 
 
-@functools.cache
+@_once_per_type
 def _is_frozen(kind: type) -> bool:
     parameters = getattr(kind, "__dataclass_params__", None)
     return parameters is not None and parameters.frozen and not hasattr(kind, "__content__")

@@ -148,6 +148,7 @@ def test_the_scanned_panel_is_followed_within_the_scans_noise(surface_run):
     assert rms < largest < 5.0 * scanned_panel.NOISE
 
 
+@pytest.mark.slow
 def test_what_a_run_on_a_surface_leaves(surface_run):
     run = surface_run("sfc_scan", complete=True)
     names = {path.stem for path in (run.folder / "figures").iterdir()}
