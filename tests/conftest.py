@@ -39,9 +39,29 @@ _COMPILED_AT_ONCE = {"compiled", "benchmarks", "live"}
 _FIRST = ("tests/experiments/", "tests/identification/", "tests/diagrams/")
 
 
-def pytest_collection_modifyitems(items):
-    """Begin with the folders of long files."""
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Begin with the folders of long files; keep what stands for slow ones in the quick tests."""
     items.sort(key=lambda item: not item.nodeid.startswith(_FIRST))
+    chosen = any("::" in argument for argument in config.args)
+    unmet = _keep_quick(items)
+    if unmet and not chosen:
+        raise pytest.UsageError("; ".join(f"{name} has no case {unmet[name]}" for name in unmet))
+
+
+def _keep_quick(items):
+    """Take the mark from the case that ``slow(but=..)`` leaves out; return those not found."""
+    wanted, met = {}, set()
+    for item in items:
+        mark = item.get_closest_marker("slow")
+        if mark is None or "but" not in mark.kwargs:
+            continue
+        name = item.nodeid.partition("[")[0]
+        wanted[name] = mark.kwargs["but"]
+        if item.callspec.id == mark.kwargs["but"]:
+            met.add(name)
+            item.own_markers.remove(mark)
+    return {name: case for name, case in wanted.items() if name not in met}
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -172,9 +172,9 @@ class _Walk:
 
     def digest(self, value: Any) -> _Digest:
         """Return the digest of a value."""
-        atom = _atom(value)
+        atom = _ATOMS.get(type(value))
         if atom is not None:
-            return _Digest(atom, ())
+            return _Digest(atom(value), ())
         known = self._known.get(id(value))
         if known is None:
             self._known[id(value)] = value, None
@@ -187,7 +187,7 @@ class _Walk:
 
     def _found(self, value: Any) -> _Digest:
         """Return the digest of what this walk has not met; of frozen objects it is remembered."""
-        if not _is_frozen(value):
+        if not _is_frozen(type(value)):
             return self._made(value)
         before = _remembered.get(id(value))
         if before is not None and before.holds(value):
@@ -203,22 +203,26 @@ class _Walk:
 
     def _made(self, value: Any) -> _Digest:
         tag, parts = self._parts(value)
-        digests = [self.digest(part) for part in parts]
-        key = _hash(tag, (digest.key for digest in digests))
-        if isinstance(value, np.ndarray):
+        keys: list[bytes] = []
+        held: tuple[np.ndarray, ...] | None = ()
+        for part in parts:
+            # most parts are atoms
+            atom = _ATOMS.get(type(part))
+            if atom is not None:
+                keys.append(atom(part))
+                continue
+            key, arrays = self.digest(part)
+            keys.append(key)
+            held = None if held is None or arrays is None else held + arrays
+        key = _hash(tag, keys)
+        kind = type(value)
+        if issubclass(kind, np.ndarray):
             return _Digest(key, (value,))
-        if isinstance(value, _UNCHANGING):
+        if _never_changes(kind):
             return _Digest(key, ())
-        if not (_is_frozen(value) or isinstance(value, tuple | frozenset | types.FunctionType)):
-            return _Digest(key, None)
-        if isinstance(value, types.FunctionType) and value.__closure__:
-            return _Digest(key, None)  # of cells what they hold can be another tomorrow
-        held: list[np.ndarray] = []
-        for digest in digests:
-            if digest.arrays is None:
-                return _Digest(key, None)
-            held += digest.arrays
-        return _Digest(key, tuple(held))
+        # of cells what they hold can be another tomorrow
+        open_ended = issubclass(kind, types.FunctionType) and value.__closure__
+        return _Digest(key, held if _never_holds_else(kind) and not open_ended else None)
 
     def _met(self, thing: Any) -> bytes:
         number = _things.get(thing)
@@ -229,6 +233,8 @@ class _Walk:
 
     def _parts(self, value: Any) -> tuple[bytes, Iterable[Any]]:
         """Return what kind of object it is, and what it holds."""
+        if _is_sequence(type(value)):
+            return self._met(type(value)), value
         if isinstance(value, ca.Function):
             return b"function", [function_digest(value)]
         if isinstance(value, type | types.BuiltinFunctionType | types.CodeType | np.ufunc):
@@ -260,8 +266,6 @@ class _Walk:
             return kind, [value.start, value.stop, value.step]
         if isinstance(value, set | frozenset):
             return kind, sorted(self.digest(part).key for part in value)
-        if isinstance(value, tuple | list):
-            return kind, value
         if isinstance(value, Mapping):
             return kind, [part for item in value.items() for part in item]
         if hasattr(type(value), "__content__"):
@@ -269,26 +273,21 @@ class _Walk:
         return kind, _reduced(value)
 
 
-def _atom(value: Any) -> bytes | None:
-    """Return a value's own digest if it holds nothing, None otherwise."""
-    kind = type(value)
-    if kind is float:
-        return b"f" + struct.pack("<d", value)
-    if kind is str:
-        return _short(b"s", value.encode("utf-8", "surrogatepass"))
-    if kind is int:
-        return b"i%d" % value
-    if kind is bool or value is None:
-        return b"n" if value is None else b"t" if value else b"0"
-    if kind is bytes:
-        return _short(b"b", value)
-    return None
-
-
 def _short(kind: bytes, value: bytes) -> bytes:
     if len(value) < _SHORT:
         return kind + value
     return kind.upper() + hashlib.sha256(value).digest()
+
+
+# of values that hold nothing their own digests
+_ATOMS: dict[type, Callable[[Any], bytes]] = {
+    float: lambda value: b"f" + struct.pack("<d", value),
+    str: lambda value: _short(b"s", value.encode("utf-8", "surrogatepass")),
+    int: lambda value: b"i%d" % value,
+    bool: lambda value: b"t" if value else b"0",
+    types.NoneType: lambda _: b"n",
+    bytes: lambda value: _short(b"b", value),
+}
 
 
 def _constant(value: ca.SX | ca.MX) -> ca.Function:
@@ -318,23 +317,54 @@ def _reduced(value: Any) -> list[Any]:
     ]
 
 
-def _is_frozen(value: Any) -> bool:
-    parameters = getattr(type(value), "__dataclass_params__", None)
-    return parameters is not None and parameters.frozen and not hasattr(type(value), "__content__")
+def _once_per_type(tell: Callable[[type], bool]) -> Callable[[type], bool]:
+    """Return a function of types that calculates once for each."""
+    kept: dict[type, bool] = {}
+
+    def told(kind: type) -> bool:
+        found = kept.get(kind)
+        if found is None:
+            found = kept[kind] = tell(kind)
+        return found
+
+    return told
+
+
+@_once_per_type
+def _is_sequence(kind: type) -> bool:
+    return issubclass(kind, tuple | list) and not issubclass(kind, enum.Enum)
+
+
+@_once_per_type
+def _never_changes(kind: type) -> bool:
+    return issubclass(kind, _UNCHANGING)
+
+
+@_once_per_type
+def _never_holds_else(kind: type) -> bool:
+    return _is_frozen(kind) or issubclass(kind, tuple | frozenset | types.FunctionType)
+
+
+@_once_per_type
+def _is_frozen(kind: type) -> bool:
+    parameters = getattr(kind, "__dataclass_params__", None)
+    return parameters is not None and parameters.frozen and not hasattr(kind, "__content__")
+
+
+@functools.cache
+def _is_found_later(kind: type, name: str) -> bool:
+    return isinstance(getattr(kind, name, None), functools.cached_property)
 
 
 def _attributes(kind: type, state: Any) -> Any:
     """Return an object's attributes by name, without those that follow from others."""
     if not isinstance(state, dict):
         return state
-    return tuple(
-        (name, state[name])
-        for name in sorted(state)
-        if not isinstance(getattr(kind, name, None), functools.cached_property)
-    )
+    names = [name for name in sorted(state) if not _is_found_later(kind, name)]
+    return tuple((name, state[name]) for name in names)
 
 
-def _hash(tag: bytes, parts: Iterable[bytes]) -> bytes:
+def _hash(tag: bytes, parts: list[bytes]) -> bytes:
     """Return what tells several parts from all others: themselves if they are short."""
-    told = b"".join(b"%d:%s" % (len(part), part) for part in (tag, *parts))
+    told = b"".join([b"%d:%s" % (len(part), part) for part in (tag, *parts)])
     return b"p" + told if len(told) < _SHORT else b"h" + hashlib.sha256(told).digest()

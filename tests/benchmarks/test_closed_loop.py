@@ -14,6 +14,7 @@ SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
 SPAN = 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_elastic_6r"])
 def test_closed_loop(benchmark, name):
     scenario = shipped_scenario(name)

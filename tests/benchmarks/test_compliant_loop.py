@@ -94,6 +94,7 @@ def fixture_loop():
     return loop
 
 
+@pytest.mark.slow
 def test_closed_loop(benchmark):
     loop = Loop()
     benchmark.pedantic(
@@ -104,6 +105,7 @@ def test_closed_loop(benchmark):
         benchmark.extra_info["real_time_factor"] = SPAN / benchmark.stats.stats.median
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "port"), OUTPUTS)
 def test_output(loop, benchmark, name, port):
     system, fixed, context = loop.isolate(name)
@@ -119,6 +121,7 @@ def test_output(loop, benchmark, name, port):
         np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UPDATES)
 def test_update(loop, benchmark, name):
     """The state of the next tick, with the outputs of this one that it follows from."""
@@ -132,6 +135,7 @@ def test_update(loop, benchmark, name):
     assert np.isfinite(state.value()).any()
 
 
+@pytest.mark.slow
 def test_plant(loop, benchmark):
     """Accelerations and reaction forces, as the sensor asks for them."""
     plant = loop.station.part.plant

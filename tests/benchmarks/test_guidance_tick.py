@@ -64,6 +64,7 @@ def test_rules_alone(benchmark, place):
     benchmark.pedantic(ticks, rounds=20, warmup_rounds=2)
 
 
+@pytest.mark.slow
 def test_whole_chain(benchmark):
     """A hand presses the tool on the cylinder of `vf_forbidden_region`, six balls around it."""
     file = find_scenario("vf_forbidden_region")

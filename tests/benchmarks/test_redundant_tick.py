@@ -25,6 +25,7 @@ POSTURES = {
 SPAN, COUNT = 0.45, 64
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("posture", POSTURES)
 def test_tick_of_seven_elastic_axes(benchmark, posture):
     """Observers and supervision included, on the states of successive ticks at 1 m/s."""

@@ -108,6 +108,7 @@ def test_distance_of_a_moving_region(benchmark, kind):
     )
 
 
+@pytest.mark.slow(but="2")
 @pytest.mark.parametrize("count", [2, 10, 50, 200])
 def test_schedule(benchmark, count):
     """Time of 1000 ticks of a walk among closed forms, all distances within."""

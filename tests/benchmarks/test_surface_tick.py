@@ -77,6 +77,7 @@ class Ticks:
             self.evaluate(*arguments)
 
 
+@pytest.mark.slow(but="cylinder-2")
 @pytest.mark.parametrize("order", [2, 4])
 @pytest.mark.parametrize("name", SURFACES)
 def test_surface_point(benchmark, name, order):

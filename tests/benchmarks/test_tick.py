@@ -188,6 +188,7 @@ def fixture_chain(request):
     return Chain(*CASES[request.param])
 
 
+@pytest.mark.slow(but="6R elastic oriented with all")
 def test_whole_tick(chain, benchmark):
     before = chain.tick().copy()
     drive = benchmark.pedantic(chain.tick, setup=chain.remember, rounds=3000, warmup_rounds=50)
@@ -198,6 +199,7 @@ def test_whole_tick(chain, benchmark):
     assert not np.array_equal(drive, before)
 
 
+@pytest.mark.slow(but="3R elastic")
 def test_updates(chain, benchmark):
     """What comes on top of a tick, once the drives have their torques."""
 

@@ -67,6 +67,7 @@ def fixture_compiled(tmp_path_factory):
     return ctypes.CDLL(str(folder / "test.so"))
 
 
+@pytest.mark.slow(but="calls")
 @needs_gcc
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_results(name, compiled):

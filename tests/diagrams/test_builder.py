@@ -85,6 +85,7 @@ def test_a_second_station_shares_functions_and_nothing_that_changes(settings, st
     assert again.diagram is not station.diagram
 
 
+@pytest.mark.slow
 def test_a_station_that_differs_in_one_number_has_functions_of_its_own(settings, station):
     settings.controller.max_alpha = np.nextafter(settings.controller.max_alpha, 0.0)
     other = build_station(settings, Path())
@@ -240,6 +241,7 @@ def test_a_joint_without_drive(settings, tmp_path):
         build_station(settings, tmp_path)
 
 
+@pytest.mark.slow
 def test_a_law_for_velocity_servos_needs_its_own_gains(settings):
     settings.controller.law = "velocity_servo"
     with pytest.raises(InputError, match=r"controller\.gains.*velocity_servo"):
@@ -272,6 +274,7 @@ def test_drives_go_to_their_joints_in_any_order(settings, tmp_path):
     assert dict(zip(order, actuation, strict=True)) == expected
 
 
+@pytest.mark.slow
 def test_warning_only_where_joints_resonate_too_fast(settings):
     settings.controller.law = "elastic"
     assert build_station(settings, Path()).warnings == []

@@ -59,6 +59,7 @@ def delta(load_exact_scenario):
     return settings
 
 
+@pytest.mark.slow
 def test_a_delta_robot_that_touches_nothing_yields_to_its_sensor(delta):
     """The analytic plant has no joint that bears the load; its reaction is computed."""
     delta.robot.plant = "analytic"
@@ -73,6 +74,7 @@ def test_a_delta_robot_that_touches_nothing_yields_to_its_sensor(delta):
     )
 
 
+@pytest.mark.slow
 def test_the_sensor_of_a_delta_robot_takes_off_the_load_while_it_moves(delta):
     """What is left of a moving load of 0.7 kg is what the drives' steps leave."""
     delta.compliance, delta.reference.dwell = soft(), 0.1
@@ -101,6 +103,7 @@ def test_a_slide_that_is_not_measured_spoils_the_compensation_but_not_what_is_bo
     assert np.linalg.norm(load[:3]) == pytest.approx(weight, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_hand_leads_a_delta_robot(delta):
     delta.compliance = soft()
     delta.compliance.tangential = CoordinateImpedance(Profile(1.0), Profile(30.0), Profile(0.0))
@@ -208,6 +211,7 @@ def test_the_coupled_plant_has_no_contact(arm_in_a_notch):
         build_station(arm_in_a_notch, SCENARIO_DIRECTORY)
 
 
+@pytest.mark.slow
 def test_trajectory_tracking_for_a_delta_robot(delta):
     """The other task: the point moves on with time, whatever the tool does."""
     delta.controller.manifold, delta.reference.dwell = "trajectory", 0.05

@@ -45,6 +45,7 @@ def applied(part, root, about):
     return total
 
 
+@pytest.mark.slow
 def test_the_plants_bear_opposite_wrenches(known):
     """As sums over the bodies of both of Drake's plants, moments about a point of neither."""
     station, root, log = known
@@ -62,6 +63,7 @@ def test_the_plants_bear_opposite_wrenches(known):
     assert np.abs(told - first).max() < 0.05
 
 
+@pytest.mark.slow
 def test_the_force_along_the_seam_is_one_of_the_seam_in_the_world(known):
     """Its direction is that of the seam where the workpiece has it, not that in its frame."""
     _, _, log = known
@@ -73,6 +75,7 @@ def test_the_force_along_the_seam_is_one_of_the_seam_in_the_world(known):
     assert np.linalg.norm(part) == pytest.approx(-ALONG, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_told_both_arms_stay_where_they_are_to_be(known):
     _, _, log = known
     late = log.time >= 0.5
@@ -80,6 +83,7 @@ def test_told_both_arms_stay_where_they_are_to_be(known):
         assert np.linalg.norm(log[name].values[late], axis=1).max() < 2e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("untold", ["both", "holder"])
 def test_untold_the_tool_leaves_the_seam(known, untold):
     settings = grinding("known")
@@ -92,6 +96,7 @@ def test_untold_the_tool_leaves_the_seam(known, untold):
     assert off["xi"] > 0.1e-3
 
 
+@pytest.mark.slow
 def test_the_holder_is_told_what_the_other_ones_sensor_measures(known):
     """As it is seen at the workpiece's frame; it has no sensor of its own."""
     settings = grinding("measured")
@@ -104,6 +109,7 @@ def test_the_holder_is_told_what_the_other_ones_sensor_measures(known):
     assert not any("sensor" in line for line in station.holder.warn())
 
 
+@pytest.mark.slow
 def test_what_does_not_know_of_the_process_is_warned_of(known):
     settings = grinding("none")
     station = build_station(settings, SCENARIO_DIRECTORY, like=known[0])

@@ -101,6 +101,7 @@ def test_what_the_drives_are_asked_for_is_known_beforehand(known):
         assert np.abs(speed - log[f"{prefix}v_M"].values[ticks])[:, :last].max() < 0.02
 
 
+@pytest.mark.slow
 def test_two_robots_that_are_too_fast_are_warned_of():
     """With a pace of both at which they are not."""
 
@@ -121,6 +122,7 @@ def test_two_robots_that_are_too_fast_are_warned_of():
     assert not built(3.0 * pace - 0.03).task.drive_plan.said
 
 
+@pytest.mark.slow
 def test_an_error_of_placement_is_seen_one_to_one(known):
     """No controller knows of it: as measured the tool is on the seam, and in truth beside it."""
     error = PoseParameters(position=[0.1e-3, 0.2e-3, -0.1e-3], zyx_deg=[0.0, 0.02, 0.0])
@@ -138,6 +140,7 @@ def test_an_error_of_placement_is_seen_one_to_one(known):
     assert np.linalg.norm(log["xi"].values[-1]) == pytest.approx(across, rel=0.01)
 
 
+@pytest.mark.slow
 def test_what_is_not_told_of_the_motion_costs(known):
     deviation = {
         highest: np.linalg.norm(
@@ -149,6 +152,7 @@ def test_what_is_not_told_of_the_motion_costs(known):
     assert deviation[0] > 50.0 * deviation[2]
 
 
+@pytest.mark.slow
 def test_planned_derivatives_are_those_of_the_pose(known):
     """As differences of the true poses say, of a holder that is where it was planned to be."""
     station, root, log = run(exact(derivatives="planned"), like=known[0])
@@ -163,6 +167,7 @@ def test_planned_derivatives_are_those_of_the_pose(known):
     assert np.abs(told[middle, 24:36] - bend).max() < 3e-3 * np.abs(bend).max()
 
 
+@pytest.mark.slow(but="holder")
 @pytest.mark.parametrize("failing", ["follower", "holder"])
 def test_a_fault_of_one_stops_both(known, failing):
     """The other one at the same tick or the next; both come to rest."""

@@ -87,6 +87,7 @@ def test_a_sensor_of_an_elastic_joint(soft, kind, component):
     check_rest(station, result, times, log, degrees=6.0)
 
 
+@pytest.mark.slow(but="jump-v_J_6")
 @pytest.mark.parametrize(
     ("kind", "name"),
     [
@@ -110,6 +111,7 @@ def test_a_sensor_of_a_light_arm_with_more_joints_than_outputs(seven, kind, name
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_a_fault_while_a_hand_holds_the_elbow(seven):
     """Held with 250 N/m, the arm stands; the hand moves on for a while."""
     settings = seven("pfc_elbow_7r")
@@ -123,6 +125,7 @@ def test_a_fault_while_a_hand_holds_the_elbow(seven):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_lost_frames_of_a_light_arms_bus(seven):
     settings = seven("pfc_panda_7r")
     settings.controller.law = "velocity_servo"
@@ -137,6 +140,7 @@ def test_lost_frames_of_a_light_arms_bus(seven):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_brakes_hold_a_joint_of_which_nothing_is_measured(six_axes):
     failure = six_axes.simulation.sensor_failure
     failure.time, failure.component, failure.whole_joint = 0.35, 1, True
@@ -144,6 +148,7 @@ def test_brakes_hold_a_joint_of_which_nothing_is_measured(six_axes):
     check_rest(*go_on(six_axes, 1.0))
 
 
+@pytest.mark.slow
 def test_brakes_hold_an_elastic_joint_of_which_nothing_is_measured(soft):
     """By default, with friction in the drives; of a robot without brakes they are requested."""
     failure = soft.simulation.sensor_failure
@@ -167,6 +172,7 @@ def test_brakes_hold_an_elastic_joint_of_which_nothing_is_measured(soft):
     assert requested[first] == 2.0 and requested[-1] == 0.0
 
 
+@pytest.mark.slow
 def test_brakes_stop_servos_that_have_lost_a_joint(seven):
     settings = seven("pfc_panda_7r")
     settings.controller.law = "velocity_servo"
@@ -219,6 +225,7 @@ def test_a_sensor_that_is_not_tared_may_be_at_the_end_of_its_range(six_axes):
     assert told == SensorFault.SATURATED
 
 
+@pytest.mark.slow
 def test_lost_frames_of_a_bus(six_axes):
     """Short losses are bridged; the servos stop when nothing has come for 10 ms."""
     six_axes.controller.law = "velocity_servo"
@@ -234,6 +241,7 @@ def test_lost_frames_of_a_bus(six_axes):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_a_joint_at_its_limit(six_axes, monkeypatch):
     """Axis 1 sets off to more than 5 deg beside where it starts."""
     six_axes.compliance = type(six_axes.compliance)()
@@ -252,12 +260,14 @@ def test_a_joint_at_its_limit(six_axes, monkeypatch):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow
 def test_a_drive_at_its_limit_for_long(soft):
     soft.controller.effort_scale, soft.faults.saturation_time = 0.05, 0.02
     _, result, *_ = go_on(soft, 0.5, after=0.0)
     assert result.fault.startswith(f"{Fault.DRIVE_SATURATED.explanation}: ")
 
 
+@pytest.mark.slow
 def test_three_free_turns_about_the_tools_axis(six_axes):
     """The reference turns on and on, and the angles with it."""
     compliance = six_axes.compliance
@@ -281,6 +291,7 @@ def test_three_free_turns_about_the_tools_axis(six_axes):
     assert np.abs(drive[300:]).max() < 600.0
 
 
+@pytest.mark.slow(but="1")
 @pytest.mark.parametrize("end", [0, 1])
 def test_at_the_end_of_an_open_path(load_exact_scenario, end):
     """Pushed against the end at 0.4 m/s, which is a wall; the tool turned on the way to it."""

@@ -29,6 +29,7 @@ def test_the_shipped_settings_give_no_warning(scenario):
     assert warnings(scenario) == []
 
 
+@pytest.mark.slow
 def test_joints_too_soft_for_the_law(scenario):
     """The tool then leaves the path by tens of millimetres at 1.5 m/s."""
     scenario.controller.boundary_layer_damping = [0.03, 0.03, 0.02]
@@ -49,6 +50,7 @@ def test_joints_so_soft_that_the_law_is_unstable(scenario):
     assert "unstable" in warning and "slower gains" in warning
 
 
+@pytest.mark.slow
 def test_stiff_joints_suit_both_laws():
     """Deviations of 0.1 mm and less at 0.3 m/s; with the printed damping 0.4 mm."""
     scenario = shipped_scenario("pfc_comau_6r")
@@ -63,6 +65,7 @@ def test_stiff_joints_suit_both_laws():
     assert warnings(scenario) == []
 
 
+@pytest.mark.slow
 def test_servos_faster_than_the_joints(scenario):
     scenario.controller.law = "velocity_servo"
     slow = GainParameters(poles=[-5.0])
@@ -85,6 +88,7 @@ def test_resonances_too_fast_for_the_elastic_law(scenario):
     assert "Hz" in warning and "singular_perturbation" in warning
 
 
+@pytest.mark.slow
 def test_damping_too_strong_for_the_sampling(scenario):
     scenario.controller.law = "singular_perturbation"
     # 35000 Nm/rad * 0.06 s * 1 ms / 4.95 kg m^2 = 0.42
@@ -120,6 +124,7 @@ def with_gains(scenario, **kinds):
     return scenario
 
 
+@pytest.mark.slow
 def test_gains_that_do_not_bear_an_error_of_the_model():
     """Four equal poles on six axes: unstable with masses 5 % off, by simulation as well."""
     scenario = shipped_scenario("pfc_elastic_6r")
@@ -179,6 +184,7 @@ def test_refused_ways_to_choose_poles(wrong, key):
         GainParameters(**wrong)
 
 
+@pytest.mark.slow
 def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
     """From 3.5 % (still) to 4 % (swings at 13 Hz) on, simulated with all masses too high."""
     scenario = shipped_scenario("vf_soft_circle")

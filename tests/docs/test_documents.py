@@ -52,6 +52,7 @@ def _named(item: Block | Command) -> str:
     return item.place if isinstance(item, Block) else str(item)
 
 
+@pytest.mark.slow(but="robot.md:172")
 @pytest.mark.parametrize("block", blocks("yaml"), ids=_named)
 def test_yaml(block: Block, desk: Path) -> None:
     """A station is built; of alternatives, which stand elsewhere than the robot, the surface."""
@@ -154,6 +155,7 @@ def test_actuators_of_a_plant_of_ones_own(desk: Path, monkeypatch: pytest.Monkey
     assert limits["pan"] == 330.0 and limits["wrist_3"] == 56.0 and len(limits) == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "port"), [(1, "manifold_force"), (2, "mode")], ids=["compliance", "guidance"]
 )

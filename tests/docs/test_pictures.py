@@ -12,6 +12,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+@pytest.mark.slow
 def test_a_recording_at_two_of_its_times(tmp_path):
     recording = record_run("pfc_elastic_3r", tmp_path / "run", 0.5)
     with opened_browser() as browser:

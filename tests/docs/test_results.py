@@ -19,6 +19,7 @@ def _outcome(status: str = COMPLETED, reason: str = "", deviation: float = 7.04e
     return Outcome(RunRow(status, reason, metrics, revision="a" * 40), 0.02)
 
 
+@pytest.mark.slow
 def test_every_scenario_has_its_laws():
     every = cases()
     assert {case.scenario for case in every} == set(scenario_names())
@@ -72,6 +73,7 @@ def test_what_was_run_is_kept_for_its_revision(tmp_path, monkeypatch):
     assert docs.results._kept(case, "a" * 40 + "+dirty") is None
 
 
+@pytest.mark.slow
 def test_two_scenarios(tmp_path, monkeypatch):
     monkeypatch.setattr(docs.results, "KEPT", tmp_path)
     monkeypatch.setattr(docs.results, "count_cores", lambda: 1)

@@ -28,6 +28,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "html"
 
 
+@pytest.mark.slow
 def test_every_document_is_a_page(site: Path) -> None:
     for file in PAGES:
         page = site / file.relative_to(ROOT / "docs").with_suffix(".html")
@@ -35,6 +36,7 @@ def test_every_document_is_a_page(site: Path) -> None:
         assert "<!-- made:" not in page.read_text(encoding="utf-8"), file
 
 
+@pytest.mark.slow
 def test_links(site: Path) -> None:
     assert broken_links(site) == []
 

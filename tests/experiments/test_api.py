@@ -86,6 +86,7 @@ def test_whatever_is_announced_is_there(name):
         experiments.runs  # noqa: B018
 
 
+@pytest.mark.slow
 def test_a_scenario_made_in_python_runs_again(short):
     scenario = short.scenario
     assert isinstance(scenario, Scenario)
@@ -97,6 +98,7 @@ def test_a_scenario_made_in_python_runs_again(short):
     assert abs(again.log["tau_d"].values[0] - short.log["tau_d"].values[0]).max() > 0.1  # Nm
 
 
+@pytest.mark.slow
 def test_changes_of_python_and_of_text(mine):
     changes = CHANGES | {
         "reference.points": np.array([0.1, 0.101]),
@@ -148,6 +150,7 @@ def test_a_fault_is_told_and_kept(tmp_path):
     assert f"fault: {faulty.fault.split()[0]}" in again._repr_html_()
 
 
+@pytest.mark.slow
 def test_a_temporary_folder_is_gone_with_its_run():
     result = run(
         "pfc_elastic_3r", CHANGES, duration=0.01, figures=False, recording=False, quiet=True
@@ -159,6 +162,7 @@ def test_a_temporary_folder_is_gone_with_its_run():
     assert not folder.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_figures_and_recording_are_shown(tmp_path, notebook, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -272,6 +276,7 @@ def test_a_table_of_pandas(short):
     assert table.attrs["units"]["xi"] == "m"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_margins():
     told = margins(

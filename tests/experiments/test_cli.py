@@ -328,6 +328,7 @@ def run_process(*arguments: str, code: str | None = None) -> subprocess.Complete
     )
 
 
+@pytest.mark.slow
 def test_module_exits_with_the_status():
     result = run_process("run", "no_such_scenario")
     assert result.returncode == 2

@@ -37,6 +37,7 @@ def fixture_make_run(tmp_path):
     return make
 
 
+@pytest.mark.slow
 def test_both_runs_are_on_the_page(make_run, tmp_path, capsys):
     folders = [make_run("slow", 0.0123), make_run("fast", 0.0456)]
     out = tmp_path / "page"
@@ -52,6 +53,7 @@ def test_both_runs_are_on_the_page(make_run, tmp_path, capsys):
     }
 
 
+@pytest.mark.slow
 def test_the_page_says_whether_the_motions_are_the_same(make_run, tmp_path):
     folders = [make_run("slow", 0.01), make_run("fast", 0.02)]
     arguments = ["compare", *map(str, folders), "--out", str(tmp_path / "page")]
@@ -73,6 +75,7 @@ def test_without_orientation_there_is_no_picture_of_it(make_run, tmp_path):
     assert not (tmp_path / "page" / "figures" / "orientations.png").exists()
 
 
+@pytest.mark.slow
 def test_axes_are_compared_with_axes(make_run, tmp_path):
     folders = [make_run("a", 0.01, told="axis"), make_run("b", 0.02, told="axis")]
     assert main(["compare", *map(str, folders), "--out", str(tmp_path / "page")]) == 0
@@ -82,6 +85,7 @@ def test_axes_are_compared_with_axes(make_run, tmp_path):
     assert not (tmp_path / "other" / "figures" / "orientations.png").exists()
 
 
+@pytest.mark.slow
 def test_forces_are_compared_where_both_have_them(make_run, tmp_path):
     out = tmp_path / "page"
     folders = [make_run("a", 0.01, pushed=True), make_run("b", 0.02, pushed=True)]

@@ -65,6 +65,7 @@ def test_c_repeats_a_run_to_the_last_bit(elastic):
     assert found.stdout.startswith("first difference: tick 7, number 0 of the outputs")
 
 
+@pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("name", OTHERS)
 def test_c_repeats_runs_of_other_kinds(name, tmp_path):
@@ -87,6 +88,7 @@ def assert_torques_are_fed_from_a_log(folder, recorded):
     np.testing.assert_array_equal(told, recorded[:, 30:36])
 
 
+@pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize(
     ("sides", "state", "torque"),
@@ -119,6 +121,7 @@ def test_wrong_inputs_end_in_a_fault(elastic):
     assert int(found.stdout.split()[-1]) > 50
 
 
+@pytest.mark.slow(but="inf")
 @needs_gcc
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
 def test_what_is_no_measurement_ends_in_a_fault(elastic, library, bad):

@@ -31,6 +31,7 @@ def test_what_a_call_gives(controller):
     assert [(port["name"], port["size"]) for port in said["inputs"]] == [("joint_state", 12)]
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_what_it_would_have_told_the_drives(controller, monkeypatch):
     monkeypatch.setenv("MAKEFLAGS", "OPTIMIZATION=-O0")

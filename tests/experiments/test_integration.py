@@ -53,6 +53,7 @@ def whole_trials(monkeypatch):
     monkeypatch.setattr(integration, "_TICKS", TICKS)
 
 
+@pytest.mark.slow(but="pfc_elastic_3r-changes1-runge_kutta3-runge_kutta2")
 @pytest.mark.parametrize(
     ("name", "changes", "scheme", "without"),
     [
@@ -83,6 +84,7 @@ def test_it_is_the_same_every_time():
     assert choices[0] == choices[1]
 
 
+@pytest.mark.slow
 def test_an_unstable_scheme_is_not_chosen_whatever_its_error(monkeypatch):
     """Second order makes undamped joints oscillate ever more, in the end."""
     monkeypatch.setattr(integration, "_TOLERANCE", 1.0)
@@ -111,6 +113,7 @@ def test_the_start_of_the_scenario_does_not_decide(start):
     assert choose("pfc_elastic_3r", start).scheme == "runge_kutta3"
 
 
+@pytest.mark.slow
 def test_stiff_joints_get_shorter_steps(stiff):
     settings, station = build("pfc_elastic_3r", *stiff)
     chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
@@ -131,12 +134,14 @@ def test_a_step_is_never_longer_than_a_tick():
     assert choose("pfc_elastic_6r", *RIGID, "simulation.max_step=0.01").step == 1e-3
 
 
+@pytest.mark.slow(but="1e-06")
 @pytest.mark.parametrize("step", [1e-5, 1e-6])
 def test_steps_that_are_short_already_take_no_long_trial(step):
     chosen = choose("pfc_elastic_6r", *RIGID, f"simulation.max_step={step}")
     assert (chosen.scheme, chosen.step) == ("runge_kutta2", step)
 
 
+@pytest.mark.slow
 def test_a_discrete_plant_has_steps_of_its_own():
     chosen = choose("pfc_delta_notch")
     assert "time steps of its own, 0.5 ms" in chosen.reason
@@ -168,6 +173,7 @@ def test_a_run_says_it_and_its_copy_gives_the_same(run_scenario, tmp_path):
             np.testing.assert_array_equal(one[name][:], two[name][:])
 
 
+@pytest.mark.slow
 def test_friction_is_made_for_a_step_that_had_to_be_shorter(run_scenario, tmp_path, stiff):
     """The copy, which names the step, gives the same."""
     changes = ("simulation.integrator=auto", "friction.f_c=[20, 20, 10]", *stiff)

@@ -38,6 +38,7 @@ def test_it_is_what_is_installed():
     assert project["project"]["scripts"] == {"pfsc": "pfsc_drake.program:main"}
 
 
+@pytest.mark.slow
 def test_from_any_folder(tmp_path):
     result = pfsc(tmp_path, "run", "no_such_scenario")
     assert result.returncode == 2

@@ -46,6 +46,7 @@ def run(settings):
     return simulated
 
 
+@pytest.mark.slow
 def test_steps_are_fine_enough(settings, run):
     """Fixed steps as shipped against error control four orders tighter than what is asked."""
     assert settings.simulation.accuracy == 0.0
@@ -124,6 +125,7 @@ def test_motion_ends_where_the_state_is_unknown(settings, run, time, frames):
     assert np.isfinite(motion.positions).all()
 
 
+@pytest.mark.slow(but="0.4005")
 @pytest.mark.parametrize("duration", [0.401, 0.4005])
 def test_between_two_ticks_a_controller_finds_nothing_new(settings, run, duration):
     """There the last tick is less than a period ago: positions moved by less than they should."""

@@ -100,6 +100,7 @@ def deviation(path, law, told, model="comau_racer_1_4"):
     return max(largest[len(largest) // 2 :])
 
 
+@pytest.mark.slow
 def test_a_path_on_a_turntable(path):
     """From rest beside a table that turns on: the tool catches up, and stays."""
     exact = deviation(path, "rigid", None)

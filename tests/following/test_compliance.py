@@ -73,6 +73,7 @@ def axes(tool):
     return tool.follower.followed.manifold.axes(point).full()
 
 
+@pytest.mark.slow
 def test_a_hand_stays_on_an_open_path():
     """It pushes the tool from 0.1 m against the start, and no farther."""
     table = WaypointTable(np.linspace(POINTS[0], POINTS[1], 9))
@@ -84,6 +85,7 @@ def test_a_hand_stays_on_an_open_path():
     assert -1e-3 < tool.read("manifold_state")[0] < 5e-3
 
 
+@pytest.mark.slow
 def test_a_tool_yields_across_a_path_like_its_spring(path):
     """By f / k across, and not along."""
     tool = on_path(path, transversal=SPRING)
@@ -102,6 +104,7 @@ def test_a_tool_yields_across_a_path_like_its_spring(path):
     assert np.linalg.norm(tool.read("manifold_state")[1:3]) < 1e-4
 
 
+@pytest.mark.slow
 def test_a_hand_leads_a_tool_along_a_path_as_far_as_its_joints_are_fast(path):
     """Along with f / d, on the path; then no joint is faster than its share."""
     tool = on_path(path, tangential=FREE)
@@ -122,6 +125,7 @@ def test_a_hand_leads_a_tool_along_a_path_as_far_as_its_joints_are_fast(path):
     assert slow.read("limit_force").max() > 10.0
 
 
+@pytest.mark.slow
 def test_a_tool_yields_across_a_surface_like_its_spring():
     surface = paraboloid([(-0.3, 0.3), (-0.3, 0.3)], 0.5, [0.9, 0.0, 0.7])
     builder = DiagramBuilder()

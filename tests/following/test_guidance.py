@@ -68,6 +68,7 @@ def test_laws_of_torques_are_told_of_the_hand(law, told):
         assert (torque.source, torque.bandwidth) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "model"),
     [
@@ -93,6 +94,7 @@ def test_a_hand_feels_the_mass_and_damping_that_are_given(law, model):
     assert np.abs(turned.matrix() - np.eye(3)).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_hard_region_holds_the_tool_and_a_soft_one_gives_way():
     """On the floor against 12 N; the soft one by f / k."""
     held = {}
@@ -122,6 +124,7 @@ def test_a_region_that_rises_lifts_the_tool():
     assert tool.pose().translation()[2] == pytest.approx(0.815, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_path_attracts_the_tool_until_the_hand_pulls_it_away():
     """Beside it the hand's 8 N are the spring's; along it they are the admittance's."""
     p, aside = START.translation(), np.array([0.0, 0.3, 0.0])
@@ -143,6 +146,7 @@ def test_a_path_attracts_the_tool_until_the_hand_pulls_it_away():
     assert tool.read("guides")[fields["active"]][0] == -1.0
 
 
+@pytest.mark.slow
 def test_without_the_hands_force_told_the_law_lets_it_push_the_tool():
     """What makes `tells_law` worth it: the tool is pushed into the floor."""
     depths = []
@@ -155,6 +159,7 @@ def test_without_the_hands_force_told_the_law_lets_it_push_the_tool():
     assert depths[1] > 1e-4
 
 
+@pytest.mark.slow(but="False-9")
 @pytest.mark.parametrize(
     ("tells", "fault"), [(True, Fault.INPUT_NOT_FINITE), (False, Fault.FORCE_SENSOR_LOST)]
 )
@@ -167,6 +172,7 @@ def test_a_wrench_that_is_no_number_stops_the_robot(tells, fault):
     assert tool.fault() == fault
 
 
+@pytest.mark.slow
 def test_more_regions_than_eight_are_looked_at_in_turn():
     """The floor is the ninth; balls are far away."""
     balls = [SphereRegion([0.9, 0.3 + 0.2 * k, 1.3], 0.05, inside=False) for k in range(8)]
@@ -187,6 +193,7 @@ def test_it_steps_without_drake():
         tool.run((k + 1) * tool.follower.period)
 
 
+@pytest.mark.slow
 def test_servos_are_told_velocities_along_the_pull():
     builder = DiagramBuilder()
     plant = load(builder)

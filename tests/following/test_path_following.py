@@ -71,6 +71,7 @@ def read(simulator, follower, port):
     return follower.GetOutputPort(port).Eval(context)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "law"),
     [("comau_racer_1_4", "rigid"), ("comau_racer_1_4_elastic", "elastic")],
@@ -118,6 +119,7 @@ def test_a_stream_has_a_speed_and_no_override(path):
         )
 
 
+@pytest.mark.slow
 def test_velocity_servos_are_told_velocities(path):
     builder = DiagramBuilder()
     plant = load(builder, "comau_racer_1_4")
@@ -144,6 +146,7 @@ def fixture_undriven(tmp_path):
     return model
 
 
+@pytest.mark.slow
 def test_a_joint_without_actuator_is_named_where_torques_are_commanded(path, undriven):
     builder = DiagramBuilder()
     plant = MultibodyPlant(0.0)
@@ -155,6 +158,7 @@ def test_a_joint_without_actuator_is_named_where_torques_are_commanded(path, und
     assert servos.HasOutputPort("velocity_reference") and not servos.HasOutputPort("actuation")
 
 
+@pytest.mark.slow
 def test_actuators_that_are_added_drive_their_joints(path, undriven):
     """The third joint's actuator is the last of the plant then."""
     builder = DiagramBuilder()
@@ -176,6 +180,7 @@ def test_actuators_that_are_added_drive_their_joints(path, undriven):
     assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
 
 
+@pytest.mark.slow
 def test_doubts_that_a_scenario_has_are_told_and_logged_once(path, caplog):
     """Of gains that are unstable on a perfect model, and of waypoints in nearly one place."""
     close = np.array([*POINTS[:2], POINTS[1], *POINTS[2:]])
@@ -193,6 +198,7 @@ def test_doubts_that_a_scenario_has_are_told_and_logged_once(path, caplog):
     assert [record.message for record in caplog.records] == follower.warnings
 
 
+@pytest.mark.slow
 def test_a_law_that_does_not_suit_the_robot_is_named(path):
     """The composite law with more damping than sampling at 1 ms allows, and with less."""
     for damping, is_named in ((0.01, True), (0.001, False)):
@@ -233,6 +239,7 @@ def test_a_fault_is_described(path, row, value, said):
         follower.describe(99)
 
 
+@pytest.mark.slow
 def test_an_override_slows_the_progress_and_not_the_tool(path):
     simulator, follower = closed_loop(
         path, "comau_racer_1_4", "rigid", FollowerOptions(override=True)
@@ -261,6 +268,7 @@ def test_it_starts_where_the_robot_is_with_a_transition(path):
     assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_path_that_oscillates_along_its_normal_is_followed(path):
     swing = Swing(coordinate=2, amplitude=0.012, frequency=2.0, begin=0.05, ramp=0.2)
     simulator, follower = closed_loop(
@@ -274,6 +282,7 @@ def test_a_path_that_oscillates_along_its_normal_is_followed(path):
         assert abs(expected) > 5e-3
 
 
+@pytest.mark.slow
 def test_a_trajectory_is_tracked_for_comparison(path):
     """The tool comes back to where time prescribes it to be, not to the closest point."""
     options = FollowerOptions(controller=ControllerParameters(manifold="trajectory"))
@@ -293,6 +302,7 @@ def test_a_trajectory_is_tracked_for_comparison(path):
     assert distances[0] > 5e-3 and distances[1] < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("state", ["observed", "from_torque"])
 def test_links_are_found_where_motors_alone_are_measured(path, state):
     """The links' side of what is measured is wrong; torques are those of the springs."""
@@ -358,6 +368,7 @@ def test_what_is_refused(path, changes, message):
         add_path_following(builder, plant, path=path, **given)
 
 
+@pytest.mark.slow
 def test_a_path_out_of_reach_is_refused():
     far = path_from_waypoints(
         WaypointTable(np.array(POINTS) + np.array([3.0, 0.0, 0.0])), smoothness=6, closed=True
@@ -375,6 +386,7 @@ def test_the_door_is_open():
         pfsc_drake.window  # noqa: B018
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_the_same_in_c(path, tmp_path):
     """Which repeats what the controller makes of a robot that is pushed about a little."""

@@ -211,6 +211,7 @@ BASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", BASES)
 def test_every_option_acts_or_is_refused(base):
     make, options = BASES[base]
@@ -281,6 +282,7 @@ CONDITIONAL = [
 ]
 
 
+@pytest.mark.slow(but="follow-options0-compliance-names0")
 @pytest.mark.parametrize(("make", "options", "block", "names"), CONDITIONAL)
 def test_options_act_where_they_are_needed(make, options, block, names):
     plain, within = shape(make(options)), options

@@ -59,6 +59,7 @@ def _told(follower, context, place):
     follower.GetInputPort("obstacles").FixValue(context, np.array([*place, 0.0, 0.0, 0.0, 0.0]))
 
 
+@pytest.mark.slow
 def test_it_waits_for_one_who_stands_on_its_way_and_goes_on_when_he_has_gone(loop):
     follower, start = loop
     simulator, context = start()
@@ -134,6 +135,7 @@ def test_what_cannot_wait_is_refused():
             add_path_following(builder, plant, "tool_point", path, "rigid", options=options)
 
 
+@pytest.mark.slow
 def test_an_elbow_avoids_obstacles_where_there_is_one():
     """The torques that push it away are in the loop; three joints leave none to spare."""
     path = path_from_waypoints(WaypointTable(POINTS), smoothness=6)

@@ -52,6 +52,7 @@ def prepared_or_line(data, folder=SCENARIO_DIRECTORY):
     return True
 
 
+@pytest.mark.slow(but="parallel")
 @pytest.mark.parametrize("base", BASES)
 def test_scenarios_are_prepared_or_refused_in_one_line(guarded, examples, base):
     data = full_scenario(*BASES[base])
@@ -66,6 +67,7 @@ def test_scenarios_are_prepared_or_refused_in_one_line(guarded, examples, base):
     check()
 
 
+@pytest.mark.slow(but="keys1")
 @pytest.mark.parametrize("keys", [{}, {"tolerance": 1e-3}, {"corner_distance": 0.01}])
 def test_tables_are_paths_or_refused_in_one_line(guarded, examples, tmp_path, keys):
     data = full_scenario("pfc_delta")
@@ -83,6 +85,7 @@ def test_tables_are_paths_or_refused_in_one_line(guarded, examples, tmp_path, ke
     check()
 
 
+@pytest.mark.slow
 def test_runs_end_with_a_status_and_one_line(guarded, examples, tmp_path, capfd):
     data = full_scenario("pfc_elastic_3r", "hand={}")
     file = tmp_path / "mutated.yaml"

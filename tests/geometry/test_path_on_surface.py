@@ -37,6 +37,7 @@ CURVES = {
 }
 
 
+@pytest.mark.slow(but="open")
 @pytest.mark.parametrize("name", CURVES)
 def test_derivatives_and_turning_against_interpolation(name):
     """The angle psi against parallel transport, whose frame knows nothing of the surface."""

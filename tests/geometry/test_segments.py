@@ -23,6 +23,7 @@ def _searched(a, b, c, d):
     return min(minimize(distance, x, bounds=bounds, tol=1e-12).fun for x in starts)
 
 
+@pytest.mark.slow
 def test_distances_are_the_least_that_a_search_finds():
     rng = np.random.default_rng(1)
     for _ in range(60):
@@ -74,6 +75,7 @@ def _swept(a, b, c, d, way):
     return np.sqrt(best.fun), best.x[2]
 
 
+@pytest.mark.slow(but="2.0")
 @pytest.mark.parametrize("away", [0.0, 0.5, 2.0])
 def test_what_a_segment_sweeps_is_as_far_as_a_search_finds(away):
     """Through it, over its inside, and beside it."""

@@ -21,6 +21,7 @@ def fixture_found(tmp_path_factory):
     return estimate(ROBOT, records[0], out=out / "found", simulated=True, quiet=True)
 
 
+@pytest.mark.slow
 def test_what_was_found(found):
     assert isinstance(found, Identification)
     assert found.estimate.base_parameters.shape == found.deviation.shape == (10,)
@@ -36,6 +37,7 @@ def test_what_was_found(found):
     assert "explained in %" in table
 
 
+@pytest.mark.slow
 def test_a_model_of_it(found, tmp_path):
     written = consistent_model(found, out=tmp_path / "model")
     assert all(file.is_file() for file in written.files)

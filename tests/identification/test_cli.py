@@ -33,6 +33,7 @@ def metrics(folder):
     return {name: metric["value"] for name, metric in content.items()}
 
 
+@pytest.mark.slow
 def test_what_was_estimated_can_be_checked_without_the_project(work):
     """Weighted least squares of the stored regressor, by numpy."""
     with h5py.File(work / "found" / "identification.h5") as file:
@@ -52,6 +53,7 @@ def test_what_was_estimated_can_be_checked_without_the_project(work):
     np.testing.assert_allclose(repeated[0], found)
 
 
+@pytest.mark.slow
 def test_the_page_tells_what_was_found(work):
     found = metrics(work / "found")
     assert found["parameters"] == 10
@@ -62,6 +64,7 @@ def test_the_page_tells_what_was_found(work):
         assert words in page
 
 
+@pytest.mark.slow
 def test_the_model_is_written_and_can_be_read(work):
     out = work / "model"
     assert main(["consistent", ROBOT, str(work / "found"), "--out", str(out)]) == 0
@@ -70,6 +73,7 @@ def test_the_model_is_written_and_can_be_read(work):
     np.testing.assert_allclose(again, truth, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_the_page_can_be_written_again_with_the_robot_moving(work):
     excitation = models_directory() / ROBOT / "excitation_optimal.yaml"
     arguments = ["report", ROBOT, str(work / "found"), "--excitation", str(excitation)]
@@ -81,6 +85,7 @@ def test_the_page_can_be_written_again_with_the_robot_moving(work):
     assert metrics(work / "again")["least_explained_not_used"] > 0.99
 
 
+@pytest.mark.slow
 def test_a_torque_with_the_wrong_sign_is_refused(work, tmp_path, capsys):
     file = tmp_path / "turned.h5"
     file.write_bytes((work / "runs" / "run_1.h5").read_bytes())
@@ -94,6 +99,7 @@ def test_a_torque_with_the_wrong_sign_is_refused(work, tmp_path, capsys):
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_an_excitation_is_found_and_written(tmp_path, capsys):
     out = tmp_path / "excitation"
     limits = ["--limit", "acceleration=30", "--harmonics", "1,2", "--period", "5"]
@@ -153,12 +159,14 @@ def test_from_the_printed_table_to_a_model(tmp_path, capsys):
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.slow
 def test_an_identification_of_another_robot_is_refused(work, tmp_path, capsys):
     out = str(tmp_path / "model")
     assert main(["consistent", "franka_emika_panda", str(work / "found"), "--out", out]) == 2
     assert "of festo_expt_45; must be of franka_emika_panda" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "part"),
     [
@@ -175,6 +183,7 @@ def test_wrong_bounds_are_one_line(work, tmp_path, capsys, options, part):
     assert part in error and error.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_elastic_joints_are_estimated_from_a_simulated_experiment(tmp_path, capsys):
     out, robot = tmp_path / "elastic", "comau_racer_1_4_elastic"
     assert main(["elastic", robot, "--locked", "--viscous", "0", "--out", str(out)]) == 0

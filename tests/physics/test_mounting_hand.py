@@ -163,6 +163,7 @@ def aligned(where, duration, **changes):
     return operator, *go(operator, state, time, duration, where)
 
 
+@pytest.mark.slow
 def test_it_pushes_more_as_long_as_nothing_moves_up_to_a_limit():
     p, where = MountingHandParameters(), pose(HOVERING, [5e-4, 0.0])
     for duration, expected in (
@@ -183,6 +184,7 @@ def test_nobody_pushes_more_and_more_against_what_is_touched():
     np.testing.assert_allclose(operator.wanted(state, time, where, np.zeros(6)), before)
 
 
+@pytest.mark.slow
 def test_it_feels_for_the_bores_in_a_spiral():
     operator, state, time = inserting(persistence=0.0)
     p, where, places = MountingHandParameters(), pose(-PINS), []
@@ -210,6 +212,7 @@ def test_once_the_pins_are_in_the_hands_follow():
     assert after[0] / before[0] == pytest.approx(np.exp(-1.0), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_eye_errs_by_what_the_seed_says_and_never_much():
     """Seen from the push on a tool that is in place: the same for a seed, within two deviations."""
     p, seen = MountingHandParameters(), []

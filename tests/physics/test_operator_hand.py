@@ -171,6 +171,7 @@ def test_it_does_not_feed_through():
     assert not system.HasAnyDirectFeedthrough()
 
 
+@pytest.mark.slow
 def test_a_robot_with_soft_joints_gives_way_to_the_target():
     """The hand moves a damped, weightless robot to where it wants the tool point to be."""
     builder = DiagramBuilder()

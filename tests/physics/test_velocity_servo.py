@@ -27,6 +27,7 @@ def simulate(law, reference, load=0.0, steps=2000):
     return np.array(velocities), np.array(torques)
 
 
+@pytest.mark.slow
 def test_step_is_a_first_order_lag():
     """``1 - exp(-omega t)`` at every tick, whatever the rate of the integral part."""
     for rate in (None, 0.0, 90.0):

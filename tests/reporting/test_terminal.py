@@ -56,6 +56,7 @@ def test_errors_are_one_line_that_moves_no_cursor(capsys):
     assert one_line(" x \r\n\t y ") == "x y"
 
 
+@pytest.mark.slow
 def test_the_whole_command_line_on_an_ascii_terminal():
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C", "COLUMNS": "60"}
     for arguments, status in ((["list"], 0), (["run", "µ…\udcff"], 2)):

@@ -305,6 +305,7 @@ def closed_loop(arm, path, law, theta):
     return builder.Build(), plant, controller
 
 
+@pytest.mark.slow
 def test_the_loop_over_a_plant_is_not_algebraic_and_converges(arm, path, make_law):
     """Double poles at -20: from rest the errors obey e_0 (1 + 20 t) exp(-20 t)."""
     diagram, plant, controller = closed_loop(arm, path, make_law(), THETA)

@@ -64,6 +64,7 @@ class Bench:
         return rows, near[NEAR_COLUMNS * MOST_NEAR], near[NEAR_COLUMNS * MOST_NEAR + 1 :]
 
 
+@pytest.mark.slow
 def test_it_finds_what_all_distances_find_and_evaluates_few(regions):
     bench = Bench(regions)
     every = near_rows(regions, reaches(PARAMETERS, PERIOD, speeds(regions)))

@@ -71,6 +71,7 @@ def test_a_given_place_is_kept(pipe):
     np.testing.assert_allclose(pipe.point("eta"), [5.0 + 0.1 * RADIUS, -2.0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_output_is_the_evaluators_own():
     bench = Bench(paraboloid(((-0.2, 0.2), (-0.2, 0.2)), 1.0))
     y_t = [0.05, -0.03, 0.02]

@@ -115,6 +115,7 @@ def test_table_3_2_is_exact_at_one_millisecond(parameters):
     assert e > 0.3
 
 
+@pytest.mark.slow
 def test_moving_references_and_changing_parameters():
     """Against a solver; parameters change with every tick, the reference is of degree 4."""
     rng = np.random.default_rng(4)

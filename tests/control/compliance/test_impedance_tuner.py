@@ -48,6 +48,7 @@ def station():
     return Simulator(diagram), tuner, log
 
 
+@pytest.mark.slow
 def test_stiffness_changes_at_depth_without_a_jump_and_to_what_was_asked(station):
     simulator, tuner, log = station
     root = simulator.get_mutable_context()

@@ -60,6 +60,7 @@ def test_it_obeys_mass_damper_spring_behind_a_filter(relative_degree):
     assert np.allclose(state[1], x[-2:], rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow(but="1")
 @pytest.mark.parametrize("relative_degree", [1, 2, 3, 4])
 def test_every_row_is_the_rate_of_the_row_above(relative_degree):
     fine = 1e-5
@@ -72,6 +73,7 @@ def test_every_row_is_the_rate_of_the_row_above(relative_degree):
         assert np.allclose(rate, now[k + 1], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_constant_torque_bends_it_by_the_spring():
     impedance = NullSpaceImpedance(PARAMETERS, 4, PERIOD)
     motion = Motion(impedance, [0.5])
@@ -81,6 +83,7 @@ def test_a_constant_torque_bends_it_by_the_spring():
     assert np.abs(state[1:]).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_without_a_spring_it_stays_where_it_is_left():
     impedance = NullSpaceImpedance(NullSpaceImpedanceParameters(1.0, 20.0, 0.0, 70.0), 4, PERIOD)
     motion = Motion(impedance, [0.5])

@@ -64,6 +64,7 @@ def test_a_force_far_from_its_reference_is_lost_either_way(measured, lost):
     assert Stepper(block).step(**given, ready=0.0)["lost"] == [0.0]
 
 
+@pytest.mark.slow(but="0.5")
 @pytest.mark.parametrize("left", [-0.5, 0.0, 0.5])
 def test_a_tool_that_is_taken_off_stays_there(left):
     """Led by its filter alone, for long, with what taring left of the sensor's bias."""

@@ -181,6 +181,7 @@ def test_inertia_of_a_fast_motion_is_taken_off(model, sensor_bandwidth, share):
     assert rms(residual[:, 3:]) < share * rms(raw[:, 3:])
 
 
+@pytest.mark.slow
 def test_known_accelerations_are_as_good_and_weight_alone_is_not():
     results = {
         inertia: rms(

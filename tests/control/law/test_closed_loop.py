@@ -46,6 +46,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow(but="velocity servos")
 @pytest.mark.parametrize("case", CASES)
 def test_outputs_obey_the_predicted_linear_dynamics(
     case, load_robot, make_law, virtual_output, oriented_path, position_path, small_path
@@ -66,6 +67,7 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     check(robot, rigid, path, make_law(robot.chain, name, oriented), virtual_output)
 
 
+@pytest.mark.slow(but="velocity_servo")
 @pytest.mark.parametrize("name", ["velocity_servo", "rigid", "visco_elastic", "elastic"])
 def test_a_path_on_a_surface(name, load_robot, make_law, virtual_output):
     """Along it, along the surface's normal, and sideways; the frame turns about the tangent."""
@@ -82,6 +84,7 @@ def test_a_path_on_a_surface(name, load_robot, make_law, virtual_output):
     check(robot, rigid, path, law, virtual_output)
 
 
+@pytest.mark.slow(but="velocity_servo-zyz")
 @pytest.mark.parametrize(
     ("name", "convention"), [("velocity_servo", "zyx"), ("velocity_servo", "zyz"), ("rigid", "zyx")]
 )

@@ -14,7 +14,6 @@ from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, MovingFrameManifold
 from pfsc_drake.control.manifolds.path import PathManifold
 from tests.control.law.closed_loop import (
-    FEW_STEPS,
     ClosedLoop,
     assert_linear_dynamics,
     rest_of_state,
@@ -29,6 +28,7 @@ CASES = {
 }
 AXIS = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
 ORIGIN = np.array([0.4, -0.1, 0.6])  # m
+STEPS = 60  # in which the frame moves by centimetres
 
 
 class Turntable:
@@ -106,7 +106,7 @@ def begun(name, load_robot, make_law, path):
 
 def followed(loop, x, path, virtual_output):
     """Simulate a loop, and return what :func:`assert_linear_dynamics` compares."""
-    times, states = simulate(loop, x, FEW_STEPS)
+    times, states = simulate(loop, x, STEPS)
     results = [loop.evaluate(t, x) for t, x in zip(times, states, strict=True)]
     assert not any(result[loop.law.layout.status][0] for result in results)
     Y = np.array([result[loop.law.layout.manifold_state] for result in results])
@@ -122,6 +122,7 @@ def followed(loop, x, path, virtual_output):
 SLOW = {"visco_elastic": [pytest.mark.slow]}
 
 
+@pytest.mark.slow(but="velocity_servo")
 @pytest.mark.parametrize("name", [pytest.param(n, marks=SLOW.get(n, [])) for n in CASES])
 def test_outputs_obey_the_predicted_linear_dynamics(
     name, load_robot, make_law, virtual_output, oriented_path, position_path
@@ -131,6 +132,7 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     assert_linear_dynamics(*followed(loop, x, path, virtual_output))
 
 
+@pytest.mark.slow
 def test_without_the_highest_derivative_they_do_not(
     load_robot, make_law, virtual_output, oriented_path
 ):

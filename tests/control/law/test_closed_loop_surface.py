@@ -95,6 +95,7 @@ CASES += [
 ]
 
 
+@pytest.mark.slow(but="velocity_servo-comau_racer_1_4-normal-dome")
 @pytest.mark.parametrize(("law", "model", "orientation", "name"), CASES)
 def test_outputs_obey_the_predicted_linear_dynamics(
     law, model, orientation, name, load_robot, make_law

@@ -62,6 +62,7 @@ class Station:
         return np.array(linearization.function(state, tau_ext, point)[6]).T
 
 
+@pytest.mark.slow(but="velocity_servo")
 @pytest.mark.parametrize("law", ["velocity_servo", "rigid", "visco_elastic", "elastic"])
 def test_one_more_coordinate_obeys_its_own_linear_dynamics(
     law, load_robot, make_law, position_path
@@ -78,6 +79,7 @@ def test_one_more_coordinate_obeys_its_own_linear_dynamics(
     assert np.abs(station.output_errors()).max() < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", ["range", "inertia", "joints"])
 def test_a_weight_changes_the_joints_alone(weight, load_robot, make_law, position_path):
     chain = load_robot("comau_racer_1_4_elastic").chain

@@ -87,6 +87,7 @@ def simulate(presliding, rest_hold, duration=0.6, push=0.0):
     return np.array(torques), np.array(states)
 
 
+@pytest.mark.slow(but="1e-05")
 @pytest.mark.parametrize("presliding", [1e-5, 6.3e-5, 3e-4])
 def test_what_sticks_rests(presliding):
     torques, states = simulate(presliding, hold())
@@ -97,6 +98,7 @@ def test_what_sticks_rests(presliding):
     assert np.abs(torques[-1] - K * (states[-200:, 2] - states[-200:, 0]).mean()) < 0.9 * F_C
 
 
+@pytest.mark.slow
 def test_without_a_hold_it_shakes():
     torques, states = simulate(6.3e-5, None)
     assert np.ptp(torques[-200:]) > 1.0

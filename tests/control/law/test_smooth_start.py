@@ -46,6 +46,7 @@ def test_follows_the_transition_from_tick_to_tick(begin):
         np.testing.assert_allclose(reference(time), expected, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_it_waits_with_the_time_of_its_reference():
     """Own time ``s = t - sin(8 t) / 8``, which rests at first; derivatives by the chain rule."""
     stepper = Stepper(SmoothStart(0.2, 2, 2, 4, PERIOD), ("own_time",))

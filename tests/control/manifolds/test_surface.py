@@ -77,6 +77,7 @@ def outputs_over_time(manifold, geometry, theta, motion, given):
     return np.column_stack([np.transpose(lengths) + ETA, further])
 
 
+@pytest.mark.slow(but="axis-cylinder")
 @pytest.mark.parametrize("situation", SITUATIONS)
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
 def test_jets_are_derivatives_of_the_outputs(situation, orientation):

@@ -150,6 +150,7 @@ def test_the_way_is_free_ahead_of_one_who_comes_slowly_later():
 BOUNDED = dc.replace(PARAMETERS, largest_acceleration=5.0, velocity_uncertainty=0.1)
 
 
+@pytest.mark.slow(but="0-parameters0")
 @pytest.mark.parametrize("parameters", [PARAMETERS, BOUNDED, dc.replace(BOUNDED, retreat=1.0)])
 @pytest.mark.parametrize("seed", [0, 2, 4])
 def test_nobody_within_his_limits_finds_the_tool_moving(seed, parameters):
@@ -193,6 +194,7 @@ def test_who_accelerates_no_faster_than_is_known_lets_it_go_on_sooner():
     assert ways[1] > ways[0] + 0.1
 
 
+@pytest.mark.slow
 def test_it_goes_back_from_one_who_walks_up_to_it_and_on_when_he_has_gone():
     """He comes along the path to where it waits, and stops there before he turns round."""
     least = {}

@@ -24,6 +24,7 @@ def test_it_is_when_one_who_turns_round_and_runs_arrives(gap, receding):
     assert float(REACH.time(gap, receding)) == pytest.approx(found.t_events[0][0], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_nobody_within_his_limits_is_there_sooner():
     """Points in space that accelerate at random, from a line: its distance is convex."""
     rng, step = np.random.default_rng(4), 2e-3

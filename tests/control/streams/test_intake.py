@@ -63,6 +63,7 @@ def test_it_leads_by_all_way_points_and_ends_at_the_last(run):
     assert run.stream[-1, 1] == len(w) - 1
 
 
+@pytest.mark.slow
 def test_it_never_passes_what_it_knows_and_leaves_room_to_stop(run):
     assert run.overrun.max() <= 1e-12
     assert np.all(run.eta[:, 0] <= run.goal + 1e-12)
@@ -117,6 +118,7 @@ def test_derivatives_are_those_of_the_whole_spline(run):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_laws_of_other_orders_get_the_same_end(order):
     w, parameters = bend(20), {1: THROUGH, 2: BEND, 3: SMOOTHER}[order]
@@ -302,6 +304,7 @@ def test_what_was_refused_is_remembered_at_rest():
     np.testing.assert_allclose(run.sigma[-1], w[25], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow(but="3")
 @pytest.mark.parametrize("seed", range(4))
 def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
     random = np.random.default_rng(seed)
@@ -331,6 +334,7 @@ def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
     assert np.linalg.norm(run.sigma[-1] - points[-1]) < parameters.spacing
 
 
+@pytest.mark.slow
 def test_orientations_come_with_way_points():
     w = bend(40)
     angles = np.linspace(0.0, 1.2, 40)

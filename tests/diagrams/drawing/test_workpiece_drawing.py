@@ -61,6 +61,7 @@ def tool_pose(diagram):
     return tool.GetInputPort("tool_pose").Eval(tool.GetMyContextFromRoot(context))
 
 
+@pytest.mark.slow
 def test_an_arm_in_a_notch_is_drawn_with_workpiece_and_ball(arm_in_a_notch, meshcat):
     turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     y_t = [0.8, 0.01, 0.902]
@@ -73,6 +74,7 @@ def test_an_arm_in_a_notch_is_drawn_with_workpiece_and_ball(arm_in_a_notch, mesh
     np.testing.assert_allclose(tool_pose(diagram), [*y_t, *turned.ravel()], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_ball_of_a_delta_robot_hangs_below_its_tool(load_scenario, meshcat):
     settings = load_scenario("pfc_delta_notch")
     y_t = build_station(settings, SCENARIO_DIRECTORY).path.pose(0.05)[0]

@@ -51,6 +51,7 @@ def uncoupled_parameters(folder):
     return path
 
 
+@pytest.mark.slow
 def test_rotors_on_the_base_make_no_difference(settings, tmp_path):
     """All connections of the other plant: drives, friction, a force on the tool, start."""
     settings.start.offset = [0.005, 0.0]
@@ -69,6 +70,7 @@ def test_rotors_on_the_base_make_no_difference(settings, tmp_path):
         np.testing.assert_allclose(got[name].values, expected[name].values, rtol=0, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_the_coupling_disturbs_the_elastic_law(settings):
     """The exact law of the simplified model is not exact any more, but far from failing."""
     settings.controller.law = "elastic"
@@ -82,6 +84,7 @@ def test_the_coupling_disturbs_the_elastic_law(settings):
     assert 5.0 * deviation[""] < deviation[COMAU] < 5e-4
 
 
+@pytest.mark.slow
 def test_the_coupling_hardly_matters_to_singular_perturbation(settings):
     """What that law neglects anyway is a hundred times as much."""
     deviation = {}
@@ -195,6 +198,7 @@ def test_joint_damping_out_of_range(damping):
         RobotParameters(joint_damping=damping)
 
 
+@pytest.mark.slow
 def test_the_visco_elastic_law_converges(load_scenario):
     settings = load_scenario("pfc_viscoelastic_3r")
     _, _, log = run(settings, 1.6)

@@ -82,6 +82,7 @@ def _crossings(station):
     return found
 
 
+@pytest.mark.slow(but="pfc_delta_notch")
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_only_measurements_reach_the_controller(load_scenario, name):
     settings = load_scenario(name)
@@ -97,6 +98,7 @@ def test_only_measurements_reach_the_controller(load_scenario, name):
         assert not (_is_control(system) and isinstance(system, MultibodyPlant))
 
 
+@pytest.mark.slow
 def test_a_posture_yields_to_what_is_observed_of_forces(load_scenario):
     """Told of them, the law knew what no machine measures."""
     settings = load_scenario("pfc_elbow_7r")
@@ -114,6 +116,7 @@ def test_a_posture_yields_to_what_is_observed_of_forces(load_scenario):
     assert len(reads) == 3
 
 
+@pytest.mark.slow
 def test_the_walk_finds_a_truth_that_is_told(load_scenario):
     settings = load_scenario("pfc_comau_6r_elastic")
     settings.controller.external_torque.source = "known"
@@ -140,6 +143,7 @@ def _controlling(station):
     }
 
 
+@pytest.mark.slow(but="pfc_compliant_6r-rigid")
 @pytest.mark.parametrize(
     ("name", "law"),
     [
@@ -187,6 +191,7 @@ def _heavier(model, folder):
     return file
 
 
+@pytest.mark.slow
 def test_the_safe_state_holds_what_is_believed(load_scenario):
     settings = load_scenario("pfc_elastic_6r")
     true = _build(settings)
@@ -238,6 +243,7 @@ def test_what_cannot_be_believed(load_scenario, name, key, value, message):
         _build(settings)
 
 
+@pytest.mark.slow
 def test_kinematics_that_are_believed_wrongly(load_scenario):
     settings = load_scenario("pfc_elastic_6r")
     settings.model_error.mass = [0.9]

@@ -71,6 +71,7 @@ def test_nothing_is_added_unless_asked_for(settings):
     }
 
 
+@pytest.mark.slow
 def test_velocity_servos_follow_the_path(settings):
     settings.controller.law = "velocity_servo"
     station, t, signals = run(settings, 0.4)
@@ -209,6 +210,7 @@ def test_a_bus_samples_at_the_ticks_of_the_law_whatever_the_servo_does(settings)
     np.testing.assert_array_equal(delivered[8:], np.repeat(sent, 4, axis=0)[:32])
 
 
+@pytest.mark.slow
 def test_a_faster_servo_gets_the_velocity_of_the_tick(settings):
     settings.controller.law = "velocity_servo"
     settings.servo.period = 0.25 * TICK
@@ -234,6 +236,7 @@ def test_friction_acts_against_the_motion(settings, increments):
     np.testing.assert_allclose(torque[moving], expected[moving], atol=1e-6)
 
 
+@pytest.mark.slow(but="0.004-1")
 @pytest.mark.parametrize(("step", "softness"), [(TICK / 4, 1 / 16), (TICK / 4, 1.0), (4 * TICK, 1)])
 def test_stuck_joints_give_way_by_their_presliding(settings, step, softness):
     """Steps change nothing; a presliding that is given does."""

@@ -39,11 +39,13 @@ def test_torque_sensors_stand_for_encoders_on_the_links(deviation):
     assert deviation("motor_and_torque", "from_torque") < 2e-5
 
 
+@pytest.mark.slow
 def test_sensors_that_are_not_exact(deviation):
     off = deviation("motor_and_torque", "from_torque", scale=0.01, noise=0.001)
     assert 1e-5 < off < 5e-4
 
 
+@pytest.mark.slow
 def test_motors_alone_tell_of_the_springs(deviation):
     assert 1e-5 < deviation("motor", "observed") < 4e-4
 
@@ -112,6 +114,7 @@ def within(log):
     return share, np.mean(ratio**2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sides", "state"), [("motor_and_torque", "from_torque"), ("motor", "observed")]
 )

@@ -15,6 +15,7 @@ def elastic(state, sides):
     return settings
 
 
+@pytest.mark.slow(but="motors")
 @pytest.mark.parametrize(
     ("settings", "told"),
     [

@@ -39,6 +39,7 @@ def arm_in_a_notch(settings):
     return settings.notch.time_step, DISCRETE
 
 
+@pytest.mark.slow(but="pfc_delta-analytic_delta")
 @pytest.mark.parametrize(
     ("scenario", "change"),
     [

@@ -50,6 +50,7 @@ def _run(file, *changes):
     return main(["run", str(file), "--out", str(out), *short, *given]), out
 
 
+@pytest.mark.slow
 def test_it_follows_a_path_and_tells_no_torques(scenario, capsys):
     status, out = _run(scenario)
     told = capsys.readouterr()

@@ -105,6 +105,7 @@ def test_factors_that_a_person_would_set_are_taken_without_a_word():
     assert _load(mass=0.95, friction=[0.5, 2.0, 1.0], joint_offset_deg=20.0).warnings == []
 
 
+@pytest.mark.slow
 def test_a_run_says_that_an_error_is_a_factor():
     scenario = read_scenario("pfc_elastic_3r", ["model_error.mass=0.05"])
     settings = load_typed(Scenario, scenario.data, "x")

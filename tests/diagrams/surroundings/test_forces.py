@@ -45,6 +45,7 @@ def six_axes(load_exact_scenario) -> Scenario:
     return settings
 
 
+@pytest.mark.slow
 def test_a_push_moves_the_arm_as_in_drakes_own_simulation(three_axes, load_arm):
     """The same drive torques and force on a plant of its own, integrated tick by tick."""
     three_axes.forces = [PULSE]
@@ -78,6 +79,7 @@ def test_a_push_moves_the_arm_as_in_drakes_own_simulation(three_axes, load_arm):
     assert log["push_point"].dim == log["push_force"].dim == 3
 
 
+@pytest.mark.slow(but="observed")
 @pytest.mark.parametrize("source", ["known", "observed"])
 def test_a_law_that_knows_of_a_push_stays_on_the_path(six_axes, source):
     """Two pulses and a hand on different links; beside the joint torques their time derivatives."""

@@ -50,6 +50,7 @@ def run(settings, duration, folder=SCENARIOS):
     return station, collect_log(station, result.root)
 
 
+@pytest.mark.slow
 def test_a_stiff_robot_is_pulled_by_the_whole_spring(settings):
     """Without compliance: 300 N/m times 40 mm, in world axes; with a pulse on top."""
     settings.compliance.tangential = CoordinateImpedance()
@@ -70,6 +71,7 @@ def test_a_stiff_robot_is_pulled_by_the_whole_spring(settings):
     assert np.abs(wrench[0]).max() == 0.0
 
 
+@pytest.mark.slow
 def test_springs_of_hand_and_tool_share_the_way(settings):
     """At rest k xi = K (xi_d - xi); along the path the tool arrives, for nothing holds it."""
     k, K = 1500.0, 500.0
@@ -125,6 +127,7 @@ def test_three_ticks_late(settings):
     assert first == pytest.approx(3.0 * TICK, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_seed_decides(settings):
     forces = []
     for seed in (1, 1, 2):

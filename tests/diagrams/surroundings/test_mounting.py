@@ -152,6 +152,7 @@ def test_wrong_plates_are_refused(change, part):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.slow
 def test_a_start_with_a_pin_in_the_frame_is_refused():
     changes = ("plate.start=held", "reference.points=[1.07, 1.07]", "start.posture_deg=[]")
     with pytest.raises(InputError, match=r"starts \d.* mm deep in the frame"):

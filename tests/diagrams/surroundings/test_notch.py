@@ -42,6 +42,7 @@ def axis_points(station, notch):
     return taught + np.array([0.0, 0.0, below]) + notch.displacement
 
 
+@pytest.mark.slow
 def test_surface_is_round_about_the_displaced_axis(settings, station):
     notch = settings.notch
     vertices, triangles = notch_surface(station.path, notch, UP)

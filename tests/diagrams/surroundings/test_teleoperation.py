@@ -46,6 +46,7 @@ def region(**teleoperation):
     return settings
 
 
+@pytest.mark.slow
 def test_the_tool_goes_where_the_hand_is_a_channel_later():
     settings = region()
     settings.teleoperation.channel.jitter = settings.teleoperation.channel.loss = 0.0
@@ -62,6 +63,7 @@ def test_the_tool_goes_where_the_hand_is_a_channel_later():
     assert metrics["energy_margin"].value >= 0.0
 
 
+@pytest.mark.slow
 def test_along_a_path_the_follower_moves_farther_by_the_scale():
     """And not while the clutch is open."""
     settings = shipped_scenario("teleop_path")
@@ -145,6 +147,7 @@ def test_turns_need_a_tool_that_yields_and_a_hand_that_turns_a_wrist():
         build_station(settings, SCENARIOS)
 
 
+@pytest.mark.slow(but="position_force")
 @pytest.mark.parametrize("coupling", ["position_force", "four_channel"])
 def test_other_couplings_lead_the_tool_too(coupling):
     settings = region(coupling=coupling)
@@ -155,6 +158,7 @@ def test_other_couplings_lead_the_tool_too(coupling):
     assert log["y_t"].values[-1, 2] - log["y_t"].values[0, 2] < -0.02
 
 
+@pytest.mark.slow
 def test_what_leads_needs_a_tool_that_yields():
     settings = shipped_scenario("pfc_comau_6r")
     settings.teleoperation = TeleoperationParameters()

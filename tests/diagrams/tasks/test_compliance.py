@@ -63,6 +63,7 @@ def test_rigid_everywhere_is_no_compliance():
     assert settings.compliance.is_given
 
 
+@pytest.mark.slow
 def test_an_untared_sensor_moves_nothing(settings):
     """A bias of 40 N would deflect by 20 mm."""
     settings.sensor.bias = np.array([40.0, -30.0, 20.0, 1.0, -1.0, 0.5])
@@ -97,6 +98,7 @@ def test_a_sensor_too_weak_for_its_tool_says_so(settings):
     assert not signals["tared"].any()
 
 
+@pytest.mark.slow(but="1")
 @pytest.mark.parametrize("axis", [1, 2])
 def test_a_force_deflects_as_a_spring(settings, axis):
     force = np.zeros(3)
@@ -149,6 +151,7 @@ def test_a_sensor_in_the_wrong_place(settings, joint, part):
         build_station(settings, Path())
 
 
+@pytest.mark.slow
 def test_differentiated_encoders_are_warned_of(settings):
     assert build_station(settings, Path()).warnings == []
     settings.encoders.difference_quotient = True

@@ -84,6 +84,7 @@ def test_a_reference_that_is_too_fast_waits(settings):
     assert speed.max() <= fastest * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_told_only_it_leaves_the_path(settings):
     station, _, law, deviation = run(settings(limits="warn"), 0.6)
     assert not station.task.drive_plan.is_slowed
@@ -113,6 +114,7 @@ def quick(name, load_exact_scenario):
     return settings
 
 
+@pytest.mark.slow(but="pfc_panda_7r")
 @pytest.mark.parametrize("name", ["pfc_panda_7r", "sfc_elastic_6r", "pfc_viscoelastic_3r"])
 def test_other_robots_laws_and_surfaces_wait_too(name, load_exact_scenario):
     station = build_station(quick(name, load_exact_scenario), find_scenario(name).parent)
@@ -140,6 +142,7 @@ def test_velocity_servos_keep_a_reserve_of_speed(settings):
     assert "% of the speed of axis" in plan.said[0]
 
 
+@pytest.mark.slow
 def test_what_seems_too_much_at_a_glance_is_looked_at_closely(load_exact_scenario):
     """Seven axes at 93 % of a joint's speed, which the coarse grid of a glance overstates."""
     settings = load_exact_scenario("pfc_elastic_7r")
@@ -169,6 +172,7 @@ def fixture_turning(load_exact_scenario):
     return change
 
 
+@pytest.mark.slow
 def test_a_wrist_that_becomes_singular_on_the_way_is_named_with_its_place(turning):
     """Against the law's own fault in a run."""
     line = Line([0.9, -0.1, 0.9], [0.9, 0.1, 0.9])
@@ -188,6 +192,7 @@ def test_a_wrist_that_becomes_singular_on_the_way_is_named_with_its_place(turnin
     assert eta - 1e-3 < float(place[1]) < eta + 6e-3
 
 
+@pytest.mark.slow
 def test_a_joint_that_passes_its_limit_on_the_way_is_named_with_its_place(turning):
     """The last joint turns as the tool does, up to 166 deg."""
     line = Line([0.5, 0.0, 0.4], [0.5, 0.2, 0.4])
@@ -202,6 +207,7 @@ def test_a_joint_that_passes_its_limit_on_the_way_is_named_with_its_place(turnin
             assert 0.15 < float(place[1]) < 0.2
 
 
+@pytest.mark.slow
 def test_weight_above_the_reserve_is_said_and_not_waited_for(settings):
     """It is the same torque whatever the drives can do, and a little less than that in motion."""
     slow, weights = {"velocity": 0.2, "acceleration": 0.5}, []

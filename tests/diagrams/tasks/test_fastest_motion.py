@@ -44,6 +44,7 @@ def build(settings, name=ARM):
     return build_station(settings, find_scenario(name).parent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "way", "leads"),
     [(ARM, 0.15, False), ("pfc_elastic_7r", -0.5, False), ("pfc_scara_4r", -0.2, True)],
@@ -71,6 +72,7 @@ def test_limits_are_met_on_the_path(name, way, leads, fastest):
     assert sum(parts.values()) == pytest.approx(1.0) and parts["none"] < 0.8
 
 
+@pytest.mark.slow
 def test_it_is_faster_than_a_motion_that_is_slowed(fastest):
     """By a tenth at least, whatever was asked for: with the same reserve, and rates left alone."""
     shortest = build(fastest(torque_rate=np.inf)).reference_duration - 2.0 * DWELL
@@ -81,6 +83,7 @@ def test_it_is_faster_than_a_motion_that_is_slowed(fastest):
         assert shortest < 0.9 * moved
 
 
+@pytest.mark.slow
 def test_from_rest_to_rest_as_smooth_as_the_law_needs(fastest):
     motion = build(fastest(way=0.15)).task.motion
     assert motion.first_discontinuity(4) is None
@@ -90,12 +93,14 @@ def test_from_rest_to_rest_as_smooth_as_the_law_needs(fastest):
     assert np.all(np.abs(values[:, 1:]) < 1e-6 * scale[1:])
 
 
+@pytest.mark.slow
 def test_a_largest_velocity_is_kept(fastest):
     plan = build(fastest(velocity=0.3)).task.drive_plan
     assert 0.29 < plan.speed.max() < 0.302
     assert plan.limiting.of_the_way(plan.speed)["velocity"] > 0.5
 
 
+@pytest.mark.slow(but="pfc_delta--0.05")
 @pytest.mark.parametrize(
     ("name", "way"),
     [("sfc_elastic_6r", 0.03), ("pfc_panda_7r", -0.1), ("pfc_delta", -0.05)],
@@ -115,6 +120,7 @@ def test_surfaces_redundant_arms_and_other_laws(name, way, fastest):
     assert np.allclose(places, begin + np.outer(along, direction), rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_a_posture_that_moves_is_told_of(fastest):
     """It stays where it is in the plan."""
     settings = fastest("pfc_panda_7r", -0.05)
@@ -123,6 +129,7 @@ def test_a_posture_that_moves_is_told_of(fastest):
     assert "planned for a posture that stays" in said
 
 
+@pytest.mark.slow
 def test_as_fast_as_toppra_on_rigid_joints(fastest):
     """Drake's own optimum, whose torque may jump, is shorter, by few per cent."""
     settings = fastest("pfc_elastic_6r", -0.4, torque_rate=np.inf)

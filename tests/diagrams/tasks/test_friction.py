@@ -62,6 +62,7 @@ def test_every_source_keeps_the_tool_nearer_to_its_path(arm):
     assert max(found.values()) < without / 8.0
 
 
+@pytest.mark.slow
 def test_the_estimate_is_the_true_friction(arm):
     """Of the disturbance observer after its lag; of the filter the coefficients, too."""
     arm.controller.friction.source = "observer"
@@ -80,6 +81,7 @@ def test_the_estimate_is_the_true_friction(arm):
     np.testing.assert_allclose(log["friction_estimate"][-1, 6:], F_V, rtol=0.06)
 
 
+@pytest.mark.slow
 def test_forces_on_the_tool_that_are_known_are_no_friction_of_rigid_joints(load_scenario):
     """Pushed at rest: what the law is told of is not taken for friction."""
     settings = load_scenario("pfc_compliant_6r")
@@ -101,6 +103,7 @@ def test_forces_on_the_tool_that_are_known_are_no_friction_of_rigid_joints(load_
     assert ends["known"] < 1.5
 
 
+@pytest.mark.slow
 def test_the_belief_is_the_plants_with_its_error_or_what_is_written(arm):
     arm.controller.friction.source = "model"
     arm.model_error.friction = [0.5]
@@ -161,6 +164,7 @@ def test_wrong_choices_are_refused(arm):
         build_station(arm, Path())
 
 
+@pytest.mark.slow
 def test_servos_are_left_to_overcome_friction_and_that_is_said(load_scenario):
     settings = load_scenario("pfc_compliant_6r")
     settings.controller.law = "velocity_servo"

@@ -22,6 +22,7 @@ def wedge():
     return load_file(Scenario, file), file.parent
 
 
+@pytest.mark.slow
 def test_names_of_modes_and_regions(wedge):
     settings, folder = wedge
     station = build_station(settings, folder)

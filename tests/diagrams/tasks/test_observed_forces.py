@@ -46,6 +46,7 @@ def test_an_arm_yields_without_a_sensor(soft):
     assert xi == pytest.approx(20.0 / 2000.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_friction_of_rigid_joints_is_no_force_if_it_is_known(soft):
     """Moving against it: believed friction is taken off what is observed."""
     soft.forces, soft.reference.dwell, soft.start.transition = [], 0.05, 0.0
@@ -60,6 +61,7 @@ def test_friction_of_rigid_joints_is_no_force_if_it_is_known(soft):
     assert found["model"] < found["none"] / 4.0
 
 
+@pytest.mark.slow
 def test_the_elastic_law_is_told_what_is_observed(load_scenario):
     """With derivatives; friction of the drives is no force on the links."""
     settings = load_scenario("pfc_elastic_3r")

@@ -173,6 +173,7 @@ def test_a_posture_goes_where_it_is_sent_as_far_as_the_tool_lets_it(at_rest):
     assert np.abs(Y[1:3]).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_the_elbow_stays_while_the_tool_moves(load_exact_scenario):
     ranges, coordinate = [], None
     for task in ("elbow", "reference"):

@@ -49,6 +49,7 @@ def deviation(station, log):
     return np.linalg.norm(xi, axis=1).max()
 
 
+@pytest.mark.slow
 def test_away_from_the_limits_of_joints(run):
     """Where it starts, 11 deg from a limit, the way leads joint 2 over it."""
     station, fault, log = run(AT_LIMIT, 1.0)
@@ -70,6 +71,7 @@ def test_to_where_the_outputs_are_easy_to_move(run):
     assert deviation(station, log) < 5e-5
 
 
+@pytest.mark.slow(but="posture0")
 @pytest.mark.parametrize(
     "posture",
     [
@@ -94,6 +96,7 @@ def test_a_posture_far_away_does_not_take_the_tool_off_its_path(run, posture):
     assert speed.max() > 0.5
 
 
+@pytest.mark.slow
 def test_an_elbow_that_hardly_moves_alone_leaves_the_joints_to_the_tool(run):
     """Kept at any price, it took a joint beyond its largest speed, each lap."""
     start = [0.0, -20.0, 0.0, -130.0, 0.0, 110.0, 45.0]
@@ -106,6 +109,7 @@ def test_an_elbow_that_hardly_moves_alone_leaves_the_joints_to_the_tool(run):
     assert 0.5 < shares.max() < 0.85
 
 
+@pytest.mark.slow(but="own0")
 @pytest.mark.parametrize("own", [GainParameters(bandwidth=20.0), GainParameters()])
 def test_poles_are_chosen_for_more_joints_than_outputs(load_scenario, own):
     settings = load_scenario("pfc_elastic_7r")

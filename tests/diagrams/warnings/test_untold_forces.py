@@ -29,6 +29,7 @@ def said(scenario):
     return [line for line in build_station(scenario, SCENARIOS).warnings if "forces act" in line]
 
 
+@pytest.mark.slow
 def test_a_law_that_is_told_or_a_servo_or_soft_regions_need_no_word(scenario):
     (line,) = said(scenario)
     assert "45 N" in line and "fixtures.bound = 0.5 mm" in line and "'measured'" in line
@@ -41,6 +42,7 @@ def test_a_law_that_is_told_or_a_servo_or_soft_regions_need_no_word(scenario):
     assert said(scenario) == []
 
 
+@pytest.mark.slow
 def test_friction_that_is_not_compensated_takes_a_tool_into_hard_regions(scenario):
     """1.3 mm untold of the hand, 0.85 mm told; servos and soft regions need no word."""
 

@@ -119,6 +119,7 @@ def test_more_outputs_than_joints_and_what_would_fit(refused, mine):
     )
 
 
+@pytest.mark.slow
 def test_what_holds_back_needs_all_of_the_orientation(refused, mine):
     changes = ["hold_back.force=-10", "path.orientation.task=tool_axis"]
     refused(mine(SIX), "hold_back.force = -10", "all of its orientation", changes=changes)
@@ -140,6 +141,7 @@ def test_start_outside_the_feasible_neighbourhood(refused, mine):
     refused(mine(), *parts, changes=[*changes, "start.offset=[0, -0.06]"])
 
 
+@pytest.mark.slow
 def test_unreachable_start(refused, mine):
     changes = ["path.shape=!Line {start: [3, 0, 1], end: [3, 1, 1]}", "reference.points=[0, 0.5]"]
     refused(mine(), "start", "3.0", "unreachable", "the robot reaches 1.88", changes=changes)

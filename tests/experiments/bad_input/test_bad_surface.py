@@ -42,6 +42,7 @@ def fixture_wrong(refused, mine):
     return check
 
 
+@pytest.mark.slow
 def test_these_points_are_fine(mine, tmp_path):
     csv(tmp_path, dish())
     changes = [part for change in fitted() for part in ("--set", change)]
@@ -187,6 +188,7 @@ def test_a_profile_that_crosses_itself_or_the_axis(wrong, tmp_path):
     wrong("not regular", changes=changes)
 
 
+@pytest.mark.slow
 def test_an_inverted_normal_is_named(refused, mine):
     """The tool would have to come from below, through the table."""
     shape = "!Plane {{origin: [0.9, 0, 0.2], axis: [0, 0, {}]}}"
@@ -199,6 +201,7 @@ def test_an_inverted_normal_is_named(refused, mine):
     refused(mine("sfc_elastic_6r"), "normal [0.0, 0.0, -1.0] inverted", "reach", changes=wrong)
 
 
+@pytest.mark.slow
 def test_starts_and_ways(wrong, tmp_path):
     csv(tmp_path, dish())
     wrong("start.theta", changes=[*fitted(), "start.theta=[0.9, 0]"])

@@ -26,6 +26,7 @@ def spline(more=""):
     return [f"path.shape=!Waypoints {{file: points.csv{more}}}", "reference.points=[0.05, 0.1]"]
 
 
+@pytest.mark.slow
 def test_these_waypoints_are_fine(mine, tmp_path):
     csv(tmp_path)
     overrides = [argument for change in spline() for argument in ("--set", change)]
@@ -89,6 +90,7 @@ def test_degrees_for_radians(refused, mine, tmp_path):
     refused(mine(), "line 2", "90 rad", "zyx_deg_1", changes=spline(), file=file)
 
 
+@pytest.mark.slow
 def test_a_tolerance_below_the_noise(refused, mine, tmp_path):
     angle = np.linspace(0.0, 1.5, 300)
     clean = np.stack([0.8 + 0.0 * angle, 0.2 * np.sin(angle), 1.0 + 0.1 * angle], axis=1)

@@ -30,6 +30,7 @@ def names(log):
     return [drawing.name for drawing in draw_figures(log, [PATH])]
 
 
+@pytest.mark.slow
 def test_all_figures_are_drawn(drawn_log):
     figures = render_figures(drawn_log, [PATH])
     assert [figure.name for figure in figures] == NAMES
@@ -78,6 +79,7 @@ def test_no_forces_no_figure(drawn_log):
     assert names(drawn_log) == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_run_stopped_by_nan_can_still_be_drawn(drawn_log):
     for signal in drawn_log.signals.values():
@@ -86,6 +88,7 @@ def test_a_run_stopped_by_nan_can_still_be_drawn(drawn_log):
     assert len(render_figures(drawn_log, [PATH])) == len(NAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_log_of_one_sample_can_be_drawn(drawn_log):
     for signal in drawn_log.signals.values():

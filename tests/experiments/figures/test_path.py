@@ -90,6 +90,7 @@ def test_points_on_the_surface():
     assert "at most 0" in drawing.caption
 
 
+@pytest.mark.slow
 def test_it_is_drawn_of_surfaces_that_were_fitted(drawn_log):
     names = [drawing.name for drawing in draw_figures(drawn_log, [np.zeros((2, 3))], FIT)]
     assert names[:2] == ["path", "surface_fit"]

@@ -26,6 +26,7 @@ def test_what_is_refused(given, said, tmp_path):
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_nobody_answers(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.hardware.driven_run._FIRST_STATUS", 0.1)
     for call, where in ((drive, {"out": tmp_path / "out"}), (first_command, {})):

@@ -111,11 +111,13 @@ def test_what_is_sent_is_what_the_law_wants_without_the_weight(driven_panda):
         np.testing.assert_allclose(weight[k], expected, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_both_sides_repeat_to_the_last_bit():
     joints = [Loop(panda()).begin().run(0.4).robot.status().q for _ in range(2)]
     np.testing.assert_array_equal(*joints)
 
 
+@pytest.mark.slow
 def test_a_robot_with_servos():
     settings = shipped_scenario("pfc_panda_7r")
     settings.controller.law, settings.controller.gains = "velocity_servo", {}
@@ -128,11 +130,13 @@ def test_a_robot_with_servos():
     assert np.abs(loop.log()["xi"].values[700:]).max() < 3e-3
 
 
+@pytest.mark.slow
 def test_an_iiwas_messages_do_as_well():
     log = Loop(panda(), "iiwa").begin().run(0.9).log()
     assert np.abs(log["xi"].values[log.time > 0.7]).max() < 2e-5
 
 
+@pytest.mark.slow
 def test_lost_packets_are_bridged():
     loop = Loop(panda(), lose=0.03).begin().run(1.2)
     log = loop.log()
@@ -149,6 +153,7 @@ def test_a_robot_that_falls_silent_is_left_alone():
     assert len(loop.log().time) == 500
 
 
+@pytest.mark.slow(but="100-8.0")
 @pytest.mark.parametrize(("gap", "degrees"), [(30, 5.0), (90, 8.0), (100, 8.0)])
 def test_a_longer_silence_stops_the_robot(gap, degrees):
     """The robot goes on with its last torque for as long; what it moves then is in the bound."""
@@ -162,6 +167,7 @@ def test_a_longer_silence_stops_the_robot(gap, degrees):
     assert np.rad2deg(np.abs(loop.robot.status().q - q)).max() < degrees
 
 
+@pytest.mark.slow
 def test_without_a_controller_the_robot_comes_to_rest():
     """The driver damps it when commands have expired."""
     loop = Loop(panda()).begin().run(0.9)
@@ -173,6 +179,7 @@ def test_without_a_controller_the_robot_comes_to_rest():
     assert np.rad2deg(np.abs(loop.robot.status().q - q)).max() < 11.0
 
 
+@pytest.mark.slow
 def test_whoever_asks_for_a_stop_gets_one():
     loop = Loop(panda()).begin().run(0.9)
     q = loop.robot.status().q
@@ -295,6 +302,7 @@ def test_the_robots_drives_have_limits_of_their_own():
         )
 
 
+@pytest.mark.slow
 def test_forces_are_measured_by_the_robot_and_told():
     """60 N deflect by 30 mm, with friction, encoders and a believed tool of another mass."""
     settings = shipped_scenario("pfc_compliant_6r")
@@ -322,6 +330,7 @@ def test_a_law_for_elastic_joints_needs_both_sides_of_them():
         driven(elastic(state="measured"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ticks", [1, 2])
 def test_elastic_joints_whose_torques_act_late(ticks):
     """The law knows of the delay, a tick of which is the link's; the other is the driver's."""
@@ -338,6 +347,7 @@ def test_elastic_joints_whose_torques_act_late(ticks):
     assert bent > 3e-4
 
 
+@pytest.mark.slow
 def test_a_delay_that_the_law_does_not_know_is_a_fault_that_ends_at_rest():
     settings = elastic()
     settings.driver.delay = 3e-3

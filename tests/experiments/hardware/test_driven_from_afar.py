@@ -51,6 +51,7 @@ def fixture_led():
     return loop, settings
 
 
+@pytest.mark.slow
 def test_it_goes_where_the_leader_has_it(led):
     """A follower of the damping of the waves' impedance b goes by 2b/(b + d) of their speed."""
     loop, settings = led
@@ -62,6 +63,7 @@ def test_it_goes_where_the_leader_has_it(led):
     assert np.abs(log["xi"].values).max() < 5e-4
 
 
+@pytest.mark.slow
 def test_it_stops_in_place_where_the_leader_is_silent(led):
     loop, _ = led
     log = loop.log()
@@ -74,6 +76,7 @@ def test_it_stops_in_place_where_the_leader_is_silent(led):
     assert np.ptp(eta[last + 200 : last + 300]) < 2e-4
 
 
+@pytest.mark.slow
 def test_its_tank_is_audited(led):
     loop, settings = led
     metrics = teleoperation_metrics(loop.log(), settings)

@@ -72,6 +72,7 @@ def test_nobody_answers(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_controller_in_c_is_not_led_from_afar(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.hardware.driven_run.check_native", lambda *_: None)
     with pytest.raises(InputError, match="--native: a controller in C hears no leader"):

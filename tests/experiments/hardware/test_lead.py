@@ -29,6 +29,7 @@ wait $FOLLOWS; STATUS=$?; kill $LEADS; wait $LEADS; exit $STATUS
 """
 
 
+@pytest.mark.slow
 def test_a_leader_without_a_follower_is_held_by_damping_alone():
     told = []
     scenario = read_scenario("teleop_region", ["hand.tremor=0"])

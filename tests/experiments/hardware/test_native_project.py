@@ -185,6 +185,7 @@ def test_what_is_refused_before_anything_is_done(tmp_path, monkeypatch, url, too
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_what_is_no_block_is_not_driven_in_c(tmp_path):
     with pytest.raises(InputError, match="export: near_regions is no block, but NearRegions"):
         Bench(tmp_path, "vf_many_surfaces", []).project  # noqa: B018

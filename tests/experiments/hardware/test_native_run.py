@@ -38,6 +38,7 @@ def fixture_told(panda):
     return panda.statuses(0.9)
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_all_that_comes_is_answered_alike(panda, told):
     run, repeated = panda.answer(panda.rows(told))
@@ -200,6 +201,7 @@ def test_what_is_no_number_is_not_sent(panda, told):
     assert np.isfinite(run.rows["sent"][:5]).all()
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_an_iiwas_messages_do_as_well(panda, tmp_path):
     """And nothing is compiled again but what knows of messages."""

@@ -32,6 +32,7 @@ def changed():
     return loop
 
 
+@pytest.mark.slow
 def test_the_pace_is_what_was_asked_for_and_the_path_is_not_left(changed):
     log = changed.log()
     t, speed = log.time, log["eta_dot"].values[:, 0]
@@ -47,6 +48,7 @@ def test_the_pace_is_what_was_asked_for_and_the_path_is_not_left(changed):
     )
 
 
+@pytest.mark.slow
 def test_an_override_from_the_start_is_the_same_motion_slower():
     loop = Loop(panda())
     loop.drive = Drive(loop.station, loop.end, DriveOptions(), 0.5)
@@ -61,6 +63,7 @@ def test_an_override_from_the_start_is_the_same_motion_slower():
     assert np.abs(slow["xi"].values[settled]).max() < 2e-5
 
 
+@pytest.mark.slow
 def test_a_pause_costs_time_and_not_the_motion(changed):
     log = changed.log()
     paces = np.interp(
@@ -71,6 +74,7 @@ def test_a_pause_costs_time_and_not_the_motion(changed):
     assert abs(changed.drive.motion_time - paces.mean() * changed.drive.time - lag) < 5e-3
 
 
+@pytest.mark.slow
 def test_a_motion_is_made_no_faster_than_drives_allow():
     settings = panda()
     settings.reference.velocity, settings.reference.acceleration = 3.0, 60.0
@@ -84,6 +88,7 @@ def test_a_motion_is_made_no_faster_than_drives_allow():
     assert plan.fastest_pace(4) == pytest.approx(min((0.95 / torques) ** 0.25, 0.95 / speeds))
 
 
+@pytest.mark.slow
 def test_who_watches_is_told_and_may_stop_the_robot():
     loop = Loop(panda()).begin()
     watching = WatchingEnd(loop.end.lcm, loop.end.dialect)
@@ -106,6 +111,7 @@ def test_who_watches_is_told_and_may_stop_the_robot():
     assert loop.speed() < 0.01
 
 
+@pytest.mark.slow
 def test_a_stop_that_makes_a_robot_faster_is_left_to_its_driver():
     """So bad a link, 14 of 15 statuses lost, that no torque in time comes of it."""
     loop = Loop(panda(), options=DriverOptions()).begin().run(0.9)

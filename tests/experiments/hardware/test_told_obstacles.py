@@ -35,10 +35,12 @@ def fixture_log():
     return loop.log()
 
 
+@pytest.mark.slow
 def test_nothing_moves_before_something_is_told(log):
     assert np.abs(log["waiting_pace"].values[log.time < 0.3]).max() == 0.0
 
 
+@pytest.mark.slow
 def test_it_moves_while_it_is_told_and_waits_in_silence(log):
     pace, t = log["waiting_pace"].values[:, 0], log.time
     assert pace[(t > 0.9) & (t < 1.0)].min() > 0.95
@@ -48,6 +50,7 @@ def test_it_moves_while_it_is_told_and_waits_in_silence(log):
     assert np.isnan(log["obstacle_position"].values[(t > 1.1) & (t < 1.6)]).all()
 
 
+@pytest.mark.slow
 def test_what_is_old_or_told_in_part_counts_for_nothing(log):
     pace, t = log["waiting_pace"].values[:, 0], log.time
     assert pace[(t > 1.6) & (t < 2.0)].max() < 1e-3

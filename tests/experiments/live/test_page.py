@@ -60,6 +60,7 @@ def boxes(browser, selector):
     return browser.evaluate(f"Array.from(document.querySelectorAll({selector!r}), {BOX})")
 
 
+@pytest.mark.slow(but="50")
 @pytest.mark.parametrize("count", [5, 50])
 def test_all_switches_and_handles_are_seen_at_once(show, count):
     browser = show(*guided(count))
@@ -74,6 +75,7 @@ def test_all_switches_and_handles_are_seen_at_once(show, count):
     assert title == "region plane_1: on"
 
 
+@pytest.mark.slow
 def test_nothing_lies_upon_another(show):
     """Whatever there is to say, and however little room."""
     browser = show(*guided(50))
@@ -90,6 +92,7 @@ def test_nothing_lies_upon_another(show):
         assert boxes(browser, f"#{name}")[0][0] >= sides[2]
 
 
+@pytest.mark.slow
 def test_a_leader_is_dragged_by_the_way_of_the_mouse(show):
     """From wherever in the pad it is taken hold of; half of the pad is 0.15 m."""
     status, pages = guided(5, drags=True)
@@ -110,6 +113,7 @@ def test_a_leader_is_dragged_by_the_way_of_the_mouse(show):
     assert browser.errors == []
 
 
+@pytest.mark.slow
 def test_dragging_selects_no_label(show):
     browser = show(*guided(5))
     browser.mouse("mousePressed", browser.middle("#pulls h2"))
@@ -118,6 +122,7 @@ def test_dragging_selects_no_label(show):
     assert browser.evaluate("String(getSelection())") == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [SIZE, (400, 800)])
 def test_of_a_robot_that_is_watched_only_what_is_known_is_shown(show, size):
     pages, status = Pages(), LiveStatus("pfc_panda_7r")

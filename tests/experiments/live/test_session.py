@@ -89,6 +89,7 @@ def assert_same(one, other):
         assert values.tobytes() == other[name].tobytes(), name
 
 
+@pytest.mark.slow
 def test_a_take_is_repeated_to_the_last_bit(tmp_path, capsys):
     rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle")
     seen = rehearsal.play(
@@ -132,6 +133,7 @@ def test_a_take_is_repeated_to_the_last_bit(tmp_path, capsys):
     assert set(status["deviation"]) == {"xi_1", "xi_2"}
 
 
+@pytest.mark.slow
 def test_in_space_a_person_changes_the_damping_and_switches_regions(tmp_path):
     """Through the cylinder that is off, at a speed that the damping decides."""
     rehearsal = Rehearsal(tmp_path / "takes", "vf_forbidden_region")
@@ -162,6 +164,7 @@ def test_in_space_a_person_changes_the_damping_and_switches_regions(tmp_path):
     assert_same(log, datasets(again)[0])
 
 
+@pytest.mark.slow
 def test_a_person_afar_leads_the_tool_a_channel_later(tmp_path):
     """Pulled sideways from 0.6 s on; 100 ms later the tool follows, and the hand feels it."""
     rehearsal = Rehearsal(
@@ -186,6 +189,7 @@ def test_a_person_afar_leads_the_tool_a_channel_later(tmp_path):
     assert_same(log, datasets(again)[0])
 
 
+@pytest.mark.slow
 def test_a_leader_is_dragged_to_where_the_hand_is(tmp_path):
     """By 4 cm, let go of, and dragged on from there: the tool comes along."""
     rehearsal = Rehearsal(
@@ -206,6 +210,7 @@ def test_a_leader_is_dragged_to_where_the_hand_is(tmp_path):
     assert np.ptp(log["y_t"][:, 2]) < 2e-3
 
 
+@pytest.mark.slow
 def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
     """A force sensor that fails at 0.3 s."""
     failing = "simulation.force_sensor_failure={time: 0.3, component: 0}"
@@ -244,6 +249,7 @@ def test_who_does_nothing_leaves_nothing(tmp_path):
     assert not (tmp_path / "takes").exists()
 
 
+@pytest.mark.slow
 def test_what_was_done_is_kept_even_if_the_session_breaks(tmp_path):
     rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle")
 

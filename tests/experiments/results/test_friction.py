@@ -68,6 +68,7 @@ def run(settings):
     return station.part.model, result.root, log
 
 
+@pytest.mark.slow
 def test_of_rigid_joints_it_is_that_of_arm_and_rotors(settings):
     settings.robot.model = "comau_racer_1_4_3r"
     settings.controller.law = "rigid"
@@ -80,6 +81,7 @@ def test_of_rigid_joints_it_is_that_of_arm_and_rotors(settings):
     np.testing.assert_allclose(log["momentum"].values[-1], momentum, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_of_elastic_joints_it_is_that_of_the_motors(settings):
     _, _, log = run(settings)
     inertia = load_parameters("comau_racer_1_4").rotors.reflected_inertia[:3]

@@ -98,6 +98,7 @@ def test_a_wrong_time_after_a_fault(mine, capfd, seconds):
     assert f"--after-fault {seconds}: allowed: 0 to 100" in capfd.readouterr().err
 
 
+@pytest.mark.slow(but="pfc_elastic_3r")
 @pytest.mark.parametrize("name", [THREE, SIX])
 def test_nan_from_the_beginning(fault, name):
     place = "q_J_1 at t = 0.000 s"
@@ -107,6 +108,7 @@ def test_nan_from_the_beginning(fault, name):
     assert metrics["max_path_deviation"]["value"] is None
 
 
+@pytest.mark.slow
 def test_singularity_on_the_way(fault, tmp_path):
     """A line leads to where the arm is stretched, and axis 3 beyond its limit of 80 deg."""
     log, metrics = fault(
@@ -156,6 +158,7 @@ def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
     assert metrics["saturated_samples"]["value"] > 20
 
 
+@pytest.mark.slow
 def test_torque_saturation_is_counted_and_survived(mine, tmp_path, capfd):
     """The first torque wants 202 Nm of axis 1; a tenth of its limit is 180 Nm."""
     out = tmp_path / "out"
@@ -175,6 +178,7 @@ def test_torque_saturation_is_counted_and_survived(mine, tmp_path, capfd):
     assert np.linalg.norm(xi[-1]) < 1e-4  # nevertheless on the path in the end
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limited", ["speed", "torque"])
 def test_saturation_of_servos(run_scenario, tmp_path, limited):
     """Beside the path by 50 mm the law asks slow servos for 5 m/s; or weak ones do not obey."""

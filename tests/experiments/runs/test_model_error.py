@@ -10,6 +10,7 @@ from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 
 
+@pytest.mark.slow
 def test_wrong_masses_bend_the_robot_by_what_is_missing(three_axes):
     """At rest the links hang lower by what the law does not hold, while the path is held."""
     exact, light = (three_axes(*e, duration="0.9") for e in ((), ("model_error.mass=0.95",)))
@@ -30,6 +31,7 @@ def test_wrong_masses_bend_the_robot_by_what_is_missing(three_axes):
     assert np.abs(exact["xi"][-1]).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_a_zero_of_a_joint_that_is_off_moves_the_tool_unseen(three_axes):
     run = three_axes("model_error.joint_offset_deg=[0.0, 0.1, 0.0]", duration="0.9")
     assert run.status == 3
@@ -40,6 +42,7 @@ def test_a_zero_of_a_joint_that_is_off_moves_the_tool_unseen(three_axes):
     assert 0.5e-3 < rest < 2.5e-3
 
 
+@pytest.mark.slow
 def test_a_start_beside_the_path_without_a_jump(three_axes):
     steep, smooth = (
         three_axes(f"start.transition={duration}", duration="0.6") for duration in (0, 0.25)

@@ -82,6 +82,7 @@ def test_interrupted_before_the_simulation_nothing_is_left(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_run_that_fails_leaves_the_earlier_results_whole(tmp_path):
     """Until there is a log of its own."""
@@ -104,6 +105,7 @@ def test_a_run_that_fails_leaves_the_earlier_results_whole(tmp_path):
     assert names == {"manifest.json", "scenario.yaml", "log.h5"} < before.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     out, temporary = tmp_path / "out", tmp_path / "temporary"
@@ -122,6 +124,7 @@ def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     assert {path.name for path in (kept / "figures").iterdir()} >= {"path.png", "progress.png"}
 
 
+@pytest.mark.slow
 def test_results_beside_the_scenario(mine, tmp_path, capfd):
     """``--out .`` with everything of the user's in the same folder."""
     scenario = Path(mine())
@@ -203,6 +206,7 @@ def test_targets_of_laws_that_are_not_run(run_scenario, mine, tmp_path):
     assert run_scenario(tmp_path / "out", mine(), *arguments).status == 0
 
 
+@pytest.mark.slow
 def test_no_hand_by_null(run_scenario, tmp_path):
     """``hand: null`` means the same as no key: the shipped hand can be taken off."""
     arguments = ["--duration", "0.02", "--set", "hand=null"]

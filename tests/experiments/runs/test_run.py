@@ -134,6 +134,7 @@ def test_metrics_follow_from_the_log(three_axes):
     np.testing.assert_array_equal(torques, np.abs(result["tau_d"]).max(axis=0))
 
 
+@pytest.mark.slow
 def test_the_resolved_scenario_gives_the_same_run(run_scenario, three_axes, tmp_path):
     first = three_axes("start.offset=[0.005, -0.002]", "reference.dwell=0.02", duration="0.1")
     again = run_scenario(tmp_path / "again", first.folder / "scenario.yaml")
@@ -147,6 +148,7 @@ def test_the_resolved_scenario_gives_the_same_run(run_scenario, three_axes, tmp_
     assert again.attributes["scenario"] == "pfc_elastic_3r"
 
 
+@pytest.mark.slow
 def test_files_of_an_earlier_run_are_replaced(run_scenario, tmp_path):
     out = tmp_path / "out"
     run_scenario(
@@ -161,6 +163,7 @@ def test_files_of_an_earlier_run_are_replaced(run_scenario, tmp_path):
     assert "recording.html" not in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow(but="0.001")
 @pytest.mark.parametrize("duration", ["0.001", "0.0305", "0.35", "1.4"])
 def test_duration_is_kept_to_the_sample(three_axes, duration):
     """Also where the sum of the steps between two looks at the run is not exact."""
@@ -168,6 +171,7 @@ def test_duration_is_kept_to_the_sample(three_axes, duration):
     assert len(result.t) == math.floor(float(duration) / TICK + 1e-6) + 1
 
 
+@pytest.mark.slow
 def test_duration_of_the_scenario_and_of_its_reference(run_scenario, tmp_path):
     changes = ["controller.law=rigid", "reference.points=[0.96, 0.961]", "reference.dwell=0.01"]
     arguments = [x for change in changes for x in ("--set", change)]

@@ -26,6 +26,7 @@ def run(request, tmp_path_factory):
     return request.param, out, log, units
 
 
+@pytest.mark.slow(but="no friction")
 def test_deviation(run):
     friction, out, log, _ = run
     late = log["t"] >= DWELL
@@ -37,6 +38,7 @@ def test_deviation(run):
     assert metrics["saturated_samples"]["value"] == 0
 
 
+@pytest.mark.slow(but="no friction")
 def test_drives_are_slides(run):
     _, out, log, units = run
     assert (units["q_J"], units["v_J"], units["tau_d"]) == ("m", "m/s", "N")

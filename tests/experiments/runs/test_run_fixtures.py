@@ -62,6 +62,7 @@ def to_paraboloid(y):
     return np.where(y[:, 2] > 0.9 - c * r**2, distance, -distance)
 
 
+@pytest.mark.slow
 def test_the_segments_of_the_dissertation_at_three_times_its_speed(tmp_path):
     """The tool's true place against closed forms of the surfaces, and the sequence of modes."""
     log, metrics = run(tmp_path, "vf_forbidden_region", 7.2, way(WAY), "hand.release=7")
@@ -93,6 +94,7 @@ def test_the_segments_of_the_dissertation_at_three_times_its_speed(tmp_path):
     assert metrics["audit_bound"] > 0.0
 
 
+@pytest.mark.slow
 def test_printed_rules_at_an_acute_edge(tmp_path):
     """They let the tool through where the program holds it."""
     pull = way([(0.6, [0.95, 0.08, 0.84]), (1.6, [0.77, 0.08, 0.80]), (2.4, [0.76, 0.04, 0.9])])
@@ -104,6 +106,7 @@ def test_printed_rules_at_an_acute_edge(tmp_path):
     assert lost["region_distance"].min() < -5e-3
 
 
+@pytest.mark.slow
 def test_a_ball_that_swings_takes_the_tool_along(tmp_path):
     """The tool's true place against that of the ball at the time, which its clock tells."""
     log, metrics = run(tmp_path, "vf_moving_region", 4.5)
@@ -121,6 +124,7 @@ def test_a_ball_that_swings_takes_the_tool_along(tmp_path):
     assert metrics["audit_bound"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_soft_region_yields_like_its_spring(tmp_path):
     lean = way([(0.6, [0.95, 0.0, 0.93]), (1.2, [0.95, 0.0, 0.88]), (2.5, [0.95, 0.0, 0.88])])
     soft = "fixtures.regions=[{shape: {origin: [0.95, 0, 0.9]}, stiffness: 3000}]"
@@ -160,6 +164,7 @@ def test_refusals(tmp_path, capsys, changes, said):
     assert len(error.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_start_inside_is_moved_out_slowly_where_that_is_chosen(tmp_path):
     log, _ = run(
         tmp_path,

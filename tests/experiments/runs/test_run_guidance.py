@@ -17,6 +17,7 @@ def run(folder, scenario, duration, *changes):
         return {name: dataset[:] for name, dataset in file.items()}
 
 
+@pytest.mark.slow
 def test_the_tool_is_held_on_a_circle_whose_radius_swings(tmp_path):
     """Place of the tool in the world against the radius over time, not the law's coordinates."""
     log = run(tmp_path, "vf_dynamic_circle", 4.0)
@@ -29,6 +30,7 @@ def test_the_tool_is_held_on_a_circle_whose_radius_swings(tmp_path):
     assert log["eta"][-1] > 0.1  # led by the hand
 
 
+@pytest.mark.slow
 def test_the_hand_cannot_push_the_tool_off_a_hard_path(tmp_path):
     places = "{time: 0.8, position: [0.05, 0, 0]}, {time: 2.5, position: [0.3, 0.05, 0]}"
     leaning = f"hand.waypoints=[{places}]"
@@ -38,6 +40,7 @@ def test_the_hand_cannot_push_the_tool_off_a_hard_path(tmp_path):
     assert np.abs(log["manifold_force"][:, 1:3]).max() > 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scenario", "place", "push"), [("vf_hard_spline", 0.01, -45), ("operator_hand_6r", 1.01, 45)]
 )
@@ -54,6 +57,7 @@ def test_the_hand_cannot_push_the_tool_past_an_end(tmp_path, scenario, place, pu
     assert log["eta"].max() < last + 5e-4
 
 
+@pytest.mark.slow
 def test_the_hand_pulls_the_tool_off_a_soft_path_and_turns_it(tmp_path):
     """At rest the stiffnesses of Tab. 4.3 bear the hand."""
     still = (

@@ -18,6 +18,7 @@ def results(tmp_path_factory):
     return folder, *run(folder, "vf_nearest_path", 2.6, *changes)
 
 
+@pytest.mark.slow
 def test_the_tool_goes_from_one_path_to_the_next(results):
     _, log, metrics = results
     assert log["guide"][0, 0] == 1
@@ -27,6 +28,7 @@ def test_the_tool_goes_from_one_path_to_the_next(results):
     assert metrics["guide_changes"] >= 1
 
 
+@pytest.mark.slow
 def test_nothing_is_given_and_the_audit_says_so(results):
     _, _, metrics = results
     for name in ("stationarity", "allowance", "energy", "tank"):
@@ -34,6 +36,7 @@ def test_nothing_is_given_and_the_audit_says_so(results):
     assert metrics["audit_bound"] > 0.0
 
 
+@pytest.mark.slow
 def test_distances_in_the_log_are_the_tools_own(results):
     """From the circle by its formula, of where the tool truly is."""
     _, log, _ = results
@@ -42,6 +45,7 @@ def test_distances_in_the_log_are_the_tools_own(results):
     np.testing.assert_allclose(log["guide_distance"][:, 0], expected, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_names_are_in_the_log(results):
     folder, _, _ = results
     with h5py.File(folder / "log.h5") as file:

@@ -39,6 +39,7 @@ def fixture_log(out):
         return {name: dataset[:] for name, dataset in file.items()}
 
 
+@pytest.mark.slow
 def test_the_plate_is_seated_and_let_go(out):
     text = (out / "metrics.json").read_text(encoding="utf-8")
     metrics = {name: metric["value"] for name, metric in json.loads(text).items()}
@@ -49,6 +50,7 @@ def test_the_plate_is_seated_and_let_go(out):
     assert metrics["time_to_contact"] < metrics["time_to_seat"] < metrics["release_time"]
 
 
+@pytest.mark.slow
 def test_the_tool_yields_to_where_the_frame_is(log):
     """Half of 1.1 mm and 13 mrad, less the play of the bores and what the cups give way."""
     last = np.flatnonzero(log["held"][:, 0] == 1.0)[-1]
@@ -56,6 +58,7 @@ def test_the_tool_yields_to_where_the_frame_is(log):
     assert 2e-3 < np.linalg.norm(log["phi"][last]) < 11e-3
 
 
+@pytest.mark.slow
 def test_the_sensor_feels_contact_and_operator_but_not_the_plate(log):
     """Newton for the plate: what the cups bear is what hand and frame do not, at rest."""
     still = (log["t"] > 0.15) & (log["t"] < 0.2)  # tared, nobody pushes yet
@@ -65,6 +68,7 @@ def test_the_sensor_feels_contact_and_operator_but_not_the_plate(log):
     assert log["frame_force"][mounted][:, 2].mean() == pytest.approx(WEIGHT, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_damping_is_that_of_5_4(log):
     started = log["t"] > 0.1
     with_length = SlowEnds(length=1.0810319).interpolant()
@@ -73,12 +77,14 @@ def test_the_damping_is_that_of_5_4(log):
     np.testing.assert_allclose(log["damping"][started, 0], expected, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_the_operator_does_one_thing_after_the_other(log):
     phase = log["phase"][:, 0]
     assert np.all(np.diff(phase) >= 0)
     assert set(phase) >= {1, 2, 3, 4}  # lead, align, insert, release
 
 
+@pytest.mark.slow
 def test_the_recording_tells_what_the_operator_does(log, out):
     page = (out / "recording.html").read_text(encoding="utf-8")
     stages = json.loads(re.search(r"stages = (\[.*?\]), MOVE", page)[1])

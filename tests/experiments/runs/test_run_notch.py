@@ -34,6 +34,7 @@ def force(log):
     return np.linalg.norm(log["wrench_ext"][:, :3], axis=1)
 
 
+@pytest.mark.slow
 def test_nothing_moves_before_the_sensor_is_tared(log):
     waiting = log["tared"][:, 0] < 0.5
     assert 20 <= waiting.sum() < 40  # samples of 1 ms, of which taring takes 20
@@ -43,11 +44,13 @@ def test_nothing_moves_before_the_sensor_is_tared(log):
     assert np.array_equal(log["xi_p"][waiting], np.tile(log["xi_p"][0], (waiting.sum(), 1)))
 
 
+@pytest.mark.slow
 def test_tool_follows_the_yielding_reference(log):
     assert log["eta"][-1] > 0.08
     assert np.linalg.norm(log["xi"] - log["xi_p"], axis=1).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_sensor_measures_the_contact(log):
     """The reaction force in the plant's joint, compensated, against Drake's contact results."""
     resting = (log["t"] > 0.3) & (log["t"] < 0.5)
@@ -59,6 +62,7 @@ def test_sensor_measures_the_contact(log):
     assert np.sqrt(np.mean(error**2)) < 0.3
 
 
+@pytest.mark.slow
 def test_forces_are_those_of_a_spring_to_the_taught_path(log):
     """At rest (3.42) is k (xi_p - xi_d) = tau_perp, and the notch leaves 2 mm of its 6 mm."""
     resting = (log["t"] > 0.4) & (log["t"] < 0.5)
@@ -69,6 +73,7 @@ def test_forces_are_those_of_a_spring_to_the_taught_path(log):
     assert force(log).max() < 5.0
 
 
+@pytest.mark.slow
 def test_ball_stays_in_the_notch(log):
     """Beyond the clearance the soft shell gives by less than a millimetre."""
     distance = np.linalg.norm(log["notch_position"], axis=1)
@@ -76,6 +81,7 @@ def test_ball_stays_in_the_notch(log):
     assert distance.max() < CLEARANCE + 1e-3
 
 
+@pytest.mark.slow
 def test_the_notch_drags_at_the_ball_that_slides_in_it(log):
     """Coulomb's friction of both surfaces, against the motion."""
     velocity = np.gradient(log["y_t"], log["t"], axis=0)
@@ -91,6 +97,7 @@ def test_the_notch_drags_at_the_ball_that_slides_in_it(log):
     assert np.median(-along / across) == pytest.approx(friction, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_push_is_measured_with_the_contact(tmp_path):
     push = "forces=[{begin: 0.1, end: 1.0, ramp: 0.05, force: [0, 0, 4]}]"
     pushed = run(tmp_path, "pfc_delta_notch", 0.4, push)
@@ -101,6 +108,7 @@ def test_a_push_is_measured_with_the_contact(tmp_path):
     assert 0.0 < real.mean(axis=0)[2] < 4.0
 
 
+@pytest.mark.slow
 def test_position_control_presses_with_ten_times_the_force(tmp_path, log):
     stiff = run(tmp_path, "pfc_delta_notch_stiff", 0.4)
     assert "wrench_measured" not in stiff

@@ -23,6 +23,7 @@ def _run(folder, *overrides, duration=2.0):
     )
 
 
+@pytest.mark.slow
 def test_the_tool_waits_and_its_promise_is_kept(tmp_path):
     outcome = _run(tmp_path, duration=3.0)
     metrics = outcome.metrics
@@ -40,6 +41,7 @@ _STANDS = "{kind: column, radius: 0.25, way: [{time: 0.6, position: [%g, %g, 0.0
 {time: 2.2, position: [3.0, -1.0, 0.0]}]}"
 
 
+@pytest.mark.slow
 def test_the_approach_to_the_path_waits_too(tmp_path):
     """The tool starts 50 mm beside its path, and goes there once the person has left."""
     where = (1.4, -0.7) * 2
@@ -67,6 +69,7 @@ def test_a_start_beside_the_path_needs_a_transition(tmp_path):
         _run(tmp_path, "start.offset=[0.05, 0.0]", "start.transition=0")
 
 
+@pytest.mark.slow
 def test_who_is_faster_than_was_said_breaks_the_promise_and_the_run_says_so(tmp_path):
     outcome = _run(
         tmp_path,
@@ -99,6 +102,7 @@ def test_what_does_not_suit_is_refused_by_its_key(tmp_path, override, message):
         _run(tmp_path, override)
 
 
+@pytest.mark.slow
 def test_a_motion_that_does_not_arrive_is_no_success(tmp_path):
     """The person stays on the path until the run, which is not cut short, is over."""
     stays = "{kind: column, radius: 0.25, way: [{time: 0.0, position: [0.8, 0.3, 0.0]}, \

@@ -66,6 +66,7 @@ def test_the_path_is_followed_on_the_dish(on_surface):
     assert all(metric["value"] < float(metric["target"].split()[1]) for metric in targets)
 
 
+@pytest.mark.slow
 def test_height_and_side_step_are_apart(on_surface):
     """A tool above the curve converges along the normal and leaves it alone sideways."""
     run = on_surface("start.offset=[0.02, 0.0]", "start.rotation_deg=[0, 0, 0]", duration="0.3")
@@ -76,6 +77,7 @@ def test_height_and_side_step_are_apart(on_surface):
     np.testing.assert_allclose(height[:50], run["xi"][:50, 0], atol=1e-6)
 
 
+@pytest.mark.slow(but="{kind: given, angles_deg: [180, -60, 0]}-3")
 @pytest.mark.parametrize(
     ("orientation", "angles"),
     [("{kind: given, angles_deg: [180, -60, 0]}", 3), ("{kind: normal, task: tool_axis, "
@@ -94,12 +96,14 @@ def test_orientations(on_surface, orientation, angles):
         assert np.abs(run["phi"][late]).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_a_point_that_moves_with_time(on_surface):
     run = on_surface(*RIGID, "controller.manifold=trajectory", "start.transition=0", duration="0.6")
     assert run.status == 0
     assert np.linalg.norm(run["tracking_error"][run.after(0.5)], axis=1).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_points_of_a_file(tmp_path, mine, run_scenario):
     x = np.linspace(-0.1, 0.1, 12)
     points = np.stack([0.85 + x, 2.0 * x, 0.95 + 0.5 * (5.0 * x**2) + 2e-4], axis=1)

@@ -36,6 +36,7 @@ def own_scenario(tmp_path):
     return folder / "own.yaml"
 
 
+@pytest.mark.slow
 def test_own_scenario(run_scenario, own_scenario, tmp_path, monkeypatch):
     """The waypoints are found beside the scenario, wherever the command is given."""
     monkeypatch.chdir(tmp_path)

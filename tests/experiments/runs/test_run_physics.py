@@ -116,6 +116,7 @@ def derivative(x):
     return (-x[4:] + 8.0 * x[3:-1] - 8.0 * x[1:-3] + x[:-4]) / (12.0 * TICK)
 
 
+@pytest.mark.slow(but="elastic")
 @pytest.mark.parametrize("law", LAWS)
 def test_signals_of_the_tool(three_axes, arm, law):
     """Tool pose from Drake at the logged joints; coordinates from the pose and the path alone."""
@@ -132,6 +133,7 @@ def test_signals_of_the_tool(three_axes, arm, law):
     np.testing.assert_allclose(result["eta"][rows, 0], eta, atol=1e-9)
 
 
+@pytest.mark.slow(but="rigid")
 @pytest.mark.parametrize("law", ["elastic", "rigid"])
 def test_orientation_of_the_tool(six_axes, six_axes_rigid, law):
     """The angles away from the path's orientation, from the logged pose and path parameter."""
@@ -145,6 +147,7 @@ def test_orientation_of_the_tool(six_axes, six_axes_rigid, law):
     assert error < 1e-3 * np.abs(result["phi_dot"]).max()
 
 
+@pytest.mark.slow(but="rigid")
 @pytest.mark.parametrize("law", LAWS)
 def test_rates_are_derivatives(three_axes, law):
     result = three_axes(f"controller.law={law}")
@@ -173,6 +176,7 @@ def test_torques_move_links_and_motors(three_axes, arm, law):
     assert np.all(np.abs(impulse + mean_tau_J - result["tau_d"][:-1]) < 5e-3 * largest)
 
 
+@pytest.mark.slow
 def test_elastic_law_comes_to_the_path_and_stays(three_axes):
     result = three_axes()
     distance = np.linalg.norm(off_the_path(result["y_t"], result["theta"][:, 0]), axis=1)
@@ -202,6 +206,7 @@ def test_six_axes_obey_the_linear_dynamics(six_axes):
     assert np.abs(six_axes["eta"] - six_axes["eta_p"]).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_rigid_law_rests_beside_the_path_by_the_deflection(three_axes, arm):
     """The law sees motors only: the links hang lower by K_s^-1 g_L."""
     result = three_axes("controller.law=rigid", "reference.dwell=1", duration="0.9")
@@ -216,6 +221,7 @@ def test_rigid_law_rests_beside_the_path_by_the_deflection(three_axes, arm):
     assert np.linalg.norm(xi - expected) < 0.1 * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 def test_only_the_elastic_law_stays(three_axes):
     deviations = {}
     for law in LAWS:

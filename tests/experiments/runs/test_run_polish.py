@@ -29,6 +29,7 @@ def fixture_log(out):
         return {name: dataset[:] for name, dataset in file.items()}
 
 
+@pytest.mark.slow
 def test_it_approaches_as_fast_as_force_and_damping_say(log):
     free = (log["t"] > 0.25) & (log["t"] < 0.45)
     assert not log["wrench_ext"][free].any()
@@ -36,6 +37,7 @@ def test_it_approaches_as_fast_as_force_and_damping_say(log):
     assert slope == pytest.approx(-APPROACH / DAMPING, rel=0.02)
 
 
+@pytest.mark.slow
 def test_it_touches_down_and_presses(log, out):
     """Contact results of Drake against the reference of the controller."""
     late = log["t"] > 1.3
@@ -47,6 +49,7 @@ def test_it_touches_down_and_presses(log, out):
     assert metrics["max_force_error"]["value"] < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begin", "end"), [(0.2, 0.45), (0.51, 0.7), (0.9, 1.4)])
 def test_what_is_logged_as_torque_is_what_moves_the_robot(log, begin, end):
     """Drake's inverse dynamics of the logged motion, approaching, touching down and pressing."""
@@ -67,6 +70,7 @@ def test_what_is_logged_as_torque_is_what_moves_the_robot(log, begin, end):
     np.testing.assert_allclose(difference, 0.0, atol=1.0)
 
 
+@pytest.mark.slow
 def test_it_stands_as_far_off_the_taught_surface_as_the_workpiece(log):
     """2 mm up, 1 deg of a place 80 mm from the middle, and the ball's depth under 20 N."""
     theta = np.array([-0.08, -0.06])
@@ -75,6 +79,7 @@ def test_it_stands_as_far_off_the_taught_surface_as_the_workpiece(log):
     assert log["xi"][-1, 0] == pytest.approx(up - depth, abs=4e-4)
 
 
+@pytest.mark.slow
 def test_position_control_presses_harder_and_takes_no_notice(tmp_path):
     bare = ("--no-figures", "--no-recording", "--duration", "0.8")
     assert main(["run", "sfc_polish_stiff", "--out", str(tmp_path), *bare]) == 0

@@ -14,6 +14,7 @@ def changes(*pairs):
     return [argument for pair in pairs for argument in ("--set", pair)]
 
 
+@pytest.mark.slow
 def test_everything_that_a_run_tells(tmp_path, run_scenario):
     done = run_scenario(
         tmp_path / "out",

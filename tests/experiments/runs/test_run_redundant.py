@@ -40,6 +40,7 @@ def run_short(tmp_path, run_scenario, name, *changes, duration=None):
     return run_scenario(tmp_path / "out", name, *arguments)
 
 
+@pytest.mark.slow(but="pfc_elbow_7r")
 @pytest.mark.parametrize("name", SHORT)
 def test_targets_are_met(tmp_path, run_scenario, name):
     run = run_short(tmp_path, run_scenario, name)
@@ -62,6 +63,7 @@ def test_targets_are_met(tmp_path, run_scenario, name):
     assert (moved > 0.05) == (name == "pfc_elbow_7r")
 
 
+@pytest.mark.slow
 def test_a_task_in_full_ends_at_the_wrist(tmp_path, run_scenario, capfd):
     run = run_short(
         tmp_path, run_scenario, "pfc_wrist_singularity_6r", "path.orientation.task=full"
@@ -73,6 +75,7 @@ def test_a_task_in_full_ends_at_the_wrist(tmp_path, run_scenario, capfd):
     assert 0.22 < run["eta"][-1, 0] < 0.26
 
 
+@pytest.mark.slow
 def test_damping_goes_through_the_wrist(tmp_path, run_scenario):
     """The tool turns round where damping is on; joints that it leaves free come to rest.
 
@@ -101,6 +104,7 @@ def test_damping_goes_through_the_wrist(tmp_path, run_scenario):
     assert run.metrics["saturated_samples"]["value"] == 0
 
 
+@pytest.mark.slow
 def test_a_task_in_full_ends_at_the_limit_of_the_last_joint(tmp_path, run_scenario, capfd):
     run = run_short(tmp_path, run_scenario, "pfc_tool_axis_6r", "path.orientation.task=full")
     assert run.status == 3

@@ -31,6 +31,7 @@ def turned_about_the_vertical(run):
     return np.unwrap(np.arctan2(R_e[:, 1, 0], R_e[:, 0, 0]))
 
 
+@pytest.mark.slow
 def test_two_turns_and_one_angle_everywhere(scara):
     """It starts 5 deg beside; each lap turns the tool by 360 deg, and the angle does not jump."""
     run = scara(duration="2.65", complete=True)
@@ -68,6 +69,7 @@ def test_the_virtual_input_is_what_the_rates_change_by(scara):
     assert np.all(np.abs(found - run["virtual_input"][:-1]) < 1e-3 * span)
 
 
+@pytest.mark.slow
 def test_elastic_joints_and_time(scara):
     """The law of order four, and a point that moves with time."""
     elastic = "robot.elastic={stiffness: [20000, 10000, 2000000, 400]}"
@@ -107,6 +109,7 @@ def test_a_torque_about_the_vertical_turns_the_tool_past_half_a_turn(scara):
     assert np.abs(steps).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_tilt_that_the_arm_cannot_have(tmp_path, run_scenario, capfd):
     def refused(*changes):
         arguments = [x for change in changes for x in ("--set", change)]

@@ -43,6 +43,7 @@ def fixture_exact(tmp_path_factory, run_scenario):
     return run_scenario(folder / "out", str(mine), *arguments)
 
 
+@pytest.mark.slow
 def test_the_tool_is_on_the_spline_that_its_way_points_make(exact):
     """Which is made here of all of them at once, by another library."""
     spline, begin, end = spline_of("comau_teach_in.csv")
@@ -55,6 +56,7 @@ def test_the_tool_is_on_the_spline_that_its_way_points_make(exact):
     assert np.linalg.norm(exact["xi"], axis=1).max() < 5e-6
 
 
+@pytest.mark.slow
 def test_it_never_passes_what_it_knows(exact):
     known = exact["eta_p"] + exact["way_left"]
     assert (exact["eta"] - known).max() < 1e-6
@@ -65,12 +67,14 @@ def test_it_never_passes_what_it_knows(exact):
     assert exact["bend_speed"].max() == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_a_run_tells_what_became_of_way_points(exact):
     assert exact.metrics["way_points_taken"]["value"] > 20
     assert exact.metrics["past_known_way"]["value"] < 1e-6
     assert exact.metrics["past_known_way"]["target"] == "< 0.5e-3"
 
 
+@pytest.mark.slow
 def test_it_goes_over_to_a_new_path_without_stopping(tmp_path, run_scenario):
     changes = [
         *FAST,

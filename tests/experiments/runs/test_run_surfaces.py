@@ -40,6 +40,7 @@ def fixture_surface_run(tmp_path_factory, run_scenario):
     return get
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHORT)
 def test_signals_and_targets(surface_run, name):
     run = surface_run(name, complete=name == "sfc_scan")
@@ -68,6 +69,7 @@ def _met(metric):
     return compare(metric["value"], float(number))
 
 
+@pytest.mark.slow(but="sfc_viscoelastic_3r-5e-06")
 @pytest.mark.parametrize(
     ("name", "bound"),
     [("sfc_viscoelastic_3r", 5e-6), ("sfc_elastic_6r", 2e-6), ("sfc_scan", 2e-6)],
@@ -79,6 +81,7 @@ def test_exact_laws_follow_to_micrometres(surface_run, name, bound):
     assert np.abs(run["eta"] - run["eta_p"])[late].max() < 20.0 * bound
 
 
+@pytest.mark.slow(but="sfc_viscoelastic_3r")
 @pytest.mark.parametrize("name", ["sfc_viscoelastic_3r", "sfc_elastic_6r", "sfc_delta_cylinder"])
 def test_the_coordinates_are_those_of_the_tool(surface_run, name):
     """The distance of y_t from the closed form of the surface is |xi|."""
@@ -97,6 +100,7 @@ def test_the_coordinates_are_those_of_the_tool(surface_run, name):
     np.testing.assert_allclose(foot + xi[:, None] * normal, run["y_t"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_normal_is_kept(surface_run):
     """The tool leads by 60 deg: its frame is that of tangents and normal, turned by a constant."""
     run = surface_run("sfc_elastic_6r", DISH)
@@ -112,6 +116,7 @@ def test_the_normal_is_kept(surface_run):
     np.testing.assert_allclose(turned, np.broadcast_to(turned[-1], turned.shape), atol=1e-4)
 
 
+@pytest.mark.slow(but="True")
 @pytest.mark.parametrize("friction", [True, False])
 def test_the_delta_robot_with_and_without_friction(surface_run, friction):
     run = surface_run("sfc_delta_cylinder", *([] if friction else ["drive_friction=false"]))
@@ -122,6 +127,7 @@ def test_the_delta_robot_with_and_without_friction(surface_run, friction):
     assert run["eta"][late].max() > 0.15
 
 
+@pytest.mark.slow
 def test_a_hand_leads_the_tool_over_the_paraboloid(surface_run):
     run = surface_run("sfc_comau_paraboloid")
     assert run["manifold_force"].shape == (len(run.t), 6)
@@ -130,6 +136,7 @@ def test_a_hand_leads_the_tool_over_the_paraboloid(surface_run):
     np.testing.assert_allclose(run["xi"], run["xi_p"], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_scanned_panel_is_followed_within_the_scans_noise(surface_run):
     run = surface_run("sfc_scan", complete=True)
     late = run.after(SHORT["sfc_scan"][1])
@@ -141,6 +148,7 @@ def test_the_scanned_panel_is_followed_within_the_scans_noise(surface_run):
     assert rms < largest < 5.0 * scanned_panel.NOISE
 
 
+@pytest.mark.slow
 def test_what_a_run_on_a_surface_leaves(surface_run):
     run = surface_run("sfc_scan", complete=True)
     names = {path.stem for path in (run.folder / "figures").iterdir()}

@@ -34,6 +34,7 @@ def fixture_five_axes(tmp_path_factory, run_scenario):
     return run
 
 
+@pytest.mark.slow
 def test_five_axes_follow_a_path_with_an_axis(five_axes):
     run = five_axes("pfc_comau_6r", complete=True)
     late = run.after(CONVERGED)
@@ -62,6 +63,7 @@ def test_a_point_that_moves_with_time(five_axes):
     assert angle_between(run["axis_e"], run["axis_d"])[late].max() < 5e-6
 
 
+@pytest.mark.slow
 def test_six_axes_turn_the_tool_about_its_axis_meanwhile(five_axes):
     """Where it turns to is the posture's; the axis does not notice."""
     run = five_axes(
@@ -79,6 +81,7 @@ def test_six_axes_turn_the_tool_about_its_axis_meanwhile(five_axes):
     assert np.linalg.norm(run["xi"], axis=1).max() < 2e-6
 
 
+@pytest.mark.slow
 def test_a_target_of_the_orientation_where_it_is_no_task(tmp_path, run_scenario):
     changes = ("--set", "path.orientation.task=none", "--duration", "0.02")
     run = run_scenario(tmp_path / "out", "pfc_elastic_6r", *changes)

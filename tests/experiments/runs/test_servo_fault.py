@@ -28,6 +28,7 @@ def settings():
     return settings
 
 
+@pytest.mark.slow(but="19")
 @pytest.mark.parametrize("component", [0, V_M_2])
 def test_the_arm_comes_to_rest(settings, component):
     """Nobody stops the simulation; the arm was moving with up to 0.2 rad/s."""
@@ -56,6 +57,7 @@ def test_the_arm_comes_to_rest(settings, component):
     assert raw["servo_fault"][-1, 0] == Fault.INPUT_NOT_FINITE
 
 
+@pytest.mark.slow
 def test_the_run_ends_and_keeps_its_log(tmp_path, capsys):
     changes = {
         "controller.law": "velocity_servo",

@@ -22,10 +22,12 @@ def deviation(run):
     return np.linalg.norm(run["xi"][run.t > CONVERGED], axis=1).max()
 
 
+@pytest.mark.slow
 def test_path_following_stays_on_the_path(held_back):
     assert deviation(held_back["ttc_comau_6r"]) > 5.0 * deviation(held_back["pfc_comau_6r"])
 
 
+@pytest.mark.slow
 def test_both_are_held_back(held_back):
     for run in held_back.values():
         late = run["eta_p"][-1, 0] - run["eta"][-1, 0]
@@ -33,6 +35,7 @@ def test_both_are_held_back(held_back):
         assert run.marks["orientation_lead"]["unit"] == "rad"
 
 
+@pytest.mark.slow
 def test_the_orientation_waits_or_runs_on(held_back):
     """By how much the path's orientation turns from where the tool is to where it should be."""
     assert held_back["pfc_comau_6r"]["orientation_lead"].max() < 1e-7

@@ -9,6 +9,7 @@ from pfsc_drake.physics.moving_obstacle import ObstacleParameters, Stride
 from reporting.metrics import Metrics
 
 
+@pytest.mark.slow
 def test_ways_cross_the_path_and_keep_away_from_the_start():
     for scenario in random_crossings(20, seed=3).values():
         (moving,) = scenario.data["obstacles"]["moving"]

@@ -24,6 +24,7 @@ def fixture_waves():
     return PointTeleoperation(station())
 
 
+@pytest.mark.slow(but="0.2")
 @pytest.mark.parametrize("delay", [0.0, 0.1, 0.2])
 def test_waves_are_felt_as_a_line_with_a_load(delay):
     """A lossless line before a mass with damping, and before what is rigid."""
@@ -34,6 +35,7 @@ def test_waves_are_felt_as_a_line_with_a_load(delay):
     assert felt.stiffness == pytest.approx(stiffness[0], rel=0.04)
 
 
+@pytest.mark.slow
 def test_a_wall_at_200_ms_is_stable_with_waves_and_not_without():
     calm = press(PointTeleoperation(station(smoothing=0.002)), 0.2)
     wild = press(PointTeleoperation(station("position_force", False, 0.002)), 0.2)
@@ -43,6 +45,7 @@ def test_a_wall_at_200_ms_is_stable_with_waves_and_not_without():
         assert motion.point[:, 0].max() < 0.1 + 1e-9
 
 
+@pytest.mark.slow(but="position_force")
 @pytest.mark.parametrize("coupling", ["waves", "position_force", "four_channel"])
 def test_a_passive_coupling_never_gives_more_than_its_tanks_held(coupling):
     """Whatever the hand does, and the channel: delay to 0.5 s, jitter, half of it lost."""
@@ -87,6 +90,7 @@ def silent(begin, length):
     return ages
 
 
+@pytest.mark.slow
 def test_both_sides_meet_again_after_a_link_was_away(monkeypatch):
     """For a second, in which the hand goes on by 0.1 m and more; and it is given no energy."""
     monkeypatch.setattr(point_module, "message_ages", silent(1500, 1000))

@@ -22,6 +22,7 @@ def check(figure):
     assert struct.unpack(">I", figure.png[16:20])[0] == round(WIDTH * DPI)
 
 
+@pytest.mark.slow(but="options0")
 @pytest.mark.parametrize(
     "options",
     [
@@ -42,6 +43,7 @@ def test_parameters_of_all_kinds(rows, options):
     assert ("2 more parameters are in the table" in parameters.caption) == ("*" in options[0])
 
 
+@pytest.mark.slow
 def test_a_single_run_and_equal_values(rows):
     samples = draw_samples(parse_variations(["mass=0:1"]), 1, 0)
     for figure in drawn(samples, {0: rows[0]}):
@@ -51,6 +53,7 @@ def test_a_single_run_and_equal_values(rows):
         check(figure)
 
 
+@pytest.mark.slow
 def test_values_over_decades(rows):
     samples = draw_samples(parse_variations(["mass=0:1"]), 40, 0)
     spread = {}

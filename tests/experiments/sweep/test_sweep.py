@@ -158,11 +158,13 @@ def test_without_the_extra(tmp_path, capfd, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_value_that_is_wrong_in_some_samples_is_the_business_of_their_rows():
     sweep = define_sweep("pfc_elastic_3r", ["reference.velocity=-1,1"])
     assert len(sweep.tasks) == 2
 
 
+@pytest.mark.slow
 def test_surfaces_that_differ(address, tmp_path):
     out = tmp_path / "out"
     vary = ("surface.shape.coefficient=1.4,1.667",)

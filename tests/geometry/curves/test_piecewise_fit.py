@@ -41,6 +41,7 @@ def test_jumps_inside_a_segment_are_refused() -> None:
         )
 
 
+@pytest.mark.slow
 def test_roughness_everywhere_is_refused_before_the_memory_ends() -> None:
     with pytest.raises(InputError, match=r"more than \d+ polynomials .* near theta = 0 "):
         fit_pieces(

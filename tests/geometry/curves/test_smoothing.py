@@ -80,6 +80,7 @@ def test_one_point_far_off_is_reached_and_moves_no_others() -> None:
     assert np.linalg.norm(values - TRUTH, axis=1)[near].max() < 3e-3
 
 
+@pytest.mark.slow
 def test_what_cannot_be_reached_says_what_can() -> None:
     points = TRUTH + 0.05 * (np.arange(400) % 2)[:, None]
     parameters = THETA.copy()

@@ -216,6 +216,7 @@ def test_an_edge_that_leaves_for_a_moment_is_open(beyond):
     assert np.abs(np.hypot(p[:, 0], p[:, 1]) - 0.2).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_spline_surface_crosses_a_plane_three_times():
     """A wave z = 0.05 sin(...) as a spline; the roots of its profile are known from the spline."""
     x = np.linspace(0.0, 0.6, 25)
@@ -243,6 +244,7 @@ def test_the_edge_next_to_a_point_begins_there():
     assert abs((begin[0] - near) @ begin[1]) < 1e-6
 
 
+@pytest.mark.slow
 def test_an_edge_that_is_meant_may_be_had_though_others_touch():
     """A plane that cuts the outer side of a torus twice; between them it touches the tube."""
     saddle = plane(SQUARE, (0.2, 0.0, 0.0), tilted((1.0, 0.0, 0.0)))

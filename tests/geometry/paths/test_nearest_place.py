@@ -30,6 +30,7 @@ def wander(seed, ticks, box, speed=0.5):
     return np.array(way)
 
 
+@pytest.mark.slow
 def test_a_nearer_part_of_the_path_is_found_within_its_ticks():
     """But for what half the way between two samples that are looked at is worth."""
     points = samples(LEMNISCATE)

@@ -129,6 +129,7 @@ def test_a_path_that_turns_back_on_itself():
     assert turning_back(WAVE) is None
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_would_be_refused_is_not_advised():
     """Scatter as large as the path: five times the noise is more than the whole way."""
     advised = 0

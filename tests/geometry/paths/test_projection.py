@@ -53,6 +53,7 @@ def test_warm_start_finds_the_constructed_foot(
     assert result.theta == pytest.approx(theta, abs=1e-10)
 
 
+@pytest.mark.slow(but="1.0")
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_tracks_laps_and_the_crossing_without_changing_the_branch(direction: float) -> None:
     projector = Projector(LEMNISCATE)

@@ -89,6 +89,7 @@ def test_a_noisy_wave(smoothness: int, noise: float, tolerance: float) -> None:
     np.testing.assert_allclose(speed, 1.0, atol=0.03)
 
 
+@pytest.mark.slow
 def test_a_rest_while_recording_does_not_matter() -> None:
     """A recorder goes on while the hand stands still, and repeats points."""
     _, truth = _wave(600)
@@ -154,6 +155,7 @@ def test_orientation_is_smoothed_with_the_position(closed: bool) -> None:
     assert turning.max() < 1.25 * np.hypot(1.0, 0.4)
 
 
+@pytest.mark.slow
 def test_a_tolerance_below_the_noise_says_what_to_write() -> None:
     points = _circle(628) + 2e-4 * np.random.default_rng(1).normal(size=(628, 3))
     with pytest.raises(InputError, match=r"path\.shape\.tolerance = 5e-05 m: .* allow") as caught:

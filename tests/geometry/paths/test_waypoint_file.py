@@ -167,6 +167,7 @@ def test_a_path_of_no_length() -> None:
         path_from_waypoints(table, smoothness=3)
 
 
+@pytest.mark.slow
 def test_progress_of_reading(tmp_path: FilePath) -> None:
     told: list[tuple[float, str]] = []
     rows = "1,2,3\n" * 120_000

@@ -42,6 +42,7 @@ def _saddle():
     return surface_through_grid(np.stack([x, y, x * y], axis=-1), smoothness=2)
 
 
+@pytest.mark.slow(but="torus")
 @pytest.mark.parametrize(
     "surface", [torus(0.3, 0.1), _rough(3, 0.02), _saddle()], ids=["torus", "rough", "saddle"]
 )
@@ -128,6 +129,7 @@ def test_a_foot_hides_its_neighbours_only_where_the_boundary_bends_away(below):
     assert float(expression([1.02, 0.0, y])[0]) == (1.0 if below else 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "height"), [(0, 0.01), (1, 0.04)])
 def test_no_sample_of_a_rough_surface_is_nearer(seed, height):
     """Of 360,000 for 400 points, half of them beside the surface."""

@@ -48,6 +48,7 @@ def _encloses(corners, x, y):
     return bool(np.sum(crosses & (at > x)) % 2)
 
 
+@pytest.mark.slow(but="True-True")
 @pytest.mark.parametrize("clockwise", [False, True])
 @pytest.mark.parametrize("inside", [False, True])
 def test_an_extruded_closed_profile(clockwise, inside):
@@ -75,6 +76,7 @@ def test_an_extruded_closed_profile(clockwise, inside):
     assert {True, False} == set(sides)
 
 
+@pytest.mark.slow(but="True")
 @pytest.mark.parametrize("inside", [False, True])
 def test_a_revolved_closed_profile(inside):
     profile = interpolate(_blob(), smoothness=3, closed=True)

@@ -88,6 +88,7 @@ coordinate = st.floats(-0.8, 0.8)
 point = st.tuples(coordinate, coordinate, coordinate)
 
 
+@pytest.mark.slow(but="plane")
 @pytest.mark.parametrize("name", CASES)
 def test_distance_is_that_of_brute_force(name):
     region, surface, is_outside = CASES[name]
@@ -115,6 +116,7 @@ def test_gradient_is_a_unit_vector_and_that_of_the_distance(name):
         assert distance(*(y - h * np.array(n)))[0] == pytest.approx(0.0, abs=1e-15)
 
 
+@pytest.mark.slow(but="plane")
 @pytest.mark.parametrize("name", CASES)
 def test_it_is_lipschitz(name, examples):
     distance = CASES[name][0].distance

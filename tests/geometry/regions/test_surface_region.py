@@ -77,6 +77,7 @@ def test_it_is_the_closed_form_of_a_torus():
         assert other.distance(*y) == pytest.approx([-v for v in expected.distance(*y)], abs=1e-13)
 
 
+@pytest.mark.slow(but="hills")
 def test_distance_is_that_of_brute_force(case):
     """Near and far, and beside the border."""
     surface, region = case
@@ -137,6 +138,7 @@ def test_it_is_lipschitz(case, examples):
     lipschitz()
 
 
+@pytest.mark.slow
 def test_newton_from_the_last_place_is_no_bound(folds):
     """Along a straight way over the valleys it stays behind; the region's distance is global."""
     region, project = SurfaceRegion(folds, above=True), SurfaceProjector(folds).project

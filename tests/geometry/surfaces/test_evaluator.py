@@ -107,6 +107,7 @@ def test_eta_is_of_fourth_order_on_a_straight_line_of_parameters():
     assert errors[2] / errors[1] == pytest.approx(16.0, rel=0.2)
 
 
+@pytest.mark.slow
 def test_eta_returns_on_a_cylinder():
     """Over a closed curve that does not go round, and by the circumference over each lap."""
     evaluator = SurfaceEvaluator(cylinder(0.09, (-0.2, 0.2), TURNED), 2)
@@ -193,6 +194,7 @@ def test_a_far_guess_finds_the_nearest_place():
         assert np.all(np.abs(row[:2] - guess) <= math.pi + 1e-9)
 
 
+@pytest.mark.slow
 def test_through_a_crossing():
     eight = FourierCurve([0, 0, 0], [[0.2, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0.1, 0]])
     evaluator = SurfaceEvaluator(extruded_surface(eight, (0.0, 0.0, 1.0), 0.3), 2)

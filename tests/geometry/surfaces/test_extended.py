@@ -71,6 +71,7 @@ def test_it_goes_on_in_its_class(pair, axis, side):
     np.testing.assert_allclose(beyond / scale, at / scale, atol=1e-4)
 
 
+@pytest.mark.slow(but="part of a cylinder-0")
 @pytest.mark.parametrize("axis", [0, 1])
 def test_derivatives_are_those_of_the_way(pair, axis):
     """Every row along lines out over both borders is the integral of the next order's row."""

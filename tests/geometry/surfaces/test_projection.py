@@ -91,6 +91,7 @@ def test_on_a_torus(u, v, xi):
     assert foot.alpha == pytest.approx(expected, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_on_random_paraboloids():
     """Against a minimizer with bounds that uses differences of the distance alone."""
     rng = np.random.default_rng(17)

@@ -68,6 +68,7 @@ def test_the_surface_is_within_the_noise_of_the_true_workpiece(scanned):
     assert scanned.base == "a plane"
 
 
+@pytest.mark.slow
 def test_residuals_are_the_noise_along_the_normal(scanned):
     points, left = scanned.points, scanned.residuals
     np.testing.assert_allclose(scanned.noise, NOISE, rtol=0.04)
@@ -86,6 +87,7 @@ def test_the_uncertainty_stated_is_that_of_the_error(scanned):
     assert np.abs(off_workpiece(samples(scanned.surface)[:, 0])).max() < 4.0 * scanned.uncertainty
 
 
+@pytest.mark.slow
 def test_points_without_noise_are_met():
     fit = fit_scattered(workpiece(noise=0.0))
     assert np.abs(off_workpiece(samples(fit.surface)[:, 0])).max() < 1e-7
@@ -101,6 +103,7 @@ def test_few_points_of_a_quadric_suffice():
     np.testing.assert_allclose(z, 0.3 * x**2 - 0.2 * x * y + 0.1 * y**2 + 0.05 * x, atol=1e-7)
 
 
+@pytest.mark.slow(but="0.00035")
 @pytest.mark.parametrize("tolerance", [3.5e-4, 1e-3])
 def test_no_point_is_missed_by_more_than_the_tolerance(tolerance, scanned):
     fit = fit_scattered(workpiece(), ScatteredFitOptions(tolerance=tolerance))
@@ -129,6 +132,7 @@ def test_what_bends_over_is_seen_from_its_axis(span):
     assert np.all(outward > 0.0)
 
 
+@pytest.mark.slow
 def test_the_normal_points_to_where_the_surface_is_seen_from():
     inside = ScatteredFitOptions(seen_from=[0.01, 0.1, 0.0])
     rows = samples(fit_scattered(tube(2.0 * np.pi), inside).surface)
@@ -138,6 +142,7 @@ def test_the_normal_points_to_where_the_surface_is_seen_from():
     assert np.all(np.sign(R[2, 2]) * np.cross(rows[:, 1], rows[:, 2]) @ R[:, 2] < 0.0)
 
 
+@pytest.mark.slow
 def test_a_given_axis_and_direction_are_used():
     fit = fit_scattered(tube(1.0), ScatteredFitOptions(base=Axis([0.0, 0.0, 0.0], [0.0, 1.0, 0.0])))
     assert fit.base == "a cylinder"
@@ -172,6 +177,7 @@ def test_a_patch_is_trimmed_to_what_is_covered():
     assert fit.hole < 0.04
 
 
+@pytest.mark.slow
 def test_a_hole_that_is_allowed_is_bridged():
     fit = fit_scattered(with_hole(), ScatteredFitOptions(largest_hole=0.05))
     assert np.abs(off_workpiece(samples(fit.surface)[:, 0])).max() < 3.0 * NOISE
@@ -244,6 +250,7 @@ def test_flying_points_are_named_instead_of_a_fold():
         fit_scattered(points)
 
 
+@pytest.mark.slow
 def test_a_place_that_points_leave_open_is_named_in_space():
     """A step of 5 mm: no smooth surface follows, and the scatter about it is said."""
     rng = np.random.default_rng(4)
@@ -253,6 +260,7 @@ def test_a_place_that_points_leave_open_is_named_in_space():
         fit_scattered(points)
 
 
+@pytest.mark.slow
 def test_the_place_of_the_largest_hole():
     points = workpiece(4000)
     flat = flat_place(points)

@@ -74,6 +74,7 @@ def test_single_sheets(surface):
     check_single_sheet(surface)
 
 
+@pytest.mark.slow
 def test_neighbours_across_the_seam_do_not_crowd_out_a_crossing():
     """An eight whose parameter creeps at the seam: thousands of pairs there are near each other."""
     t = 2.0 * math.pi * np.arange(512) / 512

@@ -135,6 +135,7 @@ def test_a_surface_goes_through_its_grid_with_tangents_of_length_one():
     np.testing.assert_allclose(np.linalg.norm(rows[..., 1, :], axis=-1).mean(), 1.0, atol=0.02)
 
 
+@pytest.mark.slow(but="None")
 @pytest.mark.parametrize("tolerance", [None, 3e-4, 5e-4])
 def test_a_smooth_surface_is_nearer_to_the_truth_than_its_noisy_points(tolerance):
     grid = torus(30, 20, (True, True), 1e-4)

@@ -17,6 +17,7 @@ def test_on_a_cylinder_angles_and_heights_are_lengths():
     assert np.allclose(way, [0.4, 0.05] + eta / [0.09, 1.0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_on_a_paraboloid_the_way_has_the_length_of_its_coordinates():
     surface = paraboloid(((-0.4, 0.4), (-0.4, 0.4)), 1.5)
     motion = straight_lines([[0.0, 0.0], [0.15, 0.2], [-0.1, 0.1]], 0.3, 2.0)

@@ -136,6 +136,7 @@ def identified(comau, tmp_path_factory):
     return write_model(comau, nearest_to_printed(comau).parameters, folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pfc_comau_6r", "pfc_compliant_6r"])
 def test_a_scenario_believes_what_was_identified(name, identified, comau):
     """The plant stays the true robot, with rigid as with elastic joints."""
@@ -169,6 +170,7 @@ def test_a_scenario_takes_the_written_robot(identified):
     np.testing.assert_allclose(station.robot.gather("mass")[:5], masses[:5], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_scenario_believes_an_identified_delta_robot(delta, tmp_path):
     parameters = true_parameters(delta) * [1.1, 1.1, 1.1, 0.9, *[1.5] * 6]
     written = write_model(delta, parameters, tmp_path)

@@ -54,6 +54,7 @@ def errors(arm, estimates):
     return np.array(found) / deviations, np.array(found) / np.transpose([true[k] for k in JUDGED])
 
 
+@pytest.mark.slow
 def test_all_joints_from_one_motion(arm, moving):
     sure, relative = errors(arm, estimate_joints(moving, arm))
     assert np.abs(sure).max() < 4.0
@@ -62,6 +63,7 @@ def test_all_joints_from_one_motion(arm, moving):
     assert np.abs(relative[:, [0, 2]]).max() < 0.06
 
 
+@pytest.mark.slow
 def test_rotors_on_turning_links_count(arm, moving):
     """The motors' inertia and the joints' stiffness are biased without (2.62)."""
     best = errors(arm, estimate_joints(moving, arm))[0]
@@ -73,6 +75,7 @@ def test_rotors_on_turning_links_count(arm, moving):
     assert residuals[1][5] > 1.05 * residuals[0][5]
 
 
+@pytest.mark.slow
 def test_locked_links(arm, faults):
     record = simulate_locked(arm, faults, duration=5.0, seed=2)
     sure, relative = errors(arm, estimate_joints(record, arm, locked=True, viscous=arm.viscous))
@@ -80,6 +83,7 @@ def test_locked_links(arm, faults):
     assert np.abs(relative[:, [0, 2]]).max() < 0.02
 
 
+@pytest.mark.slow
 def test_through_a_file(arm, moving, tmp_path):
     write_record(tmp_path / "moving.csv", moving, arm)
     again = read_record(tmp_path / "moving.csv", arm)
@@ -110,6 +114,7 @@ def refused(message, function, *arguments, **options):
         function(*arguments, **options)
 
 
+@pytest.mark.slow
 def test_bad_records(arm, moving):
     refused("no q_motor; positions of motors", estimate_joints, replace(moving, q_motor=None), arm)
     other = replace(moving, joint_names=tuple("abcdef"))

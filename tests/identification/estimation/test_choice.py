@@ -41,6 +41,7 @@ def data(comau, measure, other_trajectory):
     return of_friction
 
 
+@pytest.mark.slow
 def test_plain_friction_stays_plain(comau, data):
     """In all of ten experiments."""
     for seed in range(10):
@@ -50,6 +51,7 @@ def test_plain_friction_stays_plain(comau, data):
         assert max(judged.significance for judged in choice.judgements) < choice.threshold
 
 
+@pytest.mark.slow
 def test_coloured_noise_is_no_friction(comau, data):
     for seed in range(6):
         motions = data(np.zeros_like, seed, colour=0.9)

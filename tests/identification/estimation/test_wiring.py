@@ -177,6 +177,7 @@ def test_what_no_torque_tells_of_a_single_joint_is_said(measure_torques, tmp_pat
     assert "tau of all joints" in found.cause and "joint_1.f_" in found.negative
 
 
+@pytest.mark.slow(but="1")
 @pytest.mark.parametrize("joint", range(6))
 def test_signs_of_the_comau(comau, measure, joint):
     """The last axis hardly acts on the others: friction below zero tells it."""
@@ -184,6 +185,7 @@ def test_signs_of_the_comau(comau, measure, joint):
     assert found.cause.startswith(f"tau of joint_{joint + 1} has the wrong sign")
 
 
+@pytest.mark.slow
 def test_exchanged_wrist_torques_of_the_comau(comau, measure):
     found = find_mistake(comau.regressor, comau.base, swapped(measure(), 3, 4, "tau"))
     assert found.cause == "tau of joint_4 and joint_5 are exchanged"
@@ -195,6 +197,7 @@ def test_noise_is_no_mistake(comau, measure, seed, options):
     assert find_mistake(comau.regressor, comau.base, measure(seed, **options)) is None
 
 
+@pytest.mark.slow(but="payload")
 @pytest.mark.parametrize("kind", ["offset", "stribeck", "quadratic", "ripple", "payload"])
 def test_what_a_model_lacks_is_no_mistake_of_signals(comau, measure, kind):
     q, v, _ = comau.motion

@@ -65,12 +65,14 @@ def test_keeps_all_limits_of_the_cell(arm, found, verified):
     assert again.clearance.guaranteed >= 0.018
 
 
+@pytest.mark.slow
 def test_condition_number(arm, found):
     by_condition = search(arm, "condition", cell=CELL, **QUICK)
     assert by_condition.information.condition_number < found.information.condition_number
     assert by_condition.information.log_determinant < found.information.log_determinant
 
 
+@pytest.mark.slow
 def test_delta(delta):
     found = search(delta, limits={"acceleration": 30.0}, **QUICK)
     assert found.information.base_parameters == 10
@@ -164,6 +166,7 @@ def add_at_last(common, task):
     return task
 
 
+@pytest.mark.slow
 def test_processes(tmp_path):
     """They are replaced where they are killed: with nothing to do, and in the middle of work."""
     with side_by_side(2, 3) as run:

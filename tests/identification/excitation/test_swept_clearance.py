@@ -9,6 +9,7 @@ from identification.excitation.scene import Cell, Obstacle, RobotScene
 from identification.excitation.swept_clearance import swept_clearance
 
 
+@pytest.mark.slow
 def test_nothing_is_nearer_than_guaranteed(comau, comau_scene, printed):
     swept = swept_clearance(comau.chain, comau_scene, printed, 0.02)
     t = np.random.default_rng(0).uniform(0.0, 10.0, 300)

@@ -24,6 +24,7 @@ def test_shipped_excitation_keeps_all_and_beats_the_printed_one(
     assert verification.margins["height of the flange"] >= 0.0
 
 
+@pytest.mark.slow(but="festo_expt_45-limits0")
 @pytest.mark.parametrize(
     ("name", "limits"), [("festo_expt_45", {"acceleration": 30.0}), ("franka_emika_panda", None)]
 )
@@ -42,6 +43,7 @@ def test_shipped_excitation_between_samples(comau, comau_scene, comau_cell, best
     assert comau_scene.clearance(q).least >= comau_cell.clearance
 
 
+@pytest.mark.slow
 def test_printed_excitation_dips_too_low(comau, printed, verified):
     verification = verified(comau, printed)
     assert not verification.keeps_all
@@ -51,6 +53,7 @@ def test_printed_excitation_dips_too_low(comau, printed, verified):
         assert np.all(verification.shares[key] < 1.0)
 
 
+@pytest.mark.slow
 def test_too_fast(comau, best, verified):
     # the same way in less time
     faster = FourierTrajectory(

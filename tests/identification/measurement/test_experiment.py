@@ -52,6 +52,7 @@ def clean(request):
     return smooth, run_experiment(smooth, excitation(smooth), perfect(smooth), periods=PERIODS)
 
 
+@pytest.mark.slow
 def test_torques_are_those_of_the_parameters(clean):
     """To what the steps of the feedback at 1 kHz leave."""
     subject, run = clean
@@ -62,6 +63,7 @@ def test_torques_are_those_of_the_parameters(clean):
     np.testing.assert_allclose(motion.v, run.v[-2000:], atol=1e-4)
 
 
+@pytest.mark.slow(but="festo_expt_45")
 def test_the_excitation_is_followed(clean):
     subject, run = clean
     lower, upper = subject.position_limits.T
@@ -71,6 +73,7 @@ def test_the_excitation_is_followed(clean):
     np.testing.assert_allclose(run.record.t, np.arange(PERIODS * 2000) * 1e-3, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["comau_racer_1_4", "franka_emika_panda"])
 def test_torques_of_drakes_inverse_dynamics(robot):
     """Without the coupling of rotors, which Drake's model does not have."""
@@ -98,6 +101,7 @@ def delta():
     return load_subject("festo_expt_45")
 
 
+@pytest.mark.slow
 def test_dry_friction(delta):
     """At reversals alone, within some samples, the torque is anywhere between both signs."""
     motion = average(
@@ -112,6 +116,7 @@ def test_dry_friction(delta):
     assert abs(lag.time) < 5e-4
 
 
+@pytest.mark.slow
 def test_a_servo_that_knows_nothing(delta):
     """Its joints stick before they reverse: torques are late there, the record is not."""
     plain = Servo(feedforward=0.0, friction=0.0)
@@ -130,6 +135,7 @@ def test_a_servo_that_knows_nothing(delta):
     assert found[1].time - found[0].time == pytest.approx(6e-3, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_noise_and_encoders(delta):
     faults = shipped_imperfections("festo_expt_45")
     run = run_experiment(delta, excitation(delta), faults, periods=5, seed=1)
@@ -144,6 +150,7 @@ def test_noise_and_encoders(delta):
     assert np.all(variance <= 1.5 * faults.torque_noise**2)
 
 
+@pytest.mark.slow
 def test_five_percent_of_drift_are_seen(delta):
     faults = shipped_imperfections("festo_expt_45")
     warm = replace(faults, drift=FrictionDrift(factor=1.05, begin=0.0, end=5 * PERIOD))
@@ -160,6 +167,7 @@ def test_five_percent_of_drift_are_seen(delta):
     )
 
 
+@pytest.mark.slow
 def test_runs_differ_by_their_seed_alone(delta):
     faults = shipped_imperfections("festo_expt_45").realistic()
     seeds = [3, 3, 4]
@@ -169,6 +177,7 @@ def test_runs_differ_by_their_seed_alone(delta):
     assert np.all(np.std(runs[0].record.tau - runs[2].record.tau, axis=0) > 1.0)
 
 
+@pytest.mark.slow
 def test_a_record_through_a_file(delta, tmp_path):
     told = []
     record = run_experiment(

@@ -181,6 +181,7 @@ def test_function_and_matrix_agree_whatever_the_number_of_samples(comau):
     assert regressor.matrix(q[:0], v[:0], a[:0]).shape == (0, 6, 78)
 
 
+@pytest.mark.slow
 def test_a_minute_of_samples_takes_seconds(comau):
     regressor = Regressor(comau)
     motion = random_motion(6, samples=40_000)

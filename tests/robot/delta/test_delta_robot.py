@@ -115,6 +115,7 @@ def test_torque_jet_is_the_derivative_of_the_torque():
         along = ca.jacobian(along, t)
 
 
+@pytest.mark.slow
 @given(travel, rates, rates)
 def test_acceleration_inverts_inverse_dynamics(ours, q, v, a):
     """Drive forces made of an acceleration and of an external force give that acceleration."""

@@ -95,6 +95,7 @@ def tool_jet():
     return ca.Function("jet", [coefficients], [ca.horzcat(*y_t.coefficients)])
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(travel, st.integers(0, 2**16))
 def test_jet_is_the_taylor_series_along_a_polynomial_motion(tool_jet, q_0, seed):

@@ -77,6 +77,7 @@ def run_constrained(time_step):
     return state, model.end_effector.EvalPoseInWorld(context).translation()
 
 
+@pytest.mark.slow
 def test_same_forces_same_motion_to_first_order_in_the_step(analytic):
     state, y_t = analytic
     assert np.linalg.norm(y_t - ROBOT.tool_position(START)) > 0.1, "a motion worth the name"

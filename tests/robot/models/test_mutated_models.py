@@ -35,6 +35,7 @@ def chain_or_line(file, tool):
     return chain
 
 
+@pytest.mark.slow(but="urdf-tcp")
 @pytest.mark.fuzz
 @pytest.mark.parametrize(("kind", "tool"), [("urdf", "tcp"), ("sdf", "arm")])
 def test_one_word_changed(examples, tmp_path, urdf_text, sdf_text, kind, tool):

@@ -92,6 +92,7 @@ def test_step_within_the_bandwidth(axis):
     assert np.max(np.abs(np.delete(v, axis, axis=1)[steady])) < 0.02
 
 
+@pytest.mark.slow
 def test_no_steady_error_under_gravity_and_friction():
     reference = np.array([0.15, -0.1, 0.1, 0.2, -0.2, 0.3])
     _, v, u = Station(reference).run(1.0)

@@ -68,6 +68,7 @@ def settle(ball_first):
     return wrench.GetOutputPort("wrench").Eval(wrench.GetMyContextFromRoot(root)), place
 
 
+@pytest.mark.slow(but="True")
 @pytest.mark.parametrize("ball_first", [True, False])
 def test_carries_the_weight(ball_first):
     """Whichever of the two geometries Drake names first."""

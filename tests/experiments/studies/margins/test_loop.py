@@ -46,6 +46,7 @@ def fixture_three():
     return loop, section, linearize(loop, section, chosen)
 
 
+@pytest.mark.slow
 def test_a_fast_joint_is_no_fault():
     """In one tick it moves by more than positions and velocities may contradict each other."""
     changes = ["reference={points: [0.96, 0.7], velocity: 1.5, acceleration: 8, dwell: 0.02}"]
@@ -66,6 +67,7 @@ def test_a_fast_joint_is_no_fault():
     assert linearize(loop, root, loop.variables_in_loop([root])) is not None
 
 
+@pytest.mark.slow(but="limits")
 @pytest.mark.parametrize("task", ["reference", "limits", "conditioning"])
 def test_a_posture_that_is_pulled_is_in_the_loop(task):
     """What pulls it depends on the joints, and they follow it; a spring to a goal knows neither."""
@@ -92,6 +94,7 @@ def differences(loop, section, chosen):
     return np.column_stack(columns)
 
 
+@pytest.mark.slow(but="pfc_elastic_3r-overrides3")
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
@@ -140,6 +143,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow(but="pfc_elastic_3r-overrides6")
 @pytest.mark.parametrize(("name", "overrides"), CASES)
 def test_the_loop_at_rest_is_that_of_the_whole_station(name, overrides):
     """Two ways that share the law's own function only, with masses believed too low."""
@@ -191,6 +195,7 @@ def test_the_station_moves_like_its_linear_loop(three):
     np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_delay_margin_is_what_the_station_bears(three):
     loop, _, linear = three
     period = loop.map.period
@@ -209,6 +214,7 @@ def test_the_delay_margin_is_what_the_station_bears(three):
         assert (late > early) == bool(extra)
 
 
+@pytest.mark.slow
 def test_gains_within_the_disc_margin_are_borne_and_others_need_not_be(three):
     loop, _, linear = three
     margins = disc_margins(BrokenLoop(linear.A, linear.holds, loop.map.period))

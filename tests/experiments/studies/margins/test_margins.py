@@ -37,6 +37,7 @@ def poles(*values):
     return [*gains, "controller.friction.source=none"]
 
 
+@pytest.mark.slow
 def test_six_axes_with_four_equal_poles_do_not_bear_5_percent():
     """By simulation the tool leaves the path by 130 mm and the run stops."""
     changes = [*poles(-55, -55, -55, -55), "model_error.mass=0.95"]
@@ -72,6 +73,7 @@ def test_the_fast_pair_bears_the_box_and_has_margins():
     assert equal.tightest.smallest < 0.05 < 0.2 < fast.tightest.smallest
 
 
+@pytest.mark.slow(but="pfc_delta-overrides3")
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
@@ -92,6 +94,7 @@ def test_other_stations_are_stable_too(name, overrides):
     assert len(analysis.tightest.drives) == len(analysis.joints)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page(tmp_path, capsys):
     out = tmp_path / "out"
     short = ["reference.points=[0.96, 0.9]", "model_error.mass=0.97"]
@@ -115,6 +118,7 @@ def test_the_command_writes_a_page(tmp_path, capsys):
     assert len(list((out / "figures").iterdir())) == 3
 
 
+@pytest.mark.slow
 def test_a_run_prints_one_line_of_margins(tmp_path, capsys):
     bare = ["--no-figures", "--no-recording", "--duration", "0.02"]
     assert main(["run", "pfc_elastic_3r", "--margins", *bare, "--out", str(tmp_path / "out")]) == 0

@@ -107,6 +107,7 @@ def test_the_shipped_one_bears_three_kilograms_more(shipped):
     assert size[40:].max() < 0.5 * size[:20].max()
 
 
+@pytest.mark.slow
 def test_what_is_pressed_on_is_a_spring_that_may_be_stiffer_but_not_at_will(shipped):
     loop, section = shipped
     free = loop.pressed_force(section)
@@ -122,6 +123,7 @@ def test_what_is_pressed_on_is_a_spring_that_may_be_stiffer_but_not_at_will(ship
     assert not found.is_stable
 
 
+@pytest.mark.slow
 def test_plant_and_spring_are_the_same_for_a_loop_that_errs(shipped):
     loop, section = shipped
     assert loop.rest_is_physics

@@ -40,6 +40,7 @@ def impedance(station, q_0, target, **gains):
     return CartesianImpedance(station.part.belief.robot, ImpedanceGains(**chosen), target, q_0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("matched", [False, True])
 def test_a_constant_force_moves_the_tool_by_force_over_stiffness(lap, station, q_0, matched):
     """After it has settled in simulation, before the reference moves."""

@@ -2,10 +2,13 @@
 
 import json
 
+import pytest
+
 from experiments.studies.peers.contestants import CONTESTANTS
 from experiments.studies.peers.study import write_peers
 
 
+@pytest.mark.slow
 def test_a_push_before_anything_moves(tmp_path):
     """0.3 s of it: who is stiffer gives way less."""
     push = ("forces=[{begin: 0, end: 0.6, ramp: 0.1, frame: manifold, force: [0, 20, 0]}]",)
