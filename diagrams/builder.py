@@ -29,12 +29,14 @@ from diagrams.station import Station
 from diagrams.station_parts import (
     add_afar,
     add_robot,
+    check_trajectory,
     choose_mounting,
     following_options,
     friction_options,
     make_spring,
     make_task,
     make_workpiece,
+    naming_reference,
     outside,
     servo_lag,
     servo_options,
@@ -177,7 +179,9 @@ def build_station(
     assembly = ControllerAssembly(
         builder, task, law, known, options, start_posture, waiting, tuning
     )
-    assembly.add_place(joint_state, None if held is None else held.motion)
+    check_trajectory(scenario)
+    with naming_reference():
+        assembly.add_place(joint_state, None if held is None else held.motion)
     stream, pen = assembly.stream, None
     if isinstance(task, StreamTask) and stream is not None:
         pen = task.add_source(builder, stream, period)

@@ -29,6 +29,7 @@ from diagrams.station_parts import (
     following_options,
     friction_options,
     make_task,
+    naming_reference,
 )
 from diagrams.station_start import find_rest, find_start
 from diagrams.station_warnings import controller_warnings
@@ -194,7 +195,8 @@ def add_holder(
         assembly = ControllerAssembly(
             named, task, law, known, following_options(own), q_J, carries=True
         )
-        assembly.add_place(links.joint_state)
+        with naming_reference():
+            assembly.add_place(links.joint_state)
         reaction, told = None, own.controller.external_torque.source
         if scenario.forces:
             seen = assembly.signals["tool_pose"] if told == "measured" else None

@@ -1,5 +1,7 @@
 """The parts of a station that a scenario chooses: task, robot, drives, workpiece."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path as FilePath
 
 from pydrake.systems.framework import DiagramBuilder
@@ -315,21 +317,41 @@ def following_options(scenario: Scenario) -> FollowerOptions:
 
     Args:
         scenario: The scenario.
-
-    Raises:
-        InputError: If the way to its reference does not suit the manifold.
     """
-    reference, begins = scenario.reference, scenario.start
-    if scenario.controller.manifold == "trajectory":
-        count = f"{len(reference.swings)} given"
-        allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
-        require(not reference.swings, "reference.swings", count, allowed)
-        allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
-        require(begins.transition == 0.0, "start.transition", begins.transition, allowed)
     return FollowerOptions(
         controller=scenario.controller,
         faults=scenario.faults,
-        transition=begins.transition,
+        transition=scenario.start.transition,
         compliance=scenario.compliance,
-        swings=reference.swings,
+        swings=scenario.reference.swings,
     )
+
+
+def check_trajectory(scenario: Scenario) -> None:
+    """Refuse what a point that moves along a path with time cannot have.
+
+    Args:
+        scenario: The scenario.
+
+    Raises:
+        InputError: If it has that.
+    """
+    if scenario.controller.manifold != "trajectory":
+        return
+    swings, transition = scenario.reference.swings, scenario.start.transition
+    allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
+    require(not swings, "reference.swings", f"{len(swings)} given", allowed)
+    allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
+    require(transition == 0.0, "start.transition", transition, allowed)
+
+
+@contextmanager
+def naming_reference() -> Iterator[None]:
+    """Name the block of a scenario in what is said against its oscillations."""
+    try:
+        yield
+    except InputError as error:
+        message = str(error)
+        raise InputError(
+            f"reference.{message}" if message.startswith("swings") else message
+        ) from None

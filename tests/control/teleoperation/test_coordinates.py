@@ -82,7 +82,7 @@ def random_port(seed, ticks=300, arriving=2e-3, **options):
     return rows
 
 
-COUNTS = [2, pytest.param(20, marks=pytest.mark.slow)]
+COUNTS = [2, pytest.param(50, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("count", COUNTS)
