@@ -18,7 +18,7 @@ from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.planning.drive_limits import DrivePlanner
-from pfsc_drake.following.waiting import COURSE_STEP, JointCourse, Waiting, waiting_motion
+from pfsc_drake.following.waiting import Waiting, waiting_motion
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 
@@ -114,8 +114,7 @@ def plan_waiting(
     followed = not isinstance(task, SpaceTask | TrajectoryTask)
     allowed = "null unless controller.manifold is path or surface, on which progress can wait"
     require(followed, "obstacles", "given", allowed)
-    chain = law.robot
-    if not isinstance(chain, SerialChain):
+    if not isinstance(law.robot, SerialChain):
         raise InputError("obstacles = given: must be null for a robot that is no chain of links")
     require(not reference.swings, "reference.swings", "given", "none where there are obstacles")
     if crossing.elbow is not None:
@@ -124,13 +123,6 @@ def plan_waiting(
         require(spare, "obstacles.elbow", "given", allowed)
     watch = crossing.watch
     planner = DrivePlanner(reference, controller, 0.0, task, law, start, friction)
-    try:
-        step, course = planner.course(COURSE_STEP, approach.reference(task, law, start))
-    except InputError as error:
-        raise InputError(f"obstacles: the reference cannot be followed: {error}") from None
-    allowed_demand = planner.allowed(course, watch.reserve)
-    joints = JointCourse(step, course, planner.demand, allowed_demand)
-    order = law.linearization.relative_degree
-    ahead, pace = waiting_motion(chain, watch, task.motion, order, joints)
+    ahead, pace = waiting_motion(planner, law, watch, approach.reference(task, law, start))
     shapes = [obstacle.shape for obstacle in crossing.moving]
     return CrossingWait(shapes, watch, ahead, pace, crossing.elbow, crossing)

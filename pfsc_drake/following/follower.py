@@ -36,9 +36,9 @@ from pfsc_drake.following.options.controller import (
     LawGains,
 )
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.options.motion import MotionLimits
+from pfsc_drake.following.options.motion import limits_of
 from pfsc_drake.following.planning.drive_limits import keep_drive_limits
-from pfsc_drake.following.task import Followed, Task
+from pfsc_drake.following.task import Followed
 from pfsc_drake.following.unused_options import refuse_unused
 from pfsc_drake.following.waiting import plan_waiting
 from pfsc_drake.geometry.rotation import check_rotation_matrix
@@ -52,8 +52,6 @@ Ports = dict[str, OutputPort]
 _logger = logging.getLogger("pfsc_drake")
 # what sentences on faults tell of besides
 _DESCRIBED = ("reference", "manifold_force", "press")
-# samples of a motion whose largest rates are looked for, and the least of these [m/s, m/s^2]
-_SAMPLES, _SLOWEST = 2001, 1e-6
 # names of outputs, and of what they put out
 _OUTPUTS = {name: name for name in ("reference", "manifold_force", "limit_force", "mode", "guides")}
 _OUTPUTS |= {"record": "guidance", "stream": "stream", "watch": "watch"}
@@ -167,7 +165,8 @@ class Follower(Diagram):
         self.law = make_law(chosen, self.robot, manifold, lambda: rest, options.faults)
         if options.reference is not None:
             begun = CourseStart(self.start_posture, point[followed.place.layout.memory])
-            limits = _of_motion(options.reference, followed)
+            assert followed.motion is not None  # as refuse_unused requires
+            limits = limits_of(followed.motion, options.reference)
             known = self.law, begun, options.friction
             keep_drive_limits(limits, chosen, 0.0, followed, *known)
         self._builder = DiagramBuilder()
@@ -286,9 +285,9 @@ class Follower(Diagram):
 
     def _wire(self, chosen: ControllerParameters, options: FollowerOptions) -> None:
         builder, followed = self._builder, self.followed
-        waiting = None
+        wired, waiting = dc.replace(options, controller=chosen), None
         if options.obstacles is not None:
-            waiting = plan_waiting((self.law, chosen.law), followed, options, self.start_posture)
+            waiting = plan_waiting(self.law, followed, wired, self.start_posture)
         believed = Believed(self.robot, options.friction)
         self._on_motors = acts_on_motors(chosen.law, believed)
         assembly = ControllerAssembly(
@@ -296,7 +295,7 @@ class Follower(Diagram):
             followed,
             self.law,
             believed,
-            dc.replace(options, controller=chosen),
+            wired,
             self.start_posture,
             waiting,
         )
@@ -363,17 +362,6 @@ class Follower(Diagram):
         measured = wrench.GetOutputPort("measured")
         made |= {"wrench_measured": measured} if sensed else {}
         return made | ({"wrench_ext": measured} if known else {})
-
-
-def _of_motion(limits: MotionLimits, task: Task) -> MotionLimits:
-    """Return limits with the velocity and the acceleration of a motion as it is asked for."""
-    assert task.motion is not None  # as refuse_unused requires
-    if limits.speed == "fastest":
-        return limits
-    times = np.linspace(*task.motion.domain, _SAMPLES)
-    rates = np.abs(task.motion.derivatives(times, 2)[:, 1:]).max(axis=(0, 2))
-    velocity, acceleration = np.maximum(rates, _SLOWEST).tolist()
-    return dc.replace(limits, velocity=velocity, acceleration=acceleration)
 
 
 def _frame_of(frame: np.ndarray, compliance: ComplianceParameters) -> np.ndarray:

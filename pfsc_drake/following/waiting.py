@@ -1,6 +1,6 @@
 """Progress that waits for obstacles: the arm's way ahead, how it can be stopped, and the blocks."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,109 +14,50 @@ from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, Obstacl
 from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
-from pfsc_drake.control.planning.course import CourseFinder, CourseStart
-from pfsc_drake.control.planning.drive_demand import (
-    DriveDemand,
-    DriveLimits,
-    allowed_demand,
-    with_pace,
-)
+from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.control.planning.stopping import stopping_bandwidth
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.options.motion import MotionLimits, limits_of
+from pfsc_drake.following.planning.drive_limits import DrivePlanner
 from pfsc_drake.following.task import Followed
-from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.robot.robot_model import largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import arm_outline, outline_points
 from pfsc_drake.systems.block_system import BlockSystem
 
 # s, from sample to sample of a course on which stops begin
-COURSE_STEP = 4e-3
+_COURSE_STEP = 4e-3
 # of the planned pace, the most that may count as rest
 _MOST_REST = 0.2
 
 
-@dataclass(frozen=True)
-class JointCourse:
-    """How joints move along a motion.
-
-    Attributes:
-        step: From sample to sample [s].
-        course: Coordinates and derivatives, shape (samples, K + 1, N).
-        demand: What it asks of the drives.
-        allowed: What may be asked at each sample, shape (samples, 2N).
-    """
-
-    step: float
-    course: np.ndarray
-    demand: DriveDemand
-    allowed: np.ndarray
-
-
-def joint_course(
-    named: tuple[FollowingLaw, str],
-    followed: Followed,
-    q_J: np.ndarray,
-    friction: tuple[np.ndarray, np.ndarray] | None,
-    reserve: float,
-) -> JointCourse:
-    """Return how the joints of a robot move along what it follows.
-
-    Args:
-        named: The law, and its name.
-        followed: The path that is followed, and the motion along it.
-        q_J: Joints' coordinates at the start, shape (N,).
-        friction: Coefficients f_c and f_v that the drives overcome besides, if any are believed.
-        reserve: Share of the drives' torques and speeds that is left.
-
-    Raises:
-        InputError: If the joints cannot follow.
-    """
-    law, name = named
-    robot, motion, order = law.robot, followed.motion, law.linearization.relative_degree
-    assert motion is not None
-    assert followed.projection is not None
-    f_c, f_v = friction or (np.zeros(robot.dimension),) * 2
-    demand = DriveDemand(robot, name, f_v)
-    begin, end = (float(limit) for limit in motion.domain)
-    times = np.linspace(begin, end, int(np.ceil((end - begin) / COURSE_STEP)) + 1)
-    asked = motion.derivatives(times, order)
-    manifold = law.linearization.manifold
-    assert isinstance(manifold, PathManifold)  # what has a projection
-    reference = np.zeros((len(times), order + 1, len(manifold.coordinates)))
-    reference[:, :, : asked.shape[2]] = asked
-    finder = CourseFinder(robot, manifold, followed.projection, law.inverse, law.posture)
-    start = CourseStart(q_J, followed.point[manifold.layout.memory])
-    course, step = finder.find(start, reference, times), float(times[1] - times[0])
-    while course.shape[1] <= demand.derivatives:
-        further = np.gradient(course[:, -1:], step, axis=0)
-        course = np.concatenate([course, further], axis=1)
-    course = course[:, : demand.derivatives + 1]
-    effort = np.maximum(robot.gather("effort_limit") - f_c, 1e-9)
-    limits = DriveLimits(effort, largest_speeds(robot)).together
-    at_rest = demand.of(with_pace(course, np.zeros((len(course), 4))))
-    return JointCourse(step, course, demand, allowed_demand(at_rest, limits, reserve))
-
-
 def waiting_motion(
-    chain: SerialChain,
+    planner: DrivePlanner,
+    law: FollowingLaw,
     watch: WatchParameters,
-    motion: PiecewisePolynomialCurve,
-    order: int,
-    joints: JointCourse,
+    added: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[ArmAhead, WaitingPace]:
     """Return where the arm will be, and how the motion can be stopped.
 
     Args:
-        chain: The arm as it is believed.
+        planner: Finds how the joints move along the motion.
+        law: The law, of an arm that is a serial chain.
         watch: How it keeps away from obstacles.
-        motion: Tangential coordinates over time [m].
-        order: r of the law.
-        joints: How the joints move along it.
+        added: Derivatives 0..r that are added to those of the reference at times [s], shape
+            (samples, r + 1, m), if any are.
+
+    Raises:
+        InputError: If the joints cannot follow, or the motion cannot be stopped.
     """
-    step, course, begin = joints.step, joints.course, float(motion.domain[0])
-    bandwidth = stopping_bandwidth(joints.demand, course, step, joints.allowed, order)
+    chain, order = law.robot, law.linearization.relative_degree
+    assert isinstance(chain, SerialChain)
+    motion, begin = planner.motion, float(planner.motion.domain[0])
+    try:
+        step, course = planner.course(_COURSE_STEP, added)
+    except InputError as error:
+        raise InputError(f"obstacles: the reference cannot be followed: {error}") from None
+    allowed = planner.allowed(course, watch.reserve)
+    bandwidth = stopping_bandwidth(planner.demand, course, step, allowed, order)
     known = begin + step * np.arange(len(course))
     speed = float(np.abs(motion.derivatives(known, 1)[:, 1]).max())
     resting = min(watch.resting_speed / speed, _MOST_REST)
@@ -179,20 +120,20 @@ def add_waiting(
 
 
 def plan_waiting(
-    named: tuple[FollowingLaw, str], followed: Followed, options: FollowerOptions, q_J: np.ndarray
+    law: FollowingLaw, followed: Followed, options: FollowerOptions, q_J: np.ndarray
 ) -> Waiting:
     """Return how a motion along a path waits for obstacles.
 
     Args:
-        named: The law, and its name.
+        law: The law.
         followed: What is followed.
-        options: What is chosen, with obstacles.
+        options: What is chosen, with obstacles; its controller has the law's name.
         q_J: Joints' coordinates at the start, shape (N,).
 
     Raises:
         InputError: If what is followed or chosen cannot wait, or the joints cannot follow.
     """
-    law, obstacles, motion = named[0], options.obstacles, followed.motion
+    obstacles, motion = options.obstacles, followed.motion
     assert obstacles is not None
     allowed = "None unless a path at rest is followed by a motion over time, without yielding"
     manifold = followed.manifold
@@ -204,14 +145,15 @@ def plan_waiting(
     assert motion is not None
     planned = "0 with obstacles, which are avoided along the path alone; bring the tool there first"
     require(options.transition == 0.0, "transition", options.transition, planned)
-    chain, watch = law.robot, obstacles.watch
-    if not isinstance(chain, SerialChain):
+    watch = obstacles.watch
+    if not isinstance(law.robot, SerialChain):
         raise InputError("obstacles: given; must be None for a robot that is no chain of links")
     if obstacles.elbow is not None:
         allowed = "None for an arm without joints to spare, and one whose posture yields to forces"
         spare = law.posture is not None and options.controller.posture.yields == "none"
         require(spare, "obstacles.elbow", "given", allowed)
-    joints = joint_course(named, followed, q_J, options.friction, watch.reserve)
-    order = law.linearization.relative_degree
-    ahead, pace = waiting_motion(chain, watch, motion, order, joints)
+    start = CourseStart(q_J, followed.point[followed.place.layout.memory])
+    known = options.controller, 0.0, followed, law, start, options.friction
+    planner = DrivePlanner(limits_of(motion, MotionLimits()), *known)
+    ahead, pace = waiting_motion(planner, law, watch)
     return Waiting(obstacles.shapes, watch, ahead, pace, obstacles.elbow)

@@ -2,11 +2,16 @@
 
 import dataclasses as dc
 
+import numpy as np
+
 from pfsc_drake.errors import require, require_one_of
+from pfsc_drake.geometry import PiecewisePolynomialCurve
 
 _LIMITS = ("respect", "warn")
 _SPEEDS = ("asked", "fastest")
 _VELOCITY = 0.1  # m/s
+# samples of a motion whose largest rates are looked for, and the least of these [m/s, m/s^2]
+_SAMPLES, _SLOWEST = 2001, 1e-6
 
 
 @dc.dataclass(kw_only=True)
@@ -45,3 +50,18 @@ class MotionLimits:
     def largest_velocity(self) -> float:
         """Largest velocity of a motion as it is asked for [m/s]."""
         return _VELOCITY if self.velocity is None else self.velocity
+
+
+def limits_of(motion: PiecewisePolynomialCurve, limits: MotionLimits) -> MotionLimits:
+    """Return limits with the velocity and the acceleration of a motion as it is asked for.
+
+    Args:
+        motion: Tangential coordinates over time [m].
+        limits: The limits; those of a fastest motion stay as they are.
+    """
+    if limits.speed == "fastest":
+        return limits
+    times = np.linspace(*motion.domain, _SAMPLES)
+    rates = np.abs(motion.derivatives(times, 2)[:, 1:]).max(axis=(0, 2))
+    velocity, acceleration = np.maximum(rates, _SLOWEST).tolist()
+    return dc.replace(limits, velocity=velocity, acceleration=acceleration)

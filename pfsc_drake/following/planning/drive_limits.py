@@ -121,7 +121,7 @@ class DrivePlanner(MotionDemand):
         """Return a plan of the motion as it was asked for, or of a slower one."""
         try:
             step, course = self.course(_GLANCED)
-            if self.may_be_singular(self._motion, self._step(_GLANCED), course):
+            if self.may_be_singular(self.motion, self._step(_GLANCED), course):
                 step, course = self.course(_SLOWED)
             fits = self.fits(course, _AT_A_GLANCE)
             if not fits and self.fits(course, 1.0):
@@ -158,7 +158,7 @@ class DrivePlanner(MotionDemand):
         worst = float(share[i, axis])
         if worst <= 1.0 - reserve:
             return []
-        place = self.where(self._motion, i * step)
+        place = self.where(self.motion, i * step)
         said = (
             f"holding still takes {100.0 * worst:.0f} % of the torque of axis {axis + 1} at "
             f"{place}, reference.reserve = {reserve:g} leaves {100.0 * (1.0 - reserve):.0f} %"
@@ -175,7 +175,7 @@ class DrivePlanner(MotionDemand):
 
     def _beyond_limits(self, step: float, postures: np.ndarray, *, still: bool) -> list[str]:
         """Return which joint passes a limit on the way, if one does."""
-        motion = self._motion
+        motion = self.motion
         said = self.beyond_limits(motion, step, postures)
         if not said or not still or self._law.posture is None:
             return said
@@ -190,7 +190,7 @@ class DrivePlanner(MotionDemand):
         self, course: np.ndarray, demand: np.ndarray, step: float, fits: bool
     ) -> DrivePlan:
         """Return a plan of a course that the joints can go."""
-        times, ones, motion = step * np.arange(len(course)), np.ones(len(course)), self._motion
+        times, ones, motion = step * np.arange(len(course)), np.ones(len(course)), self.motion
         asked = DrivePlan(times, demand, demand, self.limits, ones, motion, [])
         if fits:
             return asked
@@ -204,7 +204,7 @@ class DrivePlanner(MotionDemand):
         """Return a plan of a motion of which nothing is known, with what is said besides."""
         nothing, empty = np.zeros((0, len(self.limits))), np.zeros(0)
         said = f"whether the drives can follow the reference is not known: {error}"
-        motion = self._motion
+        motion = self.motion
         return DrivePlan(empty, nothing, nothing, self.limits, empty, motion, [*besides, said])
 
     def course(
@@ -221,7 +221,7 @@ class DrivePlanner(MotionDemand):
             InputError: If the joints cannot follow.
         """
         still = longest > _CHECKED
-        return self.course_of(self._motion, self._step(longest), still=still, added=added)
+        return self.course_of(self.motion, self._step(longest), still=still, added=added)
 
     def _step(self, longest: float) -> float:
         """Return how far samples may be apart [s]: narrow bends need more of them."""
@@ -235,7 +235,7 @@ class DrivePlanner(MotionDemand):
             # it moves as fast as a sampled law lets it
             longest = min(longest, self._period)
         step = min(max(bend, min(_FINEST, longest)), ramp, longest)
-        return max(float(step), self._motion.domain[1] / _MOST)
+        return max(float(step), self.motion.domain[1] / _MOST)
 
     def fits(self, course: np.ndarray, share: float) -> bool:
         """Return whether a course asks for no more than a share of what it may."""
@@ -243,7 +243,7 @@ class DrivePlanner(MotionDemand):
 
     def slowed(self, asked: DrivePlan, course: np.ndarray, step: float) -> DrivePlan:
         """Return a plan that waits where the drives need it."""
-        reference, duration = self._reference, self._motion.domain[1]
+        reference, duration = self._reference, self.motion.domain[1]
         change = reference.acceleration / reference.largest_velocity
         allowed = self.allowed(course)
         excess = self._excess(asked, allowed)
@@ -252,7 +252,7 @@ class DrivePlanner(MotionDemand):
         except InputError as error:
             return replace(asked, said=[f"{excess}; and {error}"])
         clock = Clock(pace.rates[:, 0], step)
-        times, motion = clock.times, _retimed(self._motion, clock)
+        times, motion = clock.times, _retimed(self.motion, clock)
         demand = self.demand.of(with_pace(course, pace.rates))
         slow = pace.rates[:, 0]
         places = np.count_nonzero(np.diff((slow < _SLOW).astype(int), prepend=0) == 1)
@@ -297,7 +297,7 @@ class DrivePlanner(MotionDemand):
         return replace(asked, said=[self._excess(asked, allowed) + advice])
 
     def _rates(self, time: float) -> np.ndarray:
-        return self._motion.derivatives(np.array([time]), 1)[0, 1]
+        return self.motion.derivatives(np.array([time]), 1)[0, 1]
 
     def _excess(self, asked: DrivePlan, allowed: np.ndarray) -> str:
         """Return what is too much in a motion as it was asked for."""
@@ -305,7 +305,7 @@ class DrivePlanner(MotionDemand):
         i, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
         share = np.abs(asked.demand[i, column]) / asked.limits[column]
         kind = "torque" if column < len(self.limits) // 2 else "speed"
-        where = self.where(self._motion, asked.times[i])
+        where = self.where(self.motion, asked.times[i])
         return (
             f"as asked for it takes {100.0 * share:.0f} % of the {kind} of axis "
             f"{column % (len(self.limits) // 2) + 1} at {where}"

@@ -91,7 +91,7 @@ class FastestPlanner(MotionDemand):
     @once_per_content()
     def _plan(self, finer: int, tell: _Listener) -> DrivePlan:
         tell(0.0)
-        moves = self._first(straight_moves(self._motion, self.demand.derivatives + 1))
+        moves = self._first(straight_moves(self.motion, self.demand.derivatives + 1))
         tight = [np.ones((2, 2))] * len(moves)
         tell(0.05)
         moves = self._faster(moves, _COARSE, tight, 0.0)

@@ -79,7 +79,7 @@ class MotionDemand:
         self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
 
     @property
-    def _motion(self) -> PiecewisePolynomialCurve:
+    def motion(self) -> PiecewisePolynomialCurve:
         """Motion that is planned."""
         assert self._task.motion is not None  # else a hand guides the tool, or waypoints come
         return self._task.motion
