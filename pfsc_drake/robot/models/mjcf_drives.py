@@ -57,13 +57,20 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
         for compiler in root.all("compiler"):
             limits_by_range = compiler.attributes.get("autolimits", "true") != "false"
     places = {id(e): model for model in models for e in model.root.within()}
-    joints = {
-        attributes["name"]: (element, attributes)
+    every = [
+        joint
         for root in roots
         for body in root.all("worldbody")
-        for element, attributes in _joints(body, MAIN, classes)
-        if "name" in attributes
-    }
+        for joint in _joints(body, MAIN, classes)
+    ]
+    for element, given in every:
+        numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+        if "name" not in given and numbers.stiffness > 0.0:
+            raise InputError(
+                f"{places[id(element)].place(element)}: joint without a name: stiffness = "
+                f"{given['stiffness']}; allowed: 0, or a joint with a name"
+            )
+    joints = {given["name"]: (element, given) for element, given in every if "name" in given}
     drives: dict[str, MjcfDrive] = {}
     for name, (element, given) in joints.items():
         numbers = _Numbers(places[id(element)], element, given, limits_by_range)

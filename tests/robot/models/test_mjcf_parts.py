@@ -68,6 +68,7 @@ def read(file, options=None):
         ('euler="0.3 0.2 -0.4"', "radian", 'eulerseq="XYZ"'),
         ('xyaxes="1 0.2 0 0.3 1 0.4"', "radian", ""),
         ('zaxis="0.3 -1 0.2"', "radian", ""),
+        ('zaxis="0 0 -1"', "radian", ""),
     ],
 )
 def test_sites_and_masses_are_those_of_mujoco(tmp_path, site, angle, options):
@@ -93,6 +94,10 @@ def test_sites_and_masses_are_those_of_mujoco(tmp_path, site, angle, options):
     weight = plant.CalcGravityGeneralizedForces(context)
     np.testing.assert_allclose(-weight, data.qfrc_bias, atol=1e-6)
     assert np.abs(weight).max() > 0.1
+    # armature is inertia of the drives, which the plant's mass matrix has, too
+    inertia = np.zeros((2, 2))
+    mujoco.mj_fullM(model, data, inertia)
+    np.testing.assert_allclose(plant.CalcMassMatrix(context), inertia, rtol=1e-5)
 
 
 def test_stl_files_from_elsewhere_are_not_read(tmp_path):
@@ -111,7 +116,7 @@ ELASTIC = """<mujoco>
       <joint name="drive" axis="0 0 1" armature="0.4"/>
       <body name="link">
         <inertial mass="3" pos="0.2 0 0" diaginertia="0.02 0.05 0.05"/>
-        <joint name="spring" axis="0 0 1" stiffness="{stiffness}" damping="2" {ref}/>
+        <joint {name} axis="0 0 1" stiffness="{stiffness}" damping="2" {ref}/>
         <site name="tip" pos="0.4 0 0"/>
       </body>
     </body>
@@ -120,9 +125,9 @@ ELASTIC = """<mujoco>
 </mujoco>"""
 
 
-def elastic(folder, stiffness=700, ref="", driven="drive"):
+def elastic(folder, stiffness=700, ref="", driven="drive", name='name="spring"'):
     file = folder / "elastic.xml"
-    text = ELASTIC.format(stiffness=stiffness, ref=ref, driven=driven)
+    text = ELASTIC.format(stiffness=stiffness, ref=ref, driven=driven, name=name)
     file.write_text(text, encoding="utf-8")
     return file
 
@@ -153,6 +158,7 @@ def test_a_spring_behind_a_drive_is_an_elastic_joint(tmp_path):
     ("given", "said"),
     [
         ({"driven": "spring"}, "joint 'spring': stiffness = 700 beside an actuator; allowed: 0"),
+        ({"name": ""}, "joint without a name: stiffness = 700; allowed: 0, or a joint with a name"),
         ({"ref": 'springref="0.3"'}, "joint 'spring': springref = 0.3; allowed: that of ref"),
     ],
 )
