@@ -59,7 +59,7 @@ def through_the_wrist(six_axes):
     six_axes.path.shape = Line([0.7878, 0.0, 1.27], [0.7767, 0.0, 0.4608])
     turn = [Keyframe(0.0, [180.0, -45.0, 0.0]), Keyframe(1.0, [0.0, -5.0, -180.0])]
     six_axes.path.orientation = OrientationParameters(keyframes=turn)
-    six_axes.reference = ReferenceParameters([0.28, 0.5], 0.5, 3.0, 0.0)
+    six_axes.reference = ReferenceParameters([0.28, 0.5], velocity=0.5, acceleration=3.0, dwell=0.0)
     six_axes.start = StartParameters(posture_deg=[0, 105, -25, 0, 25, 0])
     return six_axes
 
