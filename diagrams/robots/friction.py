@@ -210,7 +210,7 @@ def _bristles(
     stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
     if given:
         presliding = _per_joint("friction.presliding", given, f_c.size)
-        return _of_presliding(options, f_c, f_v, drives, presliding)
+        return _of_presliding(options, f_c, f_v, drives, presliding, stiffest)
     step = drives.step or max(_step(options, drives), _SHORTEST_STEP)
     return replace(_bristles_of_step(step, stiffest, f_v, drives, 1.0), coulomb=f_c)
 
@@ -221,14 +221,22 @@ def _of_presliding(
     f_v: np.ndarray,
     drives: Drives,
     presliding: np.ndarray,
+    stiffest: np.ndarray,
 ) -> BristleFriction:
     """Return friction of given presliding displacements, critically damped while stuck.
+
+    Args:
+        options: What there is of it.
+        f_c: Coulomb friction, shape (N,) [Nm or N].
+        f_v: Viscous friction, shape (N,).
+        drives: The drives.
+        presliding: Displacements, shape (N,) [rad or m].
+        stiffest: Largest Coulomb friction of a drift, shape (N,) [Nm or N].
 
     Raises:
         InputError: If fixed steps are too long for it.
     """
-    step, drift = _step(options, drives), options.friction.drift
-    stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
+    step = _step(options, drives)
     least = _bristles_of_step(step, stiffest, f_v, drives, 1.0).presliding
     ratio = presliding / least
     i = int(np.argmin(ratio))

@@ -1,5 +1,6 @@
 """Default classes of an MJCF model, and what its elements inherit from them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -50,6 +51,25 @@ class DefaultClasses:
         """Return the attributes of an element with those of its class."""
         name = element.attributes.get("class", inherited)
         return self.known.get(name, {}).get(kind, {}) | element.attributes
+
+    def below(
+        self, body: Element, kind: str, inherited: str = MAIN
+    ) -> Iterator[tuple[Element, Element, Attributes]]:
+        """Yield the elements of a kind in a body and in those below it.
+
+        Args:
+            body: The body, or the world's.
+            kind: Tag of the elements.
+            inherited: Class of elements that name none, unless the body tells another one.
+
+        Yields:
+            Their body, the element, and its attributes with those of its class.
+        """
+        inherited = body.attributes.get("childclass", inherited)
+        for element in body.all(kind):
+            yield body, element, self.resolved(element, kind, inherited)
+        for child in body.all("body"):
+            yield from self.below(child, kind, inherited)
 
 
 def servo_attributes(element: Element) -> Attributes:

@@ -7,12 +7,10 @@ joint's side. The control bounds the force where there is no bias; of servos (``
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.mjcf_classes import (
-    MAIN,
     Attributes,
     DefaultClasses,
     servo_attributes,
@@ -57,26 +55,23 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
         for compiler in root.all("compiler"):
             limits_by_range = compiler.attributes.get("autolimits", "true") != "false"
     places = {id(e): model for model in models for e in model.root.within()}
-    every = [
-        joint
-        for root in roots
-        for body in root.all("worldbody")
-        for joint in _joints(body, MAIN, classes)
-    ]
-    for element, given in every:
-        numbers = _Numbers(places[id(element)], element, given, limits_by_range)
-        if "name" not in given and numbers.stiffness > 0.0:
-            raise InputError(
-                f"{places[id(element)].place(element)}: joint without a name: stiffness = "
-                f"{given['stiffness']}; allowed: 0, or a joint with a name"
-            )
-    joints = {given["name"]: (element, given) for element, given in every if "name" in given}
-    drives: dict[str, MjcfDrive] = {}
-    for name, (element, given) in joints.items():
-        numbers = _Numbers(places[id(element)], element, given, limits_by_range)
-        drives[name] = MjcfDrive(
+    joints: dict[str, _Numbers] = {}
+    for world in (world for root in roots for world in root.all("worldbody")):
+        for _, element, given in classes.below(world, "joint"):
+            numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+            if "name" in given:
+                joints[given["name"]] = numbers
+            elif numbers.stiffness > 0.0:
+                raise InputError(
+                    f"{numbers.model.place(element)}: joint without a name: stiffness = "
+                    f"{given['stiffness']}; allowed: 0, or a joint with a name"
+                )
+    drives = {
+        name: MjcfDrive(
             numbers.of("armature", 0.0), numbers.of("frictionloss", 0.0), numbers.stiffness
         )
+        for name, numbers in joints.items()
+    }
     driven: dict[str, list[tuple[float, str]]] = {}
     for root in roots:
         for element in (e for group in root.all("actuator") for e in group.children):
@@ -86,8 +81,7 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
                 numbers = _Numbers(places[id(element)], element, given, limits_by_range)
                 driven.setdefault(joint, []).append(_limit_of_actuator(numbers))
                 drives[joint].actuated = True
-    for name, (element, given) in joints.items():
-        numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+    for name, numbers in joints.items():
         limits = driven.get(name, [])
         total = sum(limit for limit, _ in limits) if limits else math.inf
         source = " + ".join(source for _, source in limits)
@@ -97,17 +91,6 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
         if total < math.inf:
             drives[name].effort_limit, drives[name].source = total, source
     return drives
-
-
-def _joints(
-    body: Element, inherited: str, classes: DefaultClasses
-) -> Iterator[tuple[Element, Attributes]]:
-    """Yield the joints below a body, with the attributes of their classes."""
-    inherited = body.attributes.get("childclass", inherited)
-    for element in body.all("joint"):
-        yield element, classes.resolved(element, "joint", inherited)
-    for child in body.all("body"):
-        yield from _joints(child, inherited, classes)
 
 
 @dataclass(frozen=True)

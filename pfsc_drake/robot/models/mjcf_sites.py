@@ -30,26 +30,12 @@ def add_sites(plant: MultibodyPlant, models: list[ModelXml]) -> None:
     for model in (model for model in models if model.root.name.startswith("mujoco")):
         angles = _Angles(model)
         for world in model.root.all("worldbody"):
-            _add_below(plant, world, "world", "main", classes, angles)
-
-
-def _add_below(
-    plant: MultibodyPlant,
-    body: Element,
-    name: str,
-    inherited: str,
-    classes: DefaultClasses,
-    angles: "_Angles",
-) -> None:
-    inherited = body.attributes.get("childclass", inherited)
-    for element in body.all("site"):
-        given = classes.resolved(element, "site", inherited)
-        site = given.get("name", "")
-        if site and not plant.HasFrameNamed(site) and plant.HasBodyNamed(name):
-            frame = plant.GetBodyByName(name).body_frame()
-            plant.AddFrame(FixedOffsetFrame(site, frame, angles.pose(element, given)))
-    for child in body.all("body"):
-        _add_below(plant, child, child.attributes.get("name", ""), inherited, classes, angles)
+            for body, element, given in classes.below(world, "site"):
+                name = "world" if body is world else body.attributes.get("name", "")
+                site = given.get("name", "")
+                if site and not plant.HasFrameNamed(site) and plant.HasBodyNamed(name):
+                    frame = plant.GetBodyByName(name).body_frame()
+                    plant.AddFrame(FixedOffsetFrame(site, frame, angles.pose(element, given)))
 
 
 class _Angles:
