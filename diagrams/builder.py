@@ -1,65 +1,57 @@
 """One builder of stations: a robot, a task and surroundings, each chosen independently."""
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path as FilePath
 
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from diagrams.controlled_robot import add_controlled_robot
 from diagrams.drawing.held_look import held_look
 from diagrams.drawing.mounting_look import mounting_look
 from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import build_delta_replay, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
-from diagrams.holder_station import add_holder, stop_both
+from diagrams.holder_station import Holder, add_holder
 from diagrams.robots.arm import Arm
-from diagrams.robots.belief import believed_robot
 from diagrams.robots.delta import DeltaPart
-from diagrams.robots.drives import add_drives
-from diagrams.robots.force_sensor import add_sensor
-from diagrams.robots.friction import add_friction, believed_friction
-from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
+from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.scenario.pair import check_carrier
+from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import add_log
+from diagrams.site import Site
 from diagrams.station import Station
-from diagrams.station_parts import (
-    add_afar,
+from diagrams.station_options import (
     add_robot,
+    check_obstacles,
     check_trajectory,
     choose_mounting,
     following_options,
     friction_options,
     make_spring,
-    make_task,
     make_workpiece,
-    naming_reference,
     outside,
-    servo_lag,
-    servo_options,
+    teleoperation_options,
 )
-from diagrams.station_start import find_rest, find_start
-from diagrams.station_warnings import controller_warnings
-from diagrams.surroundings.forces import add_surroundings
-from diagrams.surroundings.mounting_parts import add_payload
-from diagrams.surroundings.obstacles import add_obstacles, add_told_obstacles
-from diagrams.surroundings.operator import add_operator
-from diagrams.tasks.held_frame import law_manifold
-from diagrams.tasks.streaming import StreamTask
-from diagrams.tasks.waiting import Approach, plan_waiting
-from diagrams.turntable_station import add_turntable
+from diagrams.station_parts import PARTS
+from diagrams.station_start import find_start
+from diagrams.surroundings.forces import Surroundings
+from diagrams.surroundings.mounting_parts import payload_of
+from diagrams.tasks.task_drawing import drawing_of
+from diagrams.turntable_station import Turntable
 from diagrams.warnings.uncovered_links import uncovered_links
-from pfsc_drake.control.planning.course import CourseStart
-from pfsc_drake.following.assembly import ControllerAssembly
-from pfsc_drake.following.law import make_law
-from pfsc_drake.following.law_warnings import MODES
-from pfsc_drake.following.planning.drive_limits import keep_drive_limits
+from pfsc_drake.following.extension import Extension
+from pfsc_drake.following.options.follower import (
+    FollowerOptions,
+    ObstacleOptions,
+    OperatorOptions,
+)
+from pfsc_drake.following.sensed_force import SensedForce
+from pfsc_drake.following.tasks.task import Task
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.physics.joint_sensors import EncoderOptions
-from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
 
 
@@ -78,16 +70,16 @@ def build_station(
     Args:
         scenario: The scenario.
         folder: Where the scenario's relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
-        like: The same but for what is believed and how it is integrated, if it has been built: its
+        progress: Receives the fraction done and the name of the step, where that takes its time.
+        like: The same but for the nominal model and the integration, if it has been built: its
             task and its start are taken.
         with_slope: Whether a workpiece that is pressed on is a spring, with the stiffness that
             contact has there, and the plant continuous.
-        parametric: Whether mass and stiffness parameters of the believed robot, a serial chain,
+        parametric: Whether mass and stiffness parameters of the nominal model, a serial chain,
             are symbols: such a station is not simulated, but its blocks' networks differentiated.
-        remote: Whether the robot stands elsewhere: the station has a
-            :class:`~diagrams.robots.remote_arm.RemoteArm` for it, and the scenario must tell
-            nothing of its surroundings, see :func:`~diagrams.scenario.schema.driven`.
+        remote: Whether the robot is in another process: the station has a
+            :class:`~diagrams.robots.remote_arm.RemoteArm` for it, and the scenario must not have
+            surroundings, see :func:`~diagrams.scenario.schema.driven`.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -108,204 +100,92 @@ def build_station(
     if parametric:
         assert isinstance(part, Arm)
         part = replace(part, belief=part.belief.with_symbols())
-    task.require_joints(part.robot.dimension)
-    believed = part.belief.robot
-    holder = held = carrier = turntable = None
-    if scenario.holder is not None:
-        order, built = task.manifold.layout.order, None if like is None else like.holder
-        holder, carrier = add_holder(builder, scenario, order, folder, progress, built)
-        held = holder.frame
-    elif scenario.turntable is not None:
-        period, order = scenario.controller.sampling_time, task.manifold.layout.order
-        turntable = add_turntable(builder, scenario.turntable, order, period)
-        held = turntable.frame
-    begin = cache(
-        lambda: (
-            find_start(scenario.start, task, part, workpiece, mounting, held)
-            if like is None
-            else (like.start, like.initial_state)
-        )
-    )
-    rest = cache(lambda: find_rest(task, part, *begin(), held))
-    law = make_law(scenario.controller, believed, law_manifold(task, held), rest, scenario.faults)
-    start, initial_state = begin()
-    rubbing = friction_options(scenario, folder)
-    friction = believed_friction(part, scenario.controller.friction.believed, rubbing)
-    link_state = part.coordinates.link_rows @ initial_state
-    start_posture = link_state[: part.robot.dimension]
-    options = following_options(scenario)
-    crossing = scenario.obstacles
-    begun = CourseStart(rest().q_J, start.place)
-    asked, chosen, lasts = scenario.reference, scenario.controller, scenario.duration
-    plans = [each.plan for each in (holder, turntable) if each is not None]
-    carrier_plan = plans[0] if plans else None
-    keep_drive_limits(asked, chosen, lasts, task, law, begun, friction, progress, carrier_plan)
-    waiting = None if like is None else like.waiting
-    if like is None and crossing is not None:
-        given, allowed = scenario.compliance.is_given, "left out where progress waits"
-        require(not given, "compliance", "given", allowed)
-        approach = Approach(start_posture, scenario.start.transition)
-        waiting = plan_waiting(crossing, asked, chosen, task, law, begun, friction, approach)
-
-    true_state = part.joint_state(builder)
-    period, failures = scenario.controller.sampling_time, scenario.simulation
-    measured = add_joint_state(
-        builder,
-        true_state,
-        part.robot,
-        EncoderOptions() if remote else scenario.encoders,
-        failures.sensor_failure,
-        period,
-        scenario.encoder_period,
-    )
-    links = add_link_state(
-        builder,
-        part,
-        scenario.controller,
-        scenario.encoders,
-        measured,
-        true_state,
-        start_posture,
-        friction,
-    )
-    joint_state = links.joint_state
-    override = part.override.get_output_port() if isinstance(part, RemoteArm) else None
-    obstacles = {}
-    if crossing is not None:
-        told = add_told_obstacles if remote else add_obstacles
-        obstacles = told(builder, crossing, period)
-    tuning = None if scenario.operator is None else scenario.operator.tuning
-    known = believed_robot(believed, scenario.encoders, period, friction)
-    assembly = ControllerAssembly(
-        builder, task, law, known, options, start_posture, waiting, tuning
-    )
+    check_joints(scenario, task, part.robot.dimension)
+    carrier = _add_carrier(builder, scenario, task, folder, progress, like)
+    frame = None if carrier is None else carrier.frame
+    start = find_start(scenario.start, task, part, workpiece, mounting, frame)
+    if like is not None:
+        start = like.controlled.begun
     check_trajectory(scenario)
-    with naming_reference():
-        assembly.add_place(joint_state, None if held is None else held.motion)
-    stream, pen = assembly.stream, None
-    if isinstance(task, StreamTask) and stream is not None:
-        pen = task.add_source(builder, stream, period)
-    if override is not None:
-        assembly.connect("override", override)
-    if "obstacles_measured" in obstacles:
-        assembly.connect("obstacles", obstacles["obstacles_measured"])
-    # what acts on the tool acts where the tool is, also if a law follows another point
-    beside = assembly.projector.GetOutputPort("manifold_point")
-    around = assembly.signals | {"joint_state": true_state}
-    if held is None:
-        around["manifold_point"] = beside
-    operator = None
-    if scenario.operator is not None:
-        operator = add_operator(
-            builder, scenario.operator, scenario.switched_regions, period, folder
-        )
-    afar = add_afar(builder, scenario, operator, task, start, paced=not remote)
-    at_tool = operator if afar is None else None
-    forces = add_surroundings(
+    check_obstacles(scenario, task, part)
+    placed = part, task, task.manifold, outside(scenario), start[0]
+    at_tool = scenario.operator is not None and scenario.teleoperation is None
+    around = Surroundings(*placed, at_tool, mounting, spring)
+    robot = add_controlled_robot(
         builder,
+        scenario,
         part,
         task,
-        outside(scenario),
-        around,
         start,
-        at_tool,
-        mounting,
-        spring,
-        law_manifold(task, held),
-        None if holder is None else holder.reaction,
+        _options(scenario, part, around, carrier),
+        friction_options(scenario, folder),
+        duration=scenario.duration,
+        progress=progress,
+        like=None if like is None else like.controlled,
     )
-    if scenario.needs_sensor:
-        states = {"joint_state": joint_state, "true_joint_state": true_state}
-        failure = failures.force_sensor_failure
-        forces |= add_sensor(builder, part, scenario.sensor, failure, period, states | forces)
-        if mounting is not None:
-            forces |= add_payload(
-                builder, mounting, part.gravity, period, assembly.signals | forces
-            )
-        if holder is not None and holder.reaction is not None:
-            holder.reaction.tell(builder, forces["wrench_measured"], assembly.world_pose)
-    led = {} if operator is None else operator.requests
-    if afar is not None:
-        led = led | {"wrench_led": afar.lead(builder, forces)}
-    controller, made = assembly.add_law(forces | led)
-    signals = assembly.signals | obstacles | forces | made | links.signals
-    if afar is not None:
-        signals |= afar.connect(builder, task, believed, servo_lag(scenario), signals)
-    if isinstance(task, StreamTask) and stream is not None:
-        signals["true_place"] = task.add_true_place(builder, part.robot, true_state, stream, period)
-    drive = {"drive": controller.GetOutputPort(controller.drive_port)}
-    if links.drive_torque is not None:
-        builder.Connect(drive["drive"], links.drive_torque)
-    if isinstance(part, RemoteArm):
-        builder.Connect(
-            part.stop_request.get_output_port(), controller.GetInputPort("stop_request")
-        )
-    servo = None
-    if not remote:
-        further, servo = add_drives(
-            builder,
-            part,
-            servo_options(scenario),
-            scenario.driver,
-            period,
-            signals | drive,
-            initial_state,
-        )
-        signals |= further
-    stops = [] if remote else [signals["stop_category"]]
-    stops += [signals["servo_stop_category"]] if "servo_stop_category" in signals else []
-    signals |= add_friction(builder, part, true_state, rubbing, stops)
-    logged = joint_state if remote else true_state
-    signals |= states_to_log(logged, assembly.signals["joint_state"])
-    if holder is not None and carrier is not None:
-        stop_both(builder, controller, carrier)
-        signals |= holder.signals
-    if turntable is not None:
-        signals |= turntable.signals
-    discrete = part.drives.step is not None
-    log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
-    access = ControllerAccess(controller)
-    source = measured.get_system().get_name(), measured.get_name()
+    around = replace(around, manifold=robot.controller.law.linearization.manifold)
+    site = Site(builder, scenario, folder, robot, around, remote=remote, carrier=carrier)
+    for add_part in PARTS:
+        add_part(site)
+    site.connect()
+    log = add_log(builder, site.logged, site.period, discrete_plant=part.drives.step is not None)
     if scenario.simulation.fused:
         fuse_blocks(builder)
-    planned = [] if task.drive_plan is None else task.drive_plan.said
-
-    def warn() -> list[str]:
-        return (
-            task.warnings
-            + scenario.model_error.warnings
-            + planned
-            + part.start_warnings(scenario.start, start_posture, start.target)
-            + controller_warnings(scenario, task, part, law, link_state, rest())
-            + ([] if holder is None else holder.warn())
-        )
-
     diagram = builder.Build()
     diagram.set_name(scenario.name or "station")
-    return Station(
-        diagram,
-        part,
-        task,
-        law,
-        assembly.projector.get_name(),
-        access,
-        servo,
-        log,
-        initial_state,
-        start,
-        assembly.on_motors,
-        source,
-        warn,
-        workpiece,
-        operator,
-        MODES if "mode" in signals else (),
-        mounting,
-        0 if remote else scenario.driver.ticks(period),
-        holder,
-        pen,
-        waiting,
-        None if afar is None else afar.link,
-        turntable,
+    return Station(diagram, site, log, workpiece)
+
+
+def _add_carrier(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    task: Task,
+    folder: FilePath,
+    progress: Progress | None,
+    like: Station | None,
+) -> Holder | Turntable | None:
+    """Add the robot or the turntable that carries the workpiece, if one does."""
+    if scenario.holder is not None:
+        order, built = task.manifold.layout.order, None if like is None else like.holder
+        return add_holder(builder, scenario, order, folder, progress, built)
+    if scenario.turntable is not None:
+        scenario.turntable.check()
+        return Turntable(scenario.turntable)
+    return None
+
+
+def _options(
+    scenario: Scenario,
+    part: RobotPart,
+    around: Surroundings,
+    carrier: Holder | Turntable | None,
+) -> FollowerOptions:
+    """Return the options of the robot's controller."""
+    remote, extensions = isinstance(part, RemoteArm), list[Extension]()
+    if scenario.needs_sensor:
+        load, sensor = part.believed_load(scenario.sensor.joint), scenario.sensor
+        extensions.append(SensedForce(load, sensor.measurement_range, sensor))
+        if around.mounting is not None:
+            extensions.append(payload_of(around.mounting, part.gravity))
+    extensions += teleoperation_options(scenario, around.task)
+    if isinstance(carrier, Turntable):
+        extensions.append(carrier.known_motion)
+    crossing, operator = scenario.obstacles, scenario.operator
+    obstacles = None
+    if crossing is not None:
+        shapes = [obstacle.shape for obstacle in crossing.moving]
+        obstacles = ObstacleOptions(shapes, crossing.watch, crossing.elbow)
+    switches = len(scenario.switched_regions)
+    return replace(
+        following_options(scenario),
+        override=remote and around.task.is_planned,
+        stop_request=remote or isinstance(carrier, Holder),
+        obstacles=obstacles,
+        operator=OperatorOptions(operator.tuning, switches) if operator else None,
+        known_forces=around.signals,
+        frame=None if carrier is None else carrier.frame,
+        frame_motion=None if carrier is None else lambda: carrier.planned,
+        extensions=extensions,
     )
 
 
@@ -346,7 +226,7 @@ def build_station_replay(
         motion: What to draw.
         meshcat: Where to draw.
     """
-    period, drawn = settings.simulation.frame_period, station.task.drawing
+    period, drawn = settings.simulation.frame_period, drawing_of(station.task)
     look = None
     if station.workpiece is not None:
         look = station.workpiece.look(station.part.gravity)

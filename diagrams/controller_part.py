@@ -1,4 +1,4 @@
-"""The controller of a station, from what is measured to what drives are told, as a network."""
+"""The controllers of a station as one network, from what is measured to the drives."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,34 +9,24 @@ from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, S
 from diagrams.holder_station import HOLDER
 from diagrams.station import Station
 from pfsc_drake.blocks.network import Network, Wiring
-from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.link_state import DEVIATION
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import network_of
 
-_CONTROLLER = "following_controller"
-# where blocks live that control, and those that only lead vectors from one to another
-_CONTROL = ("pfsc_drake.control.", "pfsc_drake.blocks.")
-# where systems live that a controller only measures
-_PHYSICS = (
-    "pfsc_drake.physics.",
-    "pfsc_drake.systems.physics.",
-    "pfsc_drake.systems.plants.",
-    "pydrake.multibody.",
-)
-_TOLD = ("manifold_state", "status", "fault")
+# outputs of the controller in C, beside the commands to the drives; and of a robot that holds the
+# workpiece
+_OUTPUTS, _OF_HOLDER = ("manifold_state", "status", "fault", "reference"), ("fault",)
 
 
 @dataclass(frozen=True)
 class ControllerPart:
-    """The controller of a station.
+    """The controllers of a station.
 
     Attributes:
-        network: What it does; ``joint_state`` is as measured, other inputs are called as the ports
-            that they come from.
+        network: Their network; inputs and outputs are named as the controllers' ports, those of a
+            robot that holds the workpiece with the prefix ``holder_``.
         period: Sampling time [s].
-        inputs: Ports of the station's systems that the network's inputs come from, by name.
+        inputs: Ports of the station's controllers with the network's inputs, by name.
         outputs: The same of its outputs: ``drive_torque`` or ``velocity_reference``,
             ``manifold_state``, ``status``, ``fault``, ``reference``; where another robot holds
             the workpiece ``holder_drive_torque`` and ``holder_fault``; then standard deviations,
@@ -45,7 +35,7 @@ class ControllerPart:
 
     network: Network
     period: float
-    inputs: Mapping[str, OutputPort]
+    inputs: Mapping[str, InputPort]
     outputs: Mapping[str, OutputPort]
 
     def presets(self, station: Station, root: Context) -> dict[str, np.ndarray]:
@@ -60,135 +50,53 @@ class ControllerPart:
 
 
 def controller_part(station: Station) -> ControllerPart:
-    """Return the controller of a station: all blocks between what is measured and the drives.
+    """Return the controllers of a station.
 
     Args:
         station: The station, its blocks not fused.
 
     Raises:
-        InputError: If something that controls is no block.
+        InputError: If a part of a controller is no block.
     """
-    return _Search(station).part()
-
-
-class _Search:
-    """Goes upstream from the drives to what is measured."""
-
-    def __init__(self, station: Station) -> None:
-        self._station = station
-        self._sources: dict[tuple[System, int], OutputPort] = {
-            (system, int(i)): source.get_output_port(o)
-            for (system, i), (source, o) in station.diagram.connection_map().items()
-        }
-        self._inputs: dict[str, OutputPort] = dict(station.part.told)
-        if not self._inputs:
-            name, port = station.measured
-            measured = station.diagram.GetSubsystemByName(name).GetOutputPort(port)
-            self._inputs["joint_state"] = measured
-        if station.holder is not None:
-            name, port = station.holder.measured
-            measured = station.diagram.GetSubsystemByName(name).GetOutputPort(port)
-            self._inputs[f"{HOLDER}joint_state"] = measured
-        self._wiring = Wiring()
-
-    def part(self) -> ControllerPart:
-        controller = self._station.diagram.GetSubsystemByName(_CONTROLLER)
-        self._add(controller)
-        access = self._station.controller
-        outputs = {
-            name: controller.GetOutputPort(name)
-            for name in (access.drive_port, *_TOLD)
-            if controller.HasOutputPort(name)
-        }
-        reference = self._source(controller.GetInputPort("reference"))
-        assert reference is not None  # every law has one
-        outputs["reference"] = reference
-        if self._station.holder is not None:
-            carrier = self._station.diagram.GetSubsystemByName(f"{HOLDER}{_CONTROLLER}")
-            self._add(carrier)
-            for name in (self._station.holder.controller.drive_port, "fault"):
-                outputs[f"{HOLDER}{name}"] = carrier.GetOutputPort(name)
-        if self._station.diagram.HasSubsystemNamed(DEVIATION):
-            deviation = self._station.diagram.GetSubsystemByName(DEVIATION)
-            self._add(deviation)
-            ports = [deviation.get_output_port(i) for i in range(deviation.num_output_ports())]
-            outputs |= {port.get_name(): port for port in ports}
-        for name, port in outputs.items():
-            self._wiring.outputs[name] = _names(port)
-        network = self._wiring.network()
-        inputs = {name: self._inputs[name] for name in network.inputs}
-        return ControllerPart(network, access.period, inputs, outputs)
-
-    def _add(self, system: System) -> None:
-        """Add a system of blocks, and what it is fed from."""
-        if system.get_name() in self._wiring.networks:
-            return
-        ports = [system.get_input_port(i) for i in range(system.num_input_ports())]
-        fed = {port.get_name(): self._source(port) for port in ports}
-        left = [name for name, source in fed.items() if source is None]
-        self._wiring.networks[system.get_name()] = network_of(system, left)
-        for name, source in fed.items():
-            if source is not None:
-                self._wiring.connections[system.get_name(), name] = self._origin(source)
-
-    def _origin(self, source: OutputPort) -> tuple[str, str] | str:
-        """Return an output of a block, which is added, or the input at the border that it is."""
-        for name, port in self._inputs.items():
-            if _names(port) == _names(source):
-                return name
+    systems: list[System] = list(station.controllers)
+    own, *others = station.controllers
+    wiring, inputs, outputs = Wiring(), dict[str, InputPort](), dict[str, OutputPort]()
+    names = [own.drive_port, *_OUTPUTS, *own.deviations]
+    chosen = {name: (own, name) for name in names}
+    for holder in others:
+        systems.append(station.diagram.GetSubsystemByName(f"{HOLDER}stop"))
+        chosen |= {f"{HOLDER}{name}": (holder, name) for name in (holder.drive_port, *_OF_HOLDER)}
+    for system in systems:
+        _refuse_others(system)
+        wiring.networks[system.get_name()] = network_of(system)
+    sources = {
+        (target.get_name(), target.get_input_port(i).get_name()): source.get_output_port(o)
+        for (target, i), (source, o) in station.diagram.connection_map().items()
+        if target in systems
+    }
+    for (name, port), source in sources.items():
         system = source.get_system()
-        if not self._is_measured(system):
-            if not _controls(system):
-                raise InputError(
-                    f"export: {system.get_name()} is no block, but {type(system).__name__}; a "
-                    "controller in C consists of blocks"
-                )
-            self._add(system)
-            return _names(source)
-        name = self._measured_name(source)
-        if name in self._inputs:
-            name = f"{system.get_name()}_{name}"
-        self._inputs[name] = source
-        return name
-
-    def _is_measured(self, system: System) -> bool:
-        """Return whether a system is physics, or only leads from there."""
-        if isinstance(system, Diagram) and not _controls(system):
-            return all(self._is_measured(part) for part in system.GetSystems())
-        module = _module(system)
-        if module.startswith(_PHYSICS):
-            return True
-        if not module.startswith(("pydrake.systems.", "pfsc_drake.blocks.wiring_blocks")):
-            return False
-        ports = [system.get_input_port(i) for i in range(system.num_input_ports())]
-        sources = [source for port in ports if (source := self._source(port)) is not None]
-        return bool(sources) and all(self._is_measured(s.get_system()) for s in sources)
-
-    def _measured_name(self, source: OutputPort) -> str:
-        """Return what is measured there, also if it comes some ticks later."""
-        system = source.get_system()
-        while isinstance(system, BlockSystem) and isinstance(system.block, Hold):
-            earlier = self._source(system.get_input_port())
-            assert earlier is not None  # something is delayed
-            source, system = earlier, earlier.get_system()
-        return source.get_name()
-
-    def _source(self, port: InputPort) -> OutputPort | None:
-        return self._sources.get((port.get_system(), int(port.get_index())))
+        if system in systems:
+            wiring.connections[name, port] = system.get_name(), source.get_name()
+            continue
+        key = f"{HOLDER if name.startswith(HOLDER) else ''}{port}"
+        wiring.connections[name, port] = key
+        inputs[key] = station.diagram.GetSubsystemByName(name).GetInputPort(port)
+    for key, (controller, name) in chosen.items():
+        wiring.outputs[key] = controller.get_name(), name
+        outputs[key] = controller.GetOutputPort(name)
+    network = wiring.network().restricted(list(chosen))
+    return ControllerPart(network, own.period, {n: inputs[n] for n in network.inputs}, outputs)
 
 
-def _controls(system: System) -> bool:
-    """Return whether a system is a block that controls, or a diagram of such blocks."""
-    if isinstance(system, Diagram):
-        return all(_controls(part) for part in system.GetSystems())
-    return isinstance(system, BlockSystem) and _module(system).startswith(_CONTROL)
-
-
-def _module(system: System) -> str:
-    """Return where a system's class, or that of its block, is at home."""
-    block = system.block if isinstance(system, BlockSystem) else None
-    return type(system if block is None else block).__module__
-
-
-def _names(port: OutputPort) -> tuple[str, str]:
-    return port.get_system().get_name(), port.get_name()
+def _refuse_others(system: System) -> None:
+    """Refuse systems that are no blocks in a controller."""
+    if isinstance(system, BlockSystem):
+        return
+    if not isinstance(system, Diagram):
+        raise InputError(
+            f"export: {system.get_name()} is no block, but {type(system).__name__}; a "
+            "controller in C consists of blocks"
+        )
+    for part in system.GetSystems():
+        _refuse_others(part)

@@ -1,65 +1,45 @@
-"""The robot of a station that holds the workpiece, with its controller, and what it tells."""
+"""The robot of a station that holds the workpiece, with its controller."""
 
 import dataclasses as dc
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 from pathlib import Path as FilePath
+from typing import cast
 
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from diagrams.fault_instant import first_instant
+from diagrams.controlled_robot import ControlledRobot, add_controlled_robot
 from diagrams.named_builder import PrefixingBuilder
-from diagrams.oscillation import oscillation_before
 from diagrams.robots.arm import Arm, add_arm
-from diagrams.robots.belief import believed_robot
 from diagrams.robots.drives import add_drives
-from diagrams.robots.friction import add_friction, believed_friction
+from diagrams.robots.friction import add_friction
 from diagrams.robots.held_workpiece import holding
-from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
 from diagrams.robots.model import is_delta
 from diagrams.scenario import DriverParameters, HolderParameters, Scenario
 from diagrams.scenario.checks import require
 from diagrams.scenario.pair import holder_scenario
+from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import SignalLog
-from diagrams.station_parts import (
-    belief_source,
-    following_options,
-    friction_options,
-    make_task,
-    naming_reference,
-)
-from diagrams.station_start import find_rest, find_start
-from diagrams.station_warnings import controller_warnings
-from diagrams.surroundings.held_reaction import HeldReaction, add_held_reaction
-from diagrams.tasks.held_frame import HeldFrame
-from diagrams.tasks.planned_frame import planned_frame
-from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.blocks.wiring_blocks import Hold
-from pfsc_drake.control.law.fault import Fault
+from diagrams.station_options import belief_source, following_options, friction_options
+from diagrams.station_start import find_start
+from diagrams.surroundings.held_reaction import add_held_reaction
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
-from pfsc_drake.control.law.timed_reference import TimedReference
-from pfsc_drake.control.manifolds.carried import DifferencedFrame, FlangeFrame, PlannedFrame
-from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
-from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.assembly import ControllerAssembly
-from pfsc_drake.following.fault_description import FaultScene, FoundFault, describe
-from pfsc_drake.following.law import make_law
-from pfsc_drake.following.planning.drive_limits import keep_drive_limits
-from pfsc_drake.following.planning.motion_demand import MotionDemand
+from pfsc_drake.following.carrier import CarriedFrame, Derivatives, MeasuredReaction
+from pfsc_drake.following.fault_description import FoundFault
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.following_controller import ControllerAccess, FollowingController
 from pfsc_drake.systems.fuse import BlockAccess
 
-# before the names of all systems and signals of the robot that holds the workpiece
+# beginning of the names of all systems and signals of the robot that holds the workpiece
 HOLDER = "holder_"
+_WHO = "the robot that holds the workpiece"
 
 
 @dataclass
@@ -67,70 +47,51 @@ class Holder:
     """A robot that holds the workpiece.
 
     Attributes:
+        robot: The robot, whose tool frame is the workpiece's, with its controller.
         parameters: What the scenario says of it.
-        part: The robot, whose tool frame is the workpiece's.
-        task: What it does with the workpiece.
-        law: Its law.
-        controller: Its controller.
-        initial_state: State of its model at the start.
-        start: Where the workpiece is at the start.
-        on_motors: Whether its law acts on the pose of the motors.
-        frame: The workpiece's frame, and its motion as the other controller knows it.
-        plan: Returns its motion as it is planned, see :func:`planned_frame`.
-        signals: What to log, by names with the prefix.
-        warn: Tells what there is to say, one sentence each.
-        projector: Name of what finds the workpiece's place on its path.
-        measured: System and port that the measured joint state comes from, by name.
-        reaction: What it bears of the process on the workpiece, if there is one.
+        signals: Signals for the log, by names with the prefix.
+        reaction: Reaction of the process on the workpiece, its inputs open, if there is one.
     """
 
+    robot: ControlledRobot
     parameters: HolderParameters
-    part: Arm
-    task: Task
-    law: FollowingLaw
-    controller: ControllerAccess
-    initial_state: np.ndarray
-    start: StartPoint
-    on_motors: bool
-    frame: HeldFrame
-    plan: Callable[[], PiecewisePolynomialCurve]
     signals: dict[str, OutputPort]
-    warn: Callable[[], list[str]]
-    projector: str
-    measured: tuple[str, str]
-    reaction: HeldReaction | None = None
+    reaction: BlockSystem | None = None
 
-    def set_start(self, blocks: BlockAccess, root: Context) -> None:
-        """Put the robot at its start.
+    @property
+    def part(self) -> Arm:
+        """The robot alone."""
+        return cast(Arm, self.robot.part)
 
-        Args:
-            blocks: Blocks of the diagram.
-            root: Context of the diagram.
-        """
-        self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), self.initial_state)
-        blocks.set_state(root, f"{self.projector}.place", self.start.place)
+    @property
+    def law(self) -> FollowingLaw:
+        """Law of its controller."""
+        return self.robot.controller.law
+
+    @cached_property
+    def frame(self) -> np.ndarray:
+        """Pose of the workpiece at the start, ``[p_WC, R_WC by rows]``, shape (12,)."""
+        return np.array(pose_function(self.part.robot)(self.robot.start_posture)).ravel()
+
+    @cached_property
+    def planned(self) -> PiecewisePolynomialCurve:
+        """Planned motion of the workpiece over time."""
+        return self.robot.controller.planned_frame(_placement(self.parameters))
 
     def found_fault(self, log: SignalLog, blocks: BlockAccess, root: Context) -> FoundFault | None:
-        """Return why the robot's controller is in its safe state, if it is.
+        """Return the cause of a stop by the controller, if there is one.
 
         Args:
             log: Log of the station.
             blocks: Blocks of the diagram.
             root: Context of the diagram.
         """
-        fault = self.controller.fault(blocks, root)
-        if fault is Fault.NONE:
-            return None
-        suspects = self.controller.suspects(blocks, root)
-        own, column = log.of(HOLDER), self.law.layout.status.start
-        now, before = first_instant(own, blocks, root, "law", column)
-        place, robot = self.task.place, self.part.belief.robot
-        oscillating = oscillation_before(now.time, own, root, self.law)
-        scene = FaultScene(
-            self.law, robot, place, self.on_motors, now, before, suspects, oscillating
-        )
-        sentence = f"the robot that holds the workpiece: {describe(fault, scene)}"
-        return FoundFault(sentence, now.time)
+        found = self.robot.found_fault(log.of(HOLDER), blocks, root)
+        return found and FoundFault(f"{_WHO}: {found.sentence}", found.time)
+
+    def warnings(self) -> list[str]:
+        """Return doubts about the robot and its controller, one sentence each."""
+        return [f"{_WHO}: {line}" for line in self.robot.warnings()]
 
 
 def add_holder(
@@ -140,7 +101,7 @@ def add_holder(
     folder: FilePath,
     progress: Progress | None = None,
     like: Holder | None = None,
-) -> tuple[Holder, FollowingController]:
+) -> Holder:
     """Add the robot that holds the workpiece of a scenario, with its controller.
 
     All of its systems have names that begin with ``holder_``.
@@ -148,13 +109,10 @@ def add_holder(
     Args:
         builder: Builder of the diagram.
         scenario: The scenario, with a holder.
-        order: Relative degree of the other robot's law, for which the workpiece's motion is told.
+        order: Relative degree of the other robot's law, for which the motion is needed.
         folder: Where relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
-        like: The same but for how it is integrated, if it has been built.
-
-    Returns:
-        The robot, and its controller in the diagram.
+        progress: Receives the fraction done and the name of the step.
+        like: The same but for the integration, if it has been built.
 
     Raises:
         InputError: If it cannot be built, or does not suit the other robot.
@@ -163,109 +121,45 @@ def add_holder(
     assert holder is not None
     model = scenario.robot.model
     require(not is_delta(model), "robot.model", model, "a serial arm where there is a holder")
-    named, period = PrefixingBuilder(builder, HOLDER), scenario.controller.sampling_time
+    named, before = PrefixingBuilder(builder, HOLDER), None if like is None else like.robot
+    period, reacts = scenario.controller.sampling_time, bool(scenario.forces)
     with naming_holder():
         _check(holder, period, order)
-        task = make_task(own, folder, progress) if like is None else like.task
+        task = make_task(own, folder, progress) if before is None else before.task
         part = add_arm(named, holding(belief_source(own, folder), holder.workpiece))
-        task.require_joints(part.robot.dimension)
-        start, state = (
-            find_start(own.start, task, part) if like is None else (like.start, like.initial_state)
+        check_joints(own, task, part.robot.dimension)
+        start = find_start(own.start, task, part) if before is None else before.begun
+        senses = reacts and own.controller.external_torque.source == "measured"
+        derivatives = cast(Derivatives, holder.derivatives)
+        frame = CarriedFrame(order, derivatives, holder.highest, _placement(holder))
+        options = dc.replace(
+            following_options(own),
+            carries=True,
+            stop_request=True,
+            known_forces=("wrench_ext",) if reacts else (),
+            extensions=[MeasuredReaction(), frame] if senses else [frame],
         )
-        rest = cache(lambda: find_rest(task, part, start, state))
-        believed = part.belief.robot
-        law = make_law(own.controller, believed, task.manifold, rest, own.faults)
         rubbing = friction_options(own, folder)
-        friction = believed_friction(part, own.controller.friction.believed, rubbing)
-        q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
-        begun = CourseStart(rest().q_J, start.place)
-        asked, chosen = own.reference, own.controller
-        keep_drive_limits(asked, chosen, scenario.duration, task, law, begun, friction)
-        demand = MotionDemand(asked, chosen, task, law, begun, friction)
-        plan = cache(lambda: planned_frame(demand, task.motion, _placement(holder)))
-        true_state = part.joint_state(named)
-        failure = own.simulation.sensor_failure
-        measured = add_joint_state(
-            named, true_state, part.robot, own.encoders, failure, period, period
-        )
-        links = add_link_state(
-            named, part, own.controller, own.encoders, measured, true_state, q_J, friction
-        )
-        known = believed_robot(believed, own.encoders, period, friction)
-        assembly = ControllerAssembly(
-            named, task, law, known, following_options(own), q_J, carries=True
-        )
-        with naming_reference():
-            assembly.add_place(links.joint_state)
-        reaction, told = None, own.controller.external_torque.source
-        if scenario.forces:
-            seen = assembly.signals["tool_pose"] if told == "measured" else None
-            reaction = add_held_reaction(named, part, true_state, seen, period)
-        forces = {} if reaction is None else reaction.forces
-        controller, made = assembly.add_law(forces)
-    drive = controller.GetOutputPort(controller.drive_port)
-    if links.drive_torque is not None:
-        builder.Connect(drive, links.drive_torque)
-    ports = assembly.signals | {"drive": drive}
-    add_drives(named, part, None, DriverParameters(), period, ports, state)
-    rubs = add_friction(named, part, true_state, rubbing, [made["stop_category"]])
-    motion = _add_motion(named, holder, law, order, controller, plan)
-    pose = np.array(pose_function(part.robot)(q_J)).ravel()
-    logged = assembly.signals | made | rubs | forces | {"frame_jet": motion}
-    logged |= states_to_log(true_state, assembly.signals["joint_state"])
-    source = measured.get_system().get_name(), measured.get_name()
-    planned = [] if task.drive_plan is None else task.drive_plan.said
-    link_state = part.coordinates.link_rows @ state
-
-    def warn() -> list[str]:
-        said = task.warnings + own.model_error.warnings + planned
-        said += part.start_warnings(own.start, q_J, start.target)
-        said += controller_warnings(_alone(own), task, part, law, link_state, rest())
-        return [f"the robot that holds the workpiece: {line}" for line in said]
-
-    made_holder = Holder(
-        holder,
-        part,
-        task,
-        law,
-        ControllerAccess(controller),
-        state,
-        start,
-        assembly.on_motors,
-        HeldFrame(pose, order, motion),
-        plan,
-        {f"{HOLDER}{name}": port for name, port in logged.items()},
-        warn,
-        assembly.projector.get_name(),
-        source,
-        reaction,
-    )
-    return made_holder, controller
-
-
-def stop_both(
-    builder: DiagramBuilder, first: FollowingController, second: FollowingController
-) -> None:
-    """Let a fault of one of two controllers stop the other's robot as well.
-
-    The second one's stops the first at the same tick. The first one's stops the second at the next
-    tick, since both at once would ask each other.
-
-    Args:
-        builder: Builder of the diagram.
-        first: The controller that acts on what the second one tells.
-        second: The other.
-    """
-    period = first.period
-    hold = builder.AddNamedSystem(f"{HOLDER}stop", BlockSystem(Hold(1), period))
-    builder.Connect(second.GetOutputPort("fault"), first.GetInputPort("stop_request"))
-    builder.Connect(first.GetOutputPort("fault"), hold.GetInputPort("value"))
-    builder.Connect(hold.GetOutputPort("held"), second.GetInputPort("stop_request"))
+        robot = add_controlled_robot(named, own, part, task, start, options, rubbing, like=before)
+    robot.scenario = _alone(own)
+    signals = robot.signals
+    drive = {"drive": signals["drive"], "joint_state": signals["joint_state"]}
+    add_drives(named, part, None, DriverParameters(), period, drive, start[1])
+    stops = [signals["stop_category"]]
+    logged = add_friction(named, part, robot.true_state, rubbing, stops)
+    logged |= {name: signals[name] for name in robot.controller.logged}
+    logged |= robot.logged_states
+    reaction = None
+    if reacts:
+        reaction, wrench = add_held_reaction(named, part, robot.true_state, period)
+        robot.controller.connect(builder, "wrench_ext", wrench)
+        logged["wrench_ext"] = wrench
+    return Holder(robot, holder, {f"{HOLDER}{n}": p for n, p in logged.items()}, reaction)
 
 
 @contextmanager
 def naming_holder() -> Iterator[None]:
-    """Name the block of the scenario in what is said against the robot that holds."""
+    """Name the block of the scenario in errors about the robot that holds the workpiece."""
     try:
         yield
     except InputError as error:
@@ -276,16 +170,16 @@ def naming_holder() -> Iterator[None]:
 
 
 def _alone(own: Scenario) -> Scenario:
-    """Return a holder's scenario for what is said of it: it has no force sensor of its own."""
+    """Return the scenario of a robot that holds, for warnings: it has no force sensor itself."""
     torque = own.controller.external_torque
     if torque.source != "measured":
         return own
-    told = dc.replace(own.controller, external_torque=dc.replace(torque, source="known"))
-    return dc.replace(own, controller=told)
+    known = dc.replace(own.controller, external_torque=dc.replace(torque, source="known"))
+    return dc.replace(own, controller=known)
 
 
 def _check(holder: HolderParameters, period: float, order: int) -> None:
-    """Refuse what no holder can be."""
+    """Refuse a robot that cannot hold the workpiece for another one."""
     model, own, law = holder.robot.model, holder.controller.sampling_time, holder.controller.law
     require(not is_delta(model), "robot.model", model, "a serial arm, which turns what it holds")
     holder.workpiece.check()
@@ -294,47 +188,8 @@ def _check(holder: HolderParameters, period: float, order: int) -> None:
     require(own == period, "controller.sampling_time", own, f"{period:g} s, the other robot's")
 
 
-def _add_motion(
-    builder: DiagramBuilder,
-    holder: HolderParameters,
-    law: FollowingLaw,
-    order: int,
-    controller: FollowingController,
-    plan: Callable[[], PiecewisePolynomialCurve],
-) -> OutputPort:
-    """Add what tells the workpiece's motion, and return its port."""
-    robot, period = law.robot, controller.period
-    highest = order if holder.derivatives == "known" else 0
-    flange = FlangeFrame(
-        robot,
-        law.linearization.relative_degree,
-        order,
-        _placement(holder),
-        min(highest, holder.highest),
-    )
-    frame = builder.AddNamedSystem("flange_frame", BlockSystem(flange, period))
-    builder.Connect(controller.GetOutputPort("joint_jet"), frame.GetInputPort("joint_jet"))
-    told = frame.GetOutputPort("frame_jet")
-    if holder.derivatives == "differenced":
-        block = DifferencedFrame(order, holder.highest, period)
-        guess = builder.AddNamedSystem("differenced_frame", BlockSystem(block, period))
-        builder.Connect(told, guess.GetInputPort("frame_jet"))
-        told = guess.GetOutputPort("differenced")
-    elif holder.derivatives == "planned":
-        with naming_holder():
-            timed = BlockSystem(TimedReference(plan(), order, POSE_SIZE, period), period)
-        builder.AddNamedSystem("planned_motion", timed)
-        mix = BlockSystem(PlannedFrame(order, holder.highest), period)
-        builder.AddNamedSystem("planned_frame", mix)
-        builder.Connect(told, mix.GetInputPort("frame_jet"))
-        builder.Connect(timed.GetOutputPort("reference"), mix.GetInputPort("planned"))
-        told = mix.GetOutputPort("mixed")
-    assert told.size() == frame_size(order)
-    return told
-
-
 def _placement(holder: HolderParameters) -> np.ndarray:
-    """Return where the base is believed to be against where it is, ``[p, R by rows]``, (12,)."""
+    """Return the nominal pose of the base relative to the actual one, ``[p, R by rows]``, (12,)."""
     X_WB = holder.robot.base_pose.transform()
     shift = X_WB @ holder.placement_error.transform() @ X_WB.inverse()
     return np.concatenate([shift.translation(), shift.rotation().matrix().ravel()])

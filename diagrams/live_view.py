@@ -13,6 +13,7 @@ from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.delta import DeltaPart
 from diagrams.station import Station
 from diagrams.tasks.drawing import draw_workpiece
+from diagrams.tasks.task_drawing import drawing_of
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, RobotVisualizer
 from pfsc_drake.systems.drawing.tool_visualizer import ForceArrows, ToolVisualizer, TrailVisualizer
 
@@ -83,7 +84,9 @@ class LiveView:
         meshcat.SetObject(_TARGET, Sphere(_TARGET_RADIUS), _HAND)
         # the time in here counts frames
         period = 1.0
-        self._export(builder, "manifold_point", station.task.drawing.add(builder, meshcat, period))
+        self._export(
+            builder, "manifold_point", drawing_of(station.task).add(builder, meshcat, period)
+        )
         trail = TrailVisualizer("path_following", _WAY, meshcat, period, longest=_PIECES)
         builder.AddNamedSystem("trail", trail)
         self._export(builder, "way", trail.GetInputPort("point"))
@@ -145,7 +148,7 @@ class LiveView:
         period: float,
     ) -> None:
         """Add the robot, and look at it."""
-        outline = np.concatenate(station.task.drawing.outline())
+        outline = np.concatenate(drawing_of(station.task).outline())
         if isinstance(station.part, DeltaPart):
             delta = DeltaVisualizer(station.part.robot, meshcat, period)
             builder.AddNamedSystem("robot", delta)

@@ -1,6 +1,6 @@
 """A robot with its friction, sensors and surroundings, and nobody who controls it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path as FilePath
 
@@ -8,30 +8,30 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
-from diagrams.robots.belief import believed_robot
 from diagrams.robots.drives import add_drives
 from diagrams.robots.force_sensor import add_force_sensor
 from diagrams.robots.friction import add_friction
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
-from diagrams.scenario import DriverParameters, Scenario
+from diagrams.scenario import DriverParameters, Scenario, Streamed
 from diagrams.scenario.checks import require
-from diagrams.station_parts import (
+from diagrams.scenario_task import check_joints, make_task
+from diagrams.station_options import (
     add_robot,
-    following_options,
     friction_options,
-    make_task,
     make_workpiece,
     outside,
     servo_options,
 )
-from diagrams.station_start import find_rest, find_start
-from diagrams.surroundings.forces import add_surroundings
+from diagrams.station_start import find_start
+from diagrams.surroundings.forces import Surroundings
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.drivers.messages import ControlMode
-from pfsc_drake.following.assembly import ControllerAssembly
-from pfsc_drake.following.law import make_law
+from pfsc_drake.following.assembly import acts_on_motors
+from pfsc_drake.following.believed import Believed
 from pfsc_drake.robot.robot_model import gravity_function
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import BlockAccess, fuse_blocks
 
 
@@ -146,26 +146,16 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         require(not given, key, "given", "null where the controller is elsewhere")
     model = scenario.robot.model
     require(not is_delta(model), "robot.model", model, "an arm, where the controller is elsewhere")
+    known = not isinstance(scenario.path.shape, Streamed)
+    beforehand = "a path that is known beforehand, where the controller is elsewhere"
+    require(known, "path.shape", "!Streamed", beforehand)
     builder, period = DiagramBuilder(), scenario.controller.sampling_time
     task = make_task(scenario, folder)
     workpiece = make_workpiece(scenario, task)
     part = add_robot(builder, scenario, folder, workpiece)
     n = part.robot.dimension
-    task.require_joints(n)
+    check_joints(scenario, task, n)
     start, initial_state = find_start(scenario.start, task, part, workpiece)
-    law = make_law(
-        scenario.controller,
-        part.belief.robot,
-        task.manifold,
-        lambda: find_rest(task, part, start, initial_state),
-        scenario.faults,
-    )
-    link_state = part.coordinates.link_rows @ initial_state
-    # where its tool is, not where a controller expects it
-    seen = replace(scenario.controller, delay=None)
-    options = replace(following_options(scenario), controller=seen)
-    known = believed_robot(part.robot, scenario.encoders, period)
-    assembly = ControllerAssembly(builder, task, law, known, options, link_state[:n])
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(
         builder,
@@ -176,17 +166,24 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         period,
         scenario.encoder_period,
     )
-    assembly.add_place(true_state)
-    beside = assembly.projector.GetOutputPort("manifold_point")
-    around = assembly.signals | {"joint_state": true_state, "manifold_point": beside}
-    forces = add_surroundings(builder, part, task, outside(scenario), around, start)
+    # where its tool is, not where a controller expects it
+    on_motors = acts_on_motors(scenario.controller.law, Believed(part.robot))
+    tool = BlockSystem(ToolKinematics(part.robot, on_motors), period)
+    builder.AddNamedSystem("tool_kinematics", tool)
+    builder.Connect(true_state, tool.GetInputPort("joint_state"))
+    projector = BlockSystem(task.projecting, period)
+    builder.AddNamedSystem(task.projector_name, projector)
+    builder.Connect(tool.GetOutputPort("tool_pose"), projector.GetInputPort("tool_pose"))
+    around = Surroundings(part, task, task.manifold, outside(scenario), start)
+    point = projector.GetOutputPort("manifold_point")
+    forces = around.add(builder, {"true_state": true_state, "manifold_point": point})
     torque = wrench = None
     if not part.robot.is_rigid:
         torque = _name(
             add_torque_sensor(builder, part.robot, scenario.encoders, period, true_state)
         )
     if scenario.needs_sensor:
-        ports = {"joint_state": joint_state, "true_joint_state": true_state} | forces
+        ports = {"true_joint_state": true_state} | forces
         failure = scenario.simulation.force_sensor_failure
         wrench = _name(add_force_sensor(builder, part, scenario.sensor, failure, period, ports))
     command = builder.AddNamedSystem("command", ConstantVectorSource(np.zeros(n)))
@@ -215,7 +212,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         wrench,
         initial_state,
         start.place,
-        assembly.projector.get_name(),
+        task.projector_name,
         late,
     )
 

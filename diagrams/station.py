@@ -1,94 +1,79 @@
 """What running, logging and measuring need to know of a station."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
-from diagrams.fault_instant import first_instant
 from diagrams.holder_station import Holder
-from diagrams.oscillation import oscillation_before
 from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import FurtherLength, Workpiece
 from diagrams.signal_log import SignalLog
-from diagrams.surroundings.mounting import Mounting
-from diagrams.surroundings.operator import Operator
-from diagrams.tasks.path_following import PathTask
-from diagrams.tasks.task import StartPoint, Task
-from diagrams.tasks.waiting import CrossingWait
+from diagrams.site import Site
 from diagrams.turntable_station import Turntable
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
-from pfsc_drake.following.fault_description import FaultScene, FoundFault, describe
+from pfsc_drake.following.fault_description import FoundFault
+from pfsc_drake.following.law_warnings import MODES
+from pfsc_drake.following.tasks.path_task import PathTask
+from pfsc_drake.following.tasks.task import StartPoint, Task
+from pfsc_drake.following.waiting import Waiting
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import BlockAccess
-from pfsc_drake.systems.physics.operator_panel import OperatorPanel
-from pfsc_drake.systems.physics.velocity_servo import ServoAccess
 
 
-@dataclass
 class Station:
     """A built station and what is needed to run it.
 
+    Args:
+        diagram: The diagram.
+        site: Its parts.
+        log: Log of the signals that its parts show, by their names.
+        workpiece: What the tool may touch, if anything.
+
     Attributes:
         diagram: The diagram.
-        part: The robot in it.
-        task: What it is to do.
-        law: The law.
-        projector: Name of the projector.
-        controller: The controller in it.
-        servo: Its velocity servos, if there are any.
-        log: Log of ``joint_state``, ``tool_pose``, ``manifold_point``, ``reference``, ``law``;
-            of what acts on the tool ``wrench_ext``, of a sensor what :func:`add_sensor`
-            returns, with compliance what :func:`add_compliance` returns, with servos
-            ``drive_torque``, with friction ``friction_torque``. With imperfect encoders
-            ``joint_state`` is the truth, and the law was given ``joint_state_measured``.
-        initial_state: State of the robot's model at the start.
-        start: Where the tool is at the start.
-        on_motors: Whether the law acts on the tool pose of the motors, not of the links.
-        measured: System and port that the measured joint state comes from, by name, as they were
-            before blocks were fused.
-        warn: Tells what may not go as well as hoped, one sentence each.
+        controlled: The robot, with its controller.
+        log: The log. ``joint_state`` is the actual one, what the law receives
+            ``joint_state_measured`` where that differs.
+        controllers: Controller of the robot, and that of a robot that holds the workpiece.
+        servo: Velocity servos, if there are any.
         workpiece: What the tool may touch, if anything.
-        operator: Who guides the tool while the robot moves, if anybody does.
-        mode_labels: What the values of a logged signal ``mode`` are called, if there is one.
-        mounting: Where plates come from and go, if there are any.
-        ticks_late: After how many ticks torques act that are told.
+        operator: A person who guides the tool while the robot moves, if one does.
+        mode_labels: Names of the values of a logged signal ``mode``, if there is one.
+        mounting: Plates that are mounted, if there are any.
+        ticks_late: Number of samples after which commanded torques act.
         holder: The robot that holds the workpiece which the path is on, if one does.
-        pen: Where way points enter that a person draws, if one does.
-        waiting: How progress waits for obstacles, if it does.
-        leader: Link to who leads the tool in another process, if somebody does.
         turntable: The turntable that carries the workpiece which the path is on, if one does.
+        crossing: Obstacles, if there are any.
+        pen: Input of waypoints that a person draws, if one does.
+        leader: Link to a leader in another process, if there is one.
     """
 
-    diagram: Diagram
-    part: RobotPart
-    task: Task
-    law: FollowingLaw
-    projector: str
-    controller: ControllerAccess
-    servo: ServoAccess | None
-    log: SignalLog
-    initial_state: np.ndarray
-    start: StartPoint
-    on_motors: bool
-    measured: tuple[str, str]
-    warn: Callable[[], list[str]]
-    workpiece: Workpiece | None = None
-    operator: Operator | None = None
-    mode_labels: Sequence[str] = ()
-    mounting: Mounting | None = None
-    ticks_late: int = 0
-    holder: Holder | None = None
-    pen: OperatorPanel | None = None
-    waiting: CrossingWait | None = None
-    leader: TeleoperationEnd | None = None
-    turntable: Turntable | None = None
+    def __init__(
+        self, diagram: Diagram, site: Site, log: SignalLog, workpiece: Workpiece | None
+    ) -> None:
+        self.diagram, self.controlled, self.log = diagram, site.robot, log
+        self.controllers, self.servo = site.controllers, site.servo
+        self.workpiece, self.operator, self.mounting = (
+            workpiece,
+            site.operator,
+            site.around.mounting,
+        )
+        self.mode_labels: Sequence[str] = MODES if "mode" in site.logged else ()
+        self.ticks_late = 0 if site.remote else site.scenario.driver.ticks(site.period)
+        carrier = site.carrier
+        self.holder = carrier if isinstance(carrier, Holder) else None
+        self.turntable = carrier if isinstance(carrier, Turntable) else None
+        self.crossing, self.pen, self.leader = site.scenario.obstacles, site.pen, site.leader
+
+    @property
+    def part(self) -> RobotPart:
+        """The robot alone."""
+        return self.controlled.part
 
     @property
     def robot(self) -> RobotModel:
@@ -96,14 +81,49 @@ class Station:
         return self.part.robot
 
     @property
+    def task(self) -> Task:
+        """Task of the tool."""
+        return self.controlled.task
+
+    @property
+    def law(self) -> FollowingLaw:
+        """Law of the controller."""
+        return self.controlled.controller.law
+
+    @property
+    def controller(self) -> ControllerAccess:
+        """Faults and commands of the controller."""
+        return self.controlled.access
+
+    @property
+    def waiting(self) -> Waiting | None:
+        """Motion that waits for obstacles, if it does."""
+        return self.controlled.controller.waiting
+
+    @property
+    def initial_state(self) -> np.ndarray:
+        """State of the robot's model at the start."""
+        return self.controlled.initial_state
+
+    @property
+    def start(self) -> StartPoint:
+        """Start of the tool."""
+        return self.controlled.start
+
+    @property
+    def on_motors(self) -> bool:
+        """Whether the law acts on the tool pose of the motors, not of the links."""
+        return self.controlled.controller.on_motors
+
+    @property
     def initial_place(self) -> np.ndarray:
-        """Place on the manifold at the start, as the projector remembers it."""
+        """Position on the manifold at the start, as the projector remembers it."""
         return self.start.place
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What may not go as well as hoped, one sentence each."""
-        return self.warn()
+        """Doubts about the station, one sentence each."""
+        return self.controlled.warnings() + ([] if self.holder is None else self.holder.warnings())
 
     @cached_property
     def blocks(self) -> BlockAccess:
@@ -119,12 +139,12 @@ class Station:
     @property
     def start_posture(self) -> np.ndarray:
         """Joint coordinates at the start [rad or m], shape (N,)."""
-        return (self.part.coordinates.link_rows @ self.initial_state)[: self.robot.dimension]
+        return self.controlled.start_posture
 
     @property
     def reference_duration(self) -> float:
         """Length of the reference motion [s]."""
-        return self.task.motion.domain[1]
+        return self.task.end
 
     def set_start(self, root: Context) -> None:
         """Put the robot at the start of the scenario, where its drives hold its weight.
@@ -135,14 +155,13 @@ class Station:
         Args:
             root: Context of the diagram.
         """
-        self.place_robot(root, self.initial_state)
+        self.controlled.set_start(self.blocks, root)
         late = self.ticks_late
         if late or self.part.drives.step is not None:
             weight = gravity_function(self.part.robot)(self.start_posture).full().ravel()
             self.blocks.set_state(root, "hold.held", np.tile(weight, 1 + late))
         if self.holder is not None:
-            self.holder.set_start(self.blocks, root)
-        self.set_place(root, self.initial_place)
+            self.holder.robot.set_start(self.blocks, root)
 
     def tell_way_points(self, root: Context, message: np.ndarray) -> None:
         """Set what the station hears from the next tick on of way points that a person draws.
@@ -162,7 +181,7 @@ class Station:
             root: Context of the diagram.
             place: As the projector remembers it.
         """
-        self.blocks.set_state(root, f"{self.projector}.place", place)
+        self.controlled.set_place(self.blocks, root, place)
 
     def place_robot(self, root: Context, state: np.ndarray) -> None:
         """Put the robot into a state.
@@ -196,26 +215,15 @@ class Station:
         if fault is Fault.STOP_REQUESTED and self.holder is not None:
             return self.holder.found_fault(self.log, self.blocks, root)
         if fault is not Fault.NONE:
-            suspects = self.controller.suspects(self.blocks, root)
-            return self._describe(fault, root, "law", self.law.layout.status.start, suspects)
+            return self.controlled.found_fault(self.log, self.blocks, root)
         servo = self.servo
         if servo is None or (fault := servo.fault(self.blocks, root)) is Fault.NONE:
             return None
         suspects = servo.suspects(self.blocks, root)
-        found = self._describe(fault, root, "servo_fault", 0, suspects)
-        return FoundFault(f"{servo.name}: {found.sentence}", found.time)
-
-    def _describe(
-        self, fault: Fault, root: Context, signal: str, column: int, suspects: np.ndarray
-    ) -> FoundFault:
-        """Return what there is to say of a fault that is logged in a column of a signal."""
-        now, before = first_instant(self.log, self.blocks, root, signal, column)
-        place, robot = self.task.place, self.part.belief.robot
-        oscillating = oscillation_before(now.time, self.log, root, self.law)
-        scene = FaultScene(
-            self.law, robot, place, self.on_motors, now, before, suspects, oscillating
+        found = self.controlled.describe(
+            fault, self.log, self.blocks, root, "servo_fault", 0, suspects
         )
-        return FoundFault(describe(fault, scene), now.time)
+        return FoundFault(f"{servo.name}: {found.sentence}", found.time)
 
     def mode_name(self, mode: int) -> str:
         """Return what a value of the signal ``mode`` is called.

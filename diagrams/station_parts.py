@@ -1,357 +1,136 @@
-"""The parts of a station that a scenario chooses: task, robot, drives, workpiece."""
+"""Parts of a station: each reads signals of the others by name, and adds its own.
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path as FilePath
+A part is a function of a :class:`~diagrams.site.Site`. It adds nothing where a scenario has none of
+its kind. They are added in the order of :data:`PARTS`; the inputs of controllers are connected
+afterwards.
+"""
 
-from pydrake.systems.framework import DiagramBuilder
+from collections.abc import Callable
 
-from diagrams.robots.arm import add_arm
-from diagrams.robots.belief import BeliefSource
-from diagrams.robots.delta import add_delta, free_step
-from diagrams.robots.drives import ServoOptions
-from diagrams.robots.friction import FrictionOptions
-from diagrams.robots.model import is_delta
-from diagrams.robots.part import RobotPart
-from diagrams.robots.remote_arm import add_remote_arm
-from diagrams.robots.workpiece import Workpiece
-from diagrams.scenario import Scenario, Streamed
-from diagrams.scenario.checks import require, require_whole_fraction
-from diagrams.scenario.fixtures import FixtureParameters
-from diagrams.scenario.massless import check_massless
-from diagrams.surroundings.forces import Outside
+from diagrams.holder_station import HOLDER, Holder
+from diagrams.robots.drives import add_drives
+from diagrams.robots.force_sensor import add_force_sensor
+from diagrams.robots.friction import add_friction
+from diagrams.robots.remote_arm import RemoteArm
+from diagrams.site import Site
+from diagrams.station_options import friction_options, servo_options
 from diagrams.surroundings.leader import Leading
-from diagrams.surroundings.mounting import Mounting, make_mounting
-from diagrams.surroundings.operator import Operator
-from diagrams.surroundings.teleoperation import LedFromAfar, add_operator_afar
-from diagrams.surroundings.workpieces import NotchedWorkpiece, PressedWorkpiece
-from diagrams.tasks.path_following import PathTask, TrajectoryTask
-from diagrams.tasks.space_guidance import SpaceTask
-from diagrams.tasks.streaming import StreamTask
-from diagrams.tasks.surface_following import SurfaceTask
-from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.control.fixtures.lead import Lead
-from pfsc_drake.control.law.laws import RELATIVE_DEGREE
-from pfsc_drake.errors import InputError
-from pfsc_drake.following.fixtures import free_motion, make_lead
-from pfsc_drake.following.options.compliance import ComplianceParameters
-from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
+from diagrams.surroundings.obstacles import add_obstacles, add_told_obstacles
+from diagrams.surroundings.operator import add_operator
+from diagrams.surroundings.teleoperation import add_leader_side
+from diagrams.tasks.streaming import ScenarioStream
+from diagrams.turntable_station import Turntable
+from pfsc_drake.blocks.wiring_blocks import Hold
 
 
-def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = None) -> Task:
-    """Return what a scenario's tool is to do.
-
-    Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
-
-    Raises:
-        InputError: If the path or the motion along it cannot be made, or regions are given that
-            nothing keeps the tool out of.
-    """
-    controller, start, reference = scenario.controller, scenario.start, scenario.reference
-    if controller.manifold == "space":
-        motion = free_motion(scenario.compliance, controller.sampling_time)
-        degree, lead = RELATIVE_DEGREE[controller.law], choose_lead(scenario)
-        regions = scenario.fixtures or FixtureParameters()
-        return SpaceTask(regions, degree, motion, lead, start, scenario.duration, folder, progress)
-    for key, why in {"regions": "kept out of regions", "guides": "pulled to guides"}.items():
-        given = getattr(scenario.fixtures, key, [])
-        allowed = (
-            f"none with controller.manifold = {controller.manifold}; only a tool led through space "
-            f"is {why}"
-        )
-        require(not given, f"fixtures.{key}", f"{len(given)} given", allowed)
-    if controller.manifold == "surface":
-        return SurfaceTask(scenario.surface, controller, reference, start, folder, progress)
-    if isinstance(scenario.path.shape, Streamed):
-        allowed = "path where way points come while the tool moves"
-        require(controller.manifold == "path", "controller.manifold", controller.manifold, allowed)
-        return StreamTask(scenario.path, controller, start, scenario.duration, folder)
-    kind = {"path": PathTask, "trajectory": TrajectoryTask}[controller.manifold]
-    return kind(scenario.path, scenario.surface, controller, reference, start, folder, progress)
+def _controller(site: Site) -> None:
+    """Show the signals of the controller, and the states of the joints."""
+    robot, controller = site.robot, site.robot.controller
+    site.signals |= robot.signals
+    site.show(**{name: robot.signals[name] for name in controller.logged})
+    site.signals |= {"true_state": robot.true_state, "measured_state": robot.measured}
+    site.logged |= robot.logged_states
+    if site.remote:  # the links' side as it is found is all that is known of the robot
+        site.logged.pop("found_joint_state", None)
+    part = robot.part
+    if isinstance(part, RemoteArm):
+        site.signals |= {"override": part.override.get_output_port()}
+        site.signals |= {"stop_request": part.stop_request.get_output_port()}
 
 
-def choose_lead(scenario: Scenario) -> Lead:
-    """Return what is between the velocity that is asked for and a tool led through space.
-
-    Args:
-        scenario: The scenario.
-    """
-    parameters = scenario.fixtures or FixtureParameters()
-    return make_lead(
-        RELATIVE_DEGREE[scenario.controller.law],
-        parameters,
-        scenario.controller.sampling_time,
-        lag=parameters.lag_behind(scenario.servo.bandwidth),
-        delay=scenario.servo.bus_delay,
-    )
-
-
-def servo_lag(scenario: Scenario) -> float:
-    """Return the lag between what a law asks of a tool that follows, and where the tool is [s].
-
-    Args:
-        scenario: The scenario.
-    """
-    if RELATIVE_DEGREE[scenario.controller.law] > 1:
-        return 0.0
-    return 1.0 / scenario.servo.bandwidth + scenario.servo.bus_delay
+def _carrier(site: Site) -> None:
+    """Connect what carries the workpiece with the controller, and both faults with each other."""
+    carrier = site.carrier
+    if isinstance(carrier, Turntable):
+        added = carrier.add(site.builder, site.period)
+        site.signals |= added
+        frame = site.logged.pop("frame_jet")
+        site.show(turntable_motion=added["turntable_motion"], turntable_frame_jet=frame)
+    elif isinstance(carrier, Holder):
+        other = carrier.robot.signals
+        site.signals |= {"frame_jet": other["frame_jet"], "stop_request": other["fault"]}
+        site.logged |= carrier.signals
+        # a sample later: both at once would ask each other
+        hold = site.add(f"{HOLDER}stop", Hold(1), value=site.signals["fault"])
+        holds = carrier.robot.controller
+        holds.connect(site.builder, "stop_request", hold.GetOutputPort("held"))
 
 
-def make_workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
-    """Return what a tool presses on or runs in, if there is anything.
-
-    Args:
-        scenario: The scenario.
-        task: What the tool is to do.
-
-    Raises:
-        InputError: If the workpiece does not suit the task or the sampling time.
-    """
-    period = scenario.controller.sampling_time
-    if scenario.workpiece is not None:
-        require(scenario.notch is None, "notch", "given", "null where there is a workpiece")
-        require_whole_fraction("workpiece.time_step", scenario.workpiece.time_step, period)
-        if not isinstance(task, SurfaceTask):
-            raise InputError("workpiece = given: must be null where the task is no surface")
-        return PressedWorkpiece(task.surface, task.place, scenario.workpiece)
-    if scenario.notch is None:
-        return None
-    require_whole_fraction("notch.time_step", scenario.notch.time_step, period)
-    if not isinstance(task, PathTask):
-        raise InputError("notch = given: must be null where the task is no path")
-    return NotchedWorkpiece(task.path, scenario.notch)
+def _obstacles(site: Site) -> None:
+    if site.scenario.obstacles is not None:
+        add = add_told_obstacles if site.remote else add_obstacles
+        site.show(**add(site.builder, site.scenario.obstacles, site.period))
 
 
-def add_afar(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    operator: Operator | None,
-    task: Task,
-    start: StartPoint,
-    *,
-    paced: bool = True,
-) -> LedFromAfar | None:
-    """Add a scenario's operator who is far away, if there is one, with device and channel.
-
-    Args:
-        builder: Builder of the diagram.
-        scenario: The scenario.
-        operator: A person at the device, if there is one.
-        task: What the tool is to do.
-        start: Where the tool starts.
-        paced: Whether time is to wait for the clock, where the device is in another process.
-
-    Raises:
-        InputError: If nobody is there, or nothing yields.
-    """
-    if scenario.teleoperation is None:
-        return None
-    allowed = "null where nothing yields to what a sensor measures (compliance)"
-    require(scenario.compliance.needs_sensor, "teleoperation", "given", allowed)
-    way, period = scenario.teleoperation, scenario.controller.sampling_time
-    turns = ComplianceParameters(rotational=scenario.compliance.rotational).is_given
-    allowed = "null where the tool's orientation is stiff (compliance.rotational)"
-    require(way.rotation is None or turns, "teleoperation.rotation", "given", allowed)
-    leading = Leading(way, scenario.hand, operator, task, start, period)
-    return add_operator_afar(builder, leading, paced=paced)
+def _waypoints(site: Site) -> None:
+    task = site.task
+    if isinstance(task, ScenarioStream):
+        source, site.pen = task.add_source(site.builder, site.signals["stream"], site.period)
+        site.signals["waypoints"] = source
+        robot, course = site.robot.part.robot, site.signals["course"]
+        known = robot, site.signals["true_state"], course, site.period
+        site.show(true_place=task.add_true_place(site.builder, *known))
 
 
-def make_spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:
-    """Return what a workpiece that is pressed on is to the tool, if there is one.
-
-    Args:
-        scenario: The scenario.
-        workpiece: What the tool touches, if anything.
-    """
-    press = scenario.compliance.press
-    if press is None or press.force == 0.0 or not isinstance(workpiece, PressedWorkpiece):
-        return None
-    period = scenario.controller.sampling_time
-    return SurfaceSpring(workpiece.touch, workpiece.stiffness(press.force), period)
+def _operator(site: Site) -> None:
+    scenario = site.scenario
+    if scenario.operator is not None:
+        regions = scenario.switched_regions
+        operator = add_operator(site.builder, scenario.operator, regions, site.period, site.folder)
+        site.operator, site.signals = operator, site.signals | operator.requests
 
 
-def add_robot(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    folder: FilePath,
-    workpiece: Workpiece | None,
-    *,
-    remote: bool = False,
-) -> RobotPart:
-    """Add the robot of a scenario, with what its controller believes of it.
-
-    Args:
-        builder: Builder of the diagram.
-        scenario: The scenario.
-        folder: Where its relative file names start.
-        workpiece: What the tool may touch, if anything.
-        remote: Whether it stands elsewhere.
-
-    Raises:
-        InputError: If the robot cannot be read, or cannot do what the scenario asks of it.
-    """
-    source, controller = belief_source(scenario, folder), scenario.controller
-    if remote:
-        model = scenario.robot.model
-        require(not is_delta(model), "robot.model", model, "an arm, where it stands elsewhere")
-        return add_remote_arm(builder, source, has_sensor=scenario.needs_sensor)
-    if not is_delta(scenario.robot.model):
-        arm = add_arm(builder, source, workpiece)
-        if arm.robot.is_massless:
-            check_massless(scenario)
-        return arm
-    step = free_step(controller.sampling_time, scenario.simulation.max_step)
-    part = add_delta(builder, source, step, workpiece)
-    # what cannot be read is said before what it could not do
-    _check_delta(scenario)
-    return part
+def _leader(site: Site) -> None:
+    scenario = site.scenario
+    if scenario.teleoperation is not None:
+        known = site.task, site.robot.start, site.period
+        leading = Leading(scenario.teleoperation, scenario.hand, site.operator, *known)
+        message, paced = site.signals["message"], not site.remote
+        signals, site.leader = add_leader_side(site.builder, leading, message, paced=paced)
+        site.signals["message_arrived"] = signals.pop("message_arrived")
+        site.show(**signals)
 
 
-def belief_source(scenario: Scenario, folder: FilePath) -> BeliefSource:
-    """Return where a scenario's controller has from what it believes of the robot.
-
-    Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
-    """
-    controller = scenario.controller
-    return BeliefSource(
-        scenario.robot,
-        controller.model,
-        scenario.model_error,
-        folder,
-        by_velocity=not controller.law_record.commands_torque,
-    )
+def _surroundings(site: Site) -> None:
+    ports, carrier = dict(site.signals), site.carrier
+    if carrier is None:
+        # forces act where the tool is, also if a law follows another point
+        ports["manifold_point"] = ports["closest_point"]
+    operator = site.operator if site.scenario.teleoperation is None else None
+    reaction = carrier.reaction if isinstance(carrier, Holder) else None
+    site.show(**site.around.add(site.builder, ports, operator, reaction))
 
 
-def friction_options(scenario: Scenario, folder: FilePath) -> FrictionOptions:
-    """Return what brakes the drives of a scenario's plant.
-
-    Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
-    """
-    return FrictionOptions(
-        scenario.friction,
-        scenario.drive_friction,
-        scenario.faults.brakes,
-        scenario.simulation,
-        scenario.controller.sampling_time,
-        folder,
-    )
+def _force_sensor(site: Site) -> None:
+    scenario = site.scenario
+    if scenario.needs_sensor:
+        ports = {"true_joint_state": site.signals["true_state"]}
+        ports |= {name: site.signals[name] for name in ("wrench_ext",) if name in site.signals}
+        failure, part = scenario.simulation.force_sensor_failure, site.robot.part
+        sensor = add_force_sensor(site.builder, part, scenario.sensor, failure, site.period, ports)
+        site.show(wrench_sensor=sensor)
 
 
-def servo_options(scenario: Scenario) -> ServoOptions | None:
-    """Return the velocity servos of a scenario's joints; None where its law commands torques.
-
-    Args:
-        scenario: The scenario.
-    """
-    if scenario.controller.law_record.commands_torque:
-        return None
-    return ServoOptions(scenario.servo, scenario.controller, scenario.faults, scenario.encoders)
-
-
-def _check_delta(scenario: Scenario) -> None:
-    """Refuse what is said of robots that turn their tool or bend."""
-    law, start, surface = scenario.controller.law, scenario.start, scenario.surface
-    drives = "the drives of a DELTA robot are stiff and take forces"
-    require(law == "rigid", "controller.law", law, f"rigid, {drives}")
-    one = "none; one pose of the slides belongs to each position"
-    require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
-    turned = "none; a DELTA robot only translates"
-    require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
-    keyframes = scenario.path.orientation.keyframes
-    require(not keyframes, "path.orientation.keyframes", len(keyframes), turned)
-    if surface is not None:
-        kind = surface.orientation.kind
-        require(kind == "none", "surface.orientation.kind", kind, turned)
-
-
-def choose_mounting(scenario: Scenario, task: Task) -> Mounting | None:
-    """Return where a scenario's plates come from and go, if it has any.
-
-    Args:
-        scenario: The scenario.
-        task: What the tool is to do.
-
-    Raises:
-        InputError: If the plates do not suit the task, or something else is touched.
-    """
-    if scenario.plate is None:
-        return None
-    for key in ("notch", "workpiece"):
-        given = getattr(scenario, key) is not None
-        require(not given, key, "given", "null where there is a plate")
-    return make_mounting(
-        scenario.plate,
-        task,
-        has_hand=scenario.hand is not None,
-        period=scenario.controller.sampling_time,
-    )
-
-
-def outside(scenario: Scenario) -> Outside:
-    """Return what acts on a scenario's robot from outside.
-
-    Args:
-        scenario: The scenario.
-    """
-    return Outside(
-        scenario.forces,
-        scenario.hold_back,
-        scenario.pushes,
-        scenario.hand if scenario.teleoperation is None else None,
-        scenario.needs_sensor,
-        scenario.controller.sampling_time,
-    )
-
-
-def following_options(scenario: Scenario) -> FollowerOptions:
-    """Return what a scenario chooses of its controller.
-
-    Args:
-        scenario: The scenario.
-    """
-    return FollowerOptions(
-        controller=scenario.controller,
-        faults=scenario.faults,
-        transition=scenario.start.transition,
-        compliance=scenario.compliance,
-        swings=scenario.reference.swings,
-    )
-
-
-def check_trajectory(scenario: Scenario) -> None:
-    """Refuse what a point that moves along a path with time cannot have.
-
-    Args:
-        scenario: The scenario.
-
-    Raises:
-        InputError: If it has that.
-    """
-    if scenario.controller.manifold != "trajectory":
+def _drives(site: Site) -> None:
+    scenario, part = site.scenario, site.robot.part
+    if site.remote:
         return
-    swings, transition = scenario.reference.swings, scenario.start.transition
-    allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
-    require(not swings, "reference.swings", f"{len(swings)} given", allowed)
-    allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
-    require(transition == 0.0, "start.transition", transition, allowed)
+    servos, state = servo_options(scenario), site.robot.initial_state
+    signals, site.servo = add_drives(
+        site.builder, part, servos, scenario.driver, site.period, site.signals, state
+    )
+    site.show(**signals)
 
 
-@contextmanager
-def naming_reference() -> Iterator[None]:
-    """Name the block of a scenario in what is said against its oscillations."""
-    try:
-        yield
-    except InputError as error:
-        message = str(error)
-        raise InputError(
-            f"reference.{message}" if message.startswith("swings") else message
-        ) from None
+def _friction(site: Site) -> None:
+    categories = ("stop_category", "servo_stop_category")
+    stops = [site.signals[name] for name in categories if name in site.signals]
+    rubbing = friction_options(site.scenario, site.folder)
+    part, state = site.robot.part, site.signals["true_state"]
+    site.show(**add_friction(site.builder, part, state, rubbing, [] if site.remote else stops))
+
+
+PARTS: list[Callable[[Site], None]] = [
+    *(_controller, _carrier, _obstacles, _waypoints, _operator, _leader),
+    *(_surroundings, _force_sensor, _drives, _friction),
+]

@@ -5,11 +5,11 @@ import numpy as np
 from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import StartParameters
+from diagrams.scenario_task import inverted_start
 from diagrams.surroundings.mounting import Mounting
-from diagrams.tasks.held_frame import HeldFrame
-from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.carried import placed
+from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
 
@@ -19,7 +19,7 @@ def find_start(
     part: RobotPart,
     workpiece: Workpiece | None = None,
     mounting: Mounting | None = None,
-    held: HeldFrame | None = None,
+    frame: np.ndarray | None = None,
 ) -> tuple[StartPoint, np.ndarray]:
     """Return where the tool starts, and the state of the plant there, at rest.
 
@@ -29,7 +29,7 @@ def find_start(
         part: The robot.
         workpiece: What the tool touches, if anything.
         mounting: Where plates come from and go, if there are any.
-        held: What carries the manifold, if anything does.
+        frame: Pose of the frame that carries the manifold, ``[p_WC, R_WC by rows]``, if it moves.
 
     Raises:
         InputError: If the start or the way from there is known to be out of reach.
@@ -42,9 +42,9 @@ def find_start(
         workpiece.check_start(start.target.y_t)
     if mounting is not None:
         start = mounting.start(start, task)
-    q_J = _posture(parameters, task, part, start, held)
+    q_J = _posture(parameters, task, part, start, frame)
     # what is carried is on its way to reach, or out of it
-    for position, where in () if held is not None else task.way():
+    for position, where in () if frame is not None else task.way():
         part.check_reach(position, where)
     return start, part.state_at_rest(q_J)
 
@@ -54,17 +54,17 @@ def _posture(
     task: Task,
     part: RobotPart,
     start: StartPoint,
-    held: HeldFrame | None,
+    frame: np.ndarray | None,
 ) -> np.ndarray:
     """Return the joints at the start, shape (N,); say it if only the inverted one is in reach."""
 
     def found(target: ToolTarget) -> np.ndarray:
-        return part.posture(target if held is None else held.placed(target), parameters)
+        return part.posture(target if frame is None else placed(target, frame), parameters)
 
     try:
         return found(start.target)
     except InputError as error:
-        inverted = task.inverted(start)
+        inverted = inverted_start(task, start)
         if inverted is None:
             raise
         target, advice = inverted
@@ -73,24 +73,3 @@ def _posture(
         except InputError:
             raise error from None
         raise InputError(f"{error}; {advice}") from None
-
-
-def find_rest(
-    task: Task,
-    part: RobotPart,
-    start: StartPoint,
-    state: np.ndarray,
-    held: HeldFrame | None = None,
-) -> RestPosture:
-    """Return where the robot starts, as the law sees it.
-
-    Args:
-        task: What the tool is to do.
-        part: The robot.
-        start: Where the tool starts.
-        state: State of the robot's model there.
-        held: What carries the manifold, if anything does.
-    """
-    q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
-    point = task.point(start)
-    return RestPosture(q_J, point if held is None else held.resting_point(point))

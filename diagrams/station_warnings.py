@@ -7,8 +7,6 @@ import numpy as np
 from diagrams.robots.force_sensor import taring_warnings
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
-from diagrams.tasks.space_guidance import SpaceTask
-from diagrams.tasks.task import Task
 from diagrams.warnings.encoders import coarse_encoders
 from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
 from diagrams.warnings.obstacles import obstacle_warnings
@@ -21,39 +19,29 @@ from diagrams.warnings.untold_forces import (
     untold_forces,
     untold_friction,
 )
-from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.following.law import sampled_robot
+from pfsc_drake.following.controller import Controller
 from pfsc_drake.following.law_warnings import (
     law_warnings,
     observed_force_warnings,
     servo_warnings,
     unused_parameters,
 )
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.operator_hand import LiveHandParameters
 
 
-def controller_warnings(
-    scenario: Scenario,
-    task: Task,
-    part: RobotPart,
-    law: FollowingLaw,
-    link_state: np.ndarray,
-    rest: RestPosture,
-) -> list[str]:
-    """Return what a scenario's controller will not do well, one sentence each.
+def controller_warnings(scenario: Scenario, part: RobotPart, controller: Controller) -> list[str]:
+    """Return doubts about a scenario's controller, one sentence each.
 
     Args:
         scenario: The scenario.
-        task: What the tool is to do.
         part: The robot.
-        law: The law.
-        link_state: ``[q_J, v_J]`` at the start, shape (2N,).
-        rest: The start, and the manifold's point there.
+        controller: The controller.
     """
-    parameters, robot = scenario.controller, part.belief.robot
-    sampled = cache(lambda: sampled_robot(parameters, robot, law.linearization, rest, law.posture))
+    parameters, robot, task = scenario.controller, part.belief.robot, controller.task
+    law, rest, sampled = controller.law, controller.rest, cache(controller.sampled)
+    link_state = np.append(controller.start_posture, np.zeros(robot.dimension))
     bearable = bearable_way(parameters.manifold, scenario.fixtures, scenario.compliance)
     said = law_warnings(parameters, robot, law, link_state, sampled)
     if not parameters.law_record.commands_torque:
@@ -70,7 +58,7 @@ def controller_warnings(
     said += rest_warnings(scenario.teleoperation, scenario.hand, scenario.duration)
     said += unused_parameters(parameters, law)
     if scenario.fixtures is not None and isinstance(task, SpaceTask):
-        said += stiff_fixtures(scenario.fixtures, task.guided)
+        said += stiff_fixtures(scenario.fixtures, task)
         said += firm_guides(task.guides, [hand.force_limit for hand in _hands(scenario)])
     if scenario.needs_sensor:
         if scenario.compliance.needs_sensor:

@@ -1,7 +1,8 @@
-"""The turntable of a station that carries the workpiece, and what it tells."""
+"""The turntable of a station that carries the workpiece."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import cast
 
 import casadi as ca
 import numpy as np
@@ -10,22 +11,15 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario.checks import require_whole_ticks
 from diagrams.scenario.turntable import TurntableParameters
-from diagrams.tasks.held_frame import HeldFrame
-from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
-from pfsc_drake.control.manifolds.carried import DifferencedFrame
-from pfsc_drake.control.manifolds.turntable import (
-    AdvancedFrame,
-    TurntableAxes,
-    TurntableFrame,
-    turntable_motion_function,
-)
+from pfsc_drake.control.manifolds.turntable import TurntableAxes, turntable_motion_function
+from pfsc_drake.following.carrier import Derivatives, TurntableMotion, delayed
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.physics.turntable import TurntableDrive
 from pfsc_drake.systems.block_system import BlockSystem
 
-# before the names of all systems and signals of the turntable
+# beginning of the names of all systems and signals of the turntable
 TURNTABLE = "turntable_"
 # s, between the samples of the planned motion; ticks by which angles may be late
 _STEP, _MOST_TICKS = 4e-3, 100
@@ -36,77 +30,72 @@ class Turntable:
     """A turntable that carries the workpiece.
 
     Attributes:
-        frame: The workpiece's frame, and its motion as the robot's controller knows it.
-        plan: Returns its motion as it is planned, ``[p_WC, R_WC by rows]`` over time.
-        motion: Function of the true angles and rates to the true frame and its rate.
-        signals: What to log, by names with the prefix.
+        parameters: What the scenario says of it.
     """
 
-    frame: HeldFrame
-    plan: Callable[[], PiecewisePolynomialCurve]
-    motion: ca.Function
-    signals: dict[str, OutputPort]
+    parameters: TurntableParameters
 
+    @cached_property
+    def command(self) -> PiecewisePolynomialCurve:
+        """Commanded angles of all axes over time [rad]."""
+        return turntable_command(self.parameters)
 
-def add_turntable(
-    builder: DiagramBuilder, parameters: TurntableParameters, order: int, period: float
-) -> Turntable:
-    """Add a turntable, and what tells its motion to the robot's controller.
+    @property
+    def _believed(self) -> TurntableAxes:
+        return turntable_axes(self.parameters, self.parameters.placement_error.transform())
 
-    Args:
-        builder: Builder of the diagram.
-        parameters: The turntable.
-        order: Relative degree of the robot's law.
-        period: Sampling time [s].
+    @property
+    def frame(self) -> np.ndarray:
+        """Nominal pose of the workpiece at the start, ``[p_WC, R_WC by rows]``, shape (12,)."""
+        begin = self.command.derivatives(0.0, 0)[0]
+        return np.array(turntable_motion_function(self._believed, 0)(begin)).ravel()
 
-    Raises:
-        InputError: If the table has no axes or stops, or a delay is no whole number of periods.
-    """
-    parameters.check()
-    ticks = require_whole_ticks("turntable.delay", parameters.delay, period, _MOST_TICKS)
-    n, command = len(parameters.axes), turntable_command(parameters)
-    true = turntable_axes(parameters, RigidTransform())
-    believed = turntable_axes(parameters, parameters.placement_error.transform())
-    delay = parameters.delay
-    if parameters.believed_delay is not None:
-        delay = parameters.believed_delay
+    @cached_property
+    def motion(self) -> ca.Function:
+        """Function of the true angles and rates to the true frame and its rate."""
+        return turntable_motion_function(turntable_axes(self.parameters, RigidTransform()), 1)
 
-    def add(name: str, block: Block) -> BlockSystem:
-        return builder.AddNamedSystem(f"{TURNTABLE}{name}", BlockSystem(block, period))
+    @property
+    def known_motion(self) -> TurntableMotion:
+        """Motion of the workpiece as the controller of a robot knows it."""
+        table = self.parameters
+        delay = table.delay if table.believed_delay is None else table.believed_delay
+        derivatives = cast(Derivatives, table.derivatives)
+        return TurntableMotion(self._believed, self.command, delay, derivatives, table.highest)
 
-    followed = add("followed", TimedReference(_later(command, parameters.lag), 1, n, period))
-    drive = add("drive", TurntableDrive(n, parameters.increments, ticks))
-    builder.Connect(followed.GetOutputPort("reference"), drive.GetInputPort("followed"))
-    highest = parameters.highest if parameters.derivatives == "known" else 0
-    told = add("frame", TurntableFrame(believed, order, highest))
-    builder.Connect(drive.GetOutputPort("measured"), told.GetInputPort("measured"))
-    if highest:
-        planned = add("command", TimedReference(_later(command, delay), order, n, period))
-        builder.Connect(planned.GetOutputPort("reference"), told.GetInputPort("planned"))
-    frame = told.GetOutputPort("frame_jet")
-    if parameters.derivatives == "differenced":
-        guess = add("differenced", DifferencedFrame(order, parameters.highest, period))
-        builder.Connect(frame, guess.GetInputPort("frame_jet"))
-        frame = guess.GetOutputPort("differenced")
-    if delay > 0.0:
-        now = add("advanced", AdvancedFrame(order, delay))
-        builder.Connect(frame, now.GetInputPort("frame_jet"))
-        frame = now.GetOutputPort("advanced")
-    poses = turntable_motion_function(believed, 0)
-    begin = command.derivatives(0.0, 0)[0]
-
-    def plan() -> PiecewisePolynomialCurve:
+    @cached_property
+    def planned(self) -> PiecewisePolynomialCurve:
+        """Planned motion of the workpiece over time."""
+        command, poses = self.command, turntable_motion_function(self._believed, 0)
         times = np.linspace(*command.domain, int(np.ceil(command.domain[1] / _STEP)) + 1)
         angles = command.derivatives(times, 0)[:, 0]
         values = np.array(poses.map(len(times))(angles.T)).T
         return PiecewisePolynomialCurve.between_rests(times, values)
 
-    return Turntable(
-        HeldFrame(np.array(poses(begin)).ravel(), order, frame),
-        plan,
-        turntable_motion_function(true, 1),
-        {f"{TURNTABLE}motion": drive.GetOutputPort("motion"), f"{TURNTABLE}frame_jet": frame},
-    )
+    def add(self, builder: DiagramBuilder, period: float) -> dict[str, OutputPort]:
+        """Add its drives and encoders.
+
+        Args:
+            builder: Builder of the diagram.
+            period: Sampling time [s].
+
+        Returns:
+            ``turntable_motion``, true angles and rates, and ``table_angles`` as measured.
+
+        Raises:
+            InputError: If the table has no axes or stops, or a delay is no whole number of periods.
+        """
+        table, n = self.parameters, len(self.parameters.axes)
+        ticks = require_whole_ticks("turntable.delay", table.delay, period, _MOST_TICKS)
+        timed = TimedReference(delayed(self.command, table.lag), 1, n, period)
+        followed = builder.AddNamedSystem(f"{TURNTABLE}followed", BlockSystem(timed, period))
+        block = TurntableDrive(n, table.increments, ticks)
+        drive = builder.AddNamedSystem(f"{TURNTABLE}drive", BlockSystem(block, period))
+        builder.Connect(followed.GetOutputPort("reference"), drive.GetInputPort("followed"))
+        return {
+            f"{TURNTABLE}motion": drive.GetOutputPort("motion"),
+            "table_angles": drive.GetOutputPort("measured"),
+        }
 
 
 def turntable_axes(parameters: TurntableParameters, shift: RigidTransform) -> TurntableAxes:
@@ -148,14 +137,6 @@ def turntable_command(parameters: TurntableParameters) -> PiecewisePolynomialCur
     table[:, 0] += stops[move] - slopes * places[move, None]
     return PiecewisePolynomialCurve(
         along.breakpoints, table, known_smoothness=int(min(along.smoothness, table.shape[1]))
-    )
-
-
-def _later(curve: PiecewisePolynomialCurve, delay: float) -> PiecewisePolynomialCurve:
-    """Return a curve of time that comes later [s]."""
-    smooth = int(min(curve.smoothness, curve.degree))
-    return PiecewisePolynomialCurve(
-        curve.breakpoints + delay, curve.coefficients, known_smoothness=smooth
     )
 
 

@@ -15,6 +15,7 @@ from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import record
 from diagrams.drawing.tour import explained
 from diagrams.scenario import Scenario
+from diagrams.tasks.task_drawing import drawing_of
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
 from experiments.results.arrival import arrival_metrics
@@ -335,7 +336,7 @@ def _report(
 ) -> Report:
     """Draw figures if wanted, and write the page that a person opens."""
     prepared, task = run.prepared, run.prepared.station.task
-    pictures = render_figures(measured.log, task.drawing.outline(), task.fit) if drawn else []
+    pictures = render_figures(measured.log, drawing_of(task).outline(), task.fit) if drawn else []
     page = report_page(
         title=run.name,
         description=prepared.settings.description,

@@ -10,9 +10,9 @@ from pydrake.systems.framework import Context
 
 from diagrams.scenario import SimulationParameters
 from diagrams.station import Station
-from diagrams.tasks.space_guidance import SpaceTask
-from diagrams.tasks.streaming import StreamTask
+from diagrams.tasks.streaming import ScenarioStream
 from experiments.results.run_log import RunLog
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from reporting.progress import ProgressListener
 
 # progress and faults are looked at this often [s]; between them nothing interrupts the loop
@@ -152,9 +152,9 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
 
 def _known_from(station: Station, root: Context) -> float:
     """Return the parameter from which on the path is still known, of one whose way points came."""
-    if not isinstance(station.task, StreamTask):
+    if not isinstance(station.task, ScenarioStream):
         return -np.inf
-    return float(station.blocks.output(root, "waypoint_intake.course")[0]) + 1.0
+    return float(station.blocks.output(root, "controller.waypoint_intake.course")[0]) + 1.0
 
 
 def _sensor(station: Station, root: Context) -> Callable[[], object]:
@@ -172,7 +172,7 @@ def _guidance(station: Station, root: Context) -> Callable[[np.ndarray], None]:
     task = station.task
     if not isinstance(task, SpaceTask):
         return lambda y_t: None
-    rest = task.guided.lead.start
+    rest = task.lead.start
     return lambda y_t: station.blocks.set_state(
-        root, "fixture_guidance.lead", np.array(rest(y_t)).ravel()
+        root, "controller.fixture_guidance.lead", np.array(rest(y_t)).ravel()
     )

@@ -12,6 +12,7 @@ from pfsc_drake.control.compliance.impedance_parameters import (
     SlowEnds as SlowEnds,
 )
 from pfsc_drake.control.compliance.pressing import PressParameters as PressParameters
+from pfsc_drake.control.compliance.tuned_impedance import TuningParameters as TuningParameters
 from pfsc_drake.control.estimation.link_deviation import StateUncertainty as StateUncertainty
 from pfsc_drake.control.fixtures.guides import Guide as Guide
 from pfsc_drake.control.fixtures.parameters import (
@@ -51,6 +52,8 @@ from pfsc_drake.control.obstacles.shapes import (
 from pfsc_drake.control.streams.messages import WaypointSender as WaypointSender
 from pfsc_drake.control.streams.parameters import StreamParameters as StreamParameters
 from pfsc_drake.errors import InputError as InputError
+from pfsc_drake.following.controller import Controller as Controller
+from pfsc_drake.following.extension import Extension as Extension
 from pfsc_drake.following.follower import Follower as Follower
 from pfsc_drake.following.guidance import (
     GuidanceOptions as GuidanceOptions,
@@ -94,6 +97,9 @@ from pfsc_drake.following.options.follower import (
 from pfsc_drake.following.options.follower import (
     ObstacleOptions as ObstacleOptions,
 )
+from pfsc_drake.following.options.follower import (
+    OperatorOptions as OperatorOptions,
+)
 from pfsc_drake.following.options.friction import (
     FrictionCompensationParameters as FrictionCompensationParameters,
 )
@@ -105,6 +111,12 @@ from pfsc_drake.following.options.friction import (
 )
 from pfsc_drake.following.options.motion import MotionLimits as MotionLimits
 from pfsc_drake.following.path_following import add_path_following as add_path_following
+from pfsc_drake.following.sensed_force import (
+    Payload as Payload,
+)
+from pfsc_drake.following.sensed_force import (
+    SensedForce as SensedForce,
+)
 from pfsc_drake.following.streaming import add_path_streaming as add_path_streaming
 from pfsc_drake.following.surface_following import add_surface_following as add_surface_following
 from pfsc_drake.geometry import (

@@ -109,9 +109,12 @@ def test_only_what_builds_a_station_knows_a_scenario():
     """Robots, tasks, surroundings and warnings are given their own parameters."""
     builders = {
         "diagrams.builder",
+        "diagrams.controlled_robot",
         "diagrams.holder_station",
         "diagrams.robot_station",
-        "diagrams.station_parts",
+        "diagrams.scenario_task",
+        "diagrams.site",
+        "diagrams.station_options",
         "diagrams.station_warnings",
     }
     scenario = {"diagrams.scenario.Scenario", "diagrams.scenario.schema.Scenario"}

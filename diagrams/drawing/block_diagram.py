@@ -8,7 +8,7 @@ from pydrake.systems.framework import Diagram
 
 def block_diagram_dot(diagram: Diagram) -> str:
     """Return the diagram as graphviz text."""
-    return diagram.GetGraphvizString(max_depth=1)
+    return diagram.GetGraphvizString(max_depth=2)
 
 
 def block_diagram_svg(diagram: Diagram) -> str | None:

@@ -10,8 +10,9 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from diagrams.scenario import RobotParameters
 from diagrams.scenario.model_error import ModelErrorParameters
+from pfsc_drake.control.estimation.link_errors import MotorEncoders
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.law import Believed, Coefficients
+from pfsc_drake.following.believed import Believed, Coefficients
 from pfsc_drake.physics.joint_sensors import EncoderOptions, encoder_resolution
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
@@ -124,10 +125,12 @@ def believed_robot(
         InputError: If the encoders do not suit the robot.
     """
     late = period if encoders.difference_quotient else 0.0
+    links, motors = encoder_resolution(robot.numeric, encoders)
     return Believed(
         robot,
         friction,
-        np.maximum(*encoder_resolution(robot, encoders)),
+        np.maximum(links, motors),
         velocity_delay=late / 2.0,
         filter_time=encoders.filter_time + late,
+        motors=MotorEncoders(motors, encoders.difference_quotient, encoders.filter_time),
     )

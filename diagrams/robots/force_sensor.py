@@ -6,7 +6,6 @@ from diagrams.robots.part import RobotPart, SensorMount
 from diagrams.scenario import SensorFailureParameters, SensorParameters
 from diagrams.scenario.checks import require_whole_ticks
 from pfsc_drake.blocks.wiring_blocks import Hold
-from pfsc_drake.control.compliance.tool_compensation import ToolCompensation
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_torque_sensor import (
     ForceTorqueParameters,
@@ -18,49 +17,6 @@ from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 from pfsc_drake.systems.plants.reactions import JointReaction
 
 _MOST_TICKS = 10_000  # by which a force is late
-
-
-def add_sensor(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    parameters: SensorParameters,
-    failure: SensorFailureParameters,
-    period: float,
-    ports: dict[str, OutputPort],
-) -> dict[str, OutputPort]:
-    """Add a force/torque sensor with taring and compensation of the tool behind it.
-
-    Args:
-        builder: Builder of the diagram.
-        part: The robot.
-        parameters: The sensor.
-        failure: How it fails, if it does.
-        period: Sampling time of the controller [s].
-        ports: ``joint_state`` as measured, ``true_joint_state``, and ``wrench_ext`` if anything
-            acts on the tool.
-
-    Returns:
-        ``wrench_measured`` (at the tool point, world axes), ``tared``, ``sensor_fault``,
-        and ``wrench_sensor``, what the sensor itself tells.
-
-    Raises:
-        InputError: If the sensor does not suit the robot or the sampling time.
-    """
-    mount = part.sensor_mount(builder, parameters.joint, ports)
-    reading = _reading(builder, mount, parameters, failure, period)
-    block = ToolCompensation(
-        part.belief.robot,
-        mount.believed_load,
-        parameters.measurement_range,
-        parameters,
-        period,
-    )
-    compensation = builder.AddNamedSystem("tool_compensation", BlockSystem(block, period))
-    builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
-    builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
-    signals = {"wrench_measured": "wrench", "tared": "tared", "sensor_fault": "fault"}
-    found = {name: compensation.GetOutputPort(port) for name, port in signals.items()}
-    return found | {"wrench_sensor": reading}
 
 
 def add_force_sensor(

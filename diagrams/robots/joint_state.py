@@ -3,21 +3,15 @@
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.robots.part import RobotPart
-from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import SensorFailureParameters
 from diagrams.scenario.checks import require
-from pfsc_drake.control.estimation.link_errors import MotorEncoders
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.law import Coefficients
-from pfsc_drake.following.link_state import FoundLinks, add_links
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.physics.force_torque_sensor import SensorFailure
 from pfsc_drake.physics.joint_sensors import (
     EncoderOptions,
     JointEncoders,
     JointTorqueSensor,
-    encoder_resolution,
 )
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
@@ -80,20 +74,6 @@ def add_joint_state(
     return broken.GetOutputPort("delivered")
 
 
-def states_to_log(joint_state: OutputPort, measured: OutputPort) -> dict[str, OutputPort]:
-    """Return ``joint_state`` for the log, and ``joint_state_measured`` where it is not the truth.
-
-    That is with imperfect encoders, and where a sensor is to fail.
-
-    Args:
-        joint_state: The true one.
-        measured: What the law gets, see :func:`add_joint_state`.
-    """
-    if measured is joint_state:
-        return {"joint_state": measured}
-    return {"joint_state": joint_state, "joint_state_measured": measured}
-
-
 def add_torque_sensor(
     builder: DiagramBuilder,
     robot: RobotModel,
@@ -122,60 +102,23 @@ def add_torque_sensor(
     return sensor.GetOutputPort("joint_torque")
 
 
-def add_link_state(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    controller: ControllerParameters,
-    encoders: EncoderOptions,
-    measured: OutputPort,
-    true_state: OutputPort,
-    start: np.ndarray,
-    friction: Coefficients | None,
-) -> FoundLinks:
-    """Add what finds the links' side of elastic joints where it is not measured.
+def check_sides(
+    believed: RobotModel, controller: ControllerParameters, encoders: EncoderOptions
+) -> None:
+    """Refuse encoders that do not measure what a controller takes.
 
     Args:
-        builder: Builder of the diagram.
-        part: The robot.
-        controller: Says where it has that from.
-        encoders: What is measured.
-        measured: ``[q_J, v_J, q_M, v_M]`` as encoders measure it.
-        true_state: The same as it is.
-        start: Joint coordinates at the start, at rest, shape (N,).
-        friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
+        believed: Nominal model of the robot.
+        controller: The controller.
+        encoders: The encoders.
 
     Raises:
-        InputError: If what the controller wants is not measured.
+        InputError: If so.
     """
-    robot, source, sides = part.belief.robot, controller.state, encoders.sides
-    if robot.is_rigid or (source == "measured" and not controller.law_record.knows_links):
-        return FoundLinks(measured)
-    remote = isinstance(part, RemoteArm)
-    if not remote:  # else the robot knows what it measures
-        require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
-    if source == "measured":
-        return FoundLinks(measured)
-    torque, resolution = None, encoder_resolution(robot.numeric, encoders)[1]
-    if source == "from_torque":
-        torque = _measured_torque(builder, part, encoders, controller.sampling_time, true_state)
-    motors = MotorEncoders(resolution, encoders.difference_quotient, encoders.filter_time)
-    links = add_links(builder, robot, controller, measured, start, friction, torque, motors)
-    if remote:  # that is all that is known of the robot
-        del links.signals["found_joint_state"]
-    return links
-
-
-def _measured_torque(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    encoders: EncoderOptions,
-    period: float,
-    true_state: OutputPort,
-) -> OutputPort:
-    """Return what torque sensors in the joints tell, shape (N,)."""
-    if isinstance(part, RemoteArm):
-        return part.torque.get_output_port()
-    return add_torque_sensor(builder, part.robot, encoders, period, true_state)
+    source, sides = controller.state, encoders.sides
+    if believed.is_rigid or (source == "measured" and not controller.law_record.knows_links):
+        return
+    require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
 
 
 def _wanted(source: str) -> str:

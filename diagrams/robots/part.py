@@ -86,11 +86,6 @@ class RobotPart(ABC):
     def drives(self) -> Drives:
         """What friction acts on."""
 
-    @property
-    def told(self) -> Ports:
-        """What a robot that stands elsewhere tells its controller, by name; of others nothing."""
-        return {}
-
     @abstractmethod
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
         """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""

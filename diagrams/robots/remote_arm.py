@@ -37,19 +37,6 @@ class RemoteArm(Arm):
         """The system in the diagram that stands for it."""
         return self.measured
 
-    @property
-    def told(self) -> Ports:
-        """What comes from outside, by the names that it has in a controller in C."""
-        sources = {
-            "joint_state": self.measured,
-            "joint_torque": self.torque,
-            "stop_request": self.stop_request,
-            "override": self.override,
-        }
-        if self.wrench is not None:
-            sources["measured_wrench"] = self.wrench
-        return {name: source.get_output_port() for name, source in sources.items()}
-
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
         """Return ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,)."""
         return self.measured.get_output_port()

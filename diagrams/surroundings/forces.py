@@ -10,15 +10,14 @@ from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import ForcePulse, HandParameters, HoldBackParameters
 from diagrams.scenario.checks import require
-from diagrams.surroundings.held_reaction import HeldReaction
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_parts import add_hand, add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
-from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows, Sum
 from pfsc_drake.control.manifolds.manifold import Manifold, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.physics.link_forces import LinkForces, LinkHand, LinkHandParameters
 from pfsc_drake.physics.scripted_force import DecoupledForce, ForceProfile, ScriptedForce
 from pfsc_drake.robot.serial.link_places import LinkPlace, place_on_link
@@ -29,7 +28,7 @@ from pfsc_drake.systems.plants.external_forces import LinkPushes
 
 @dataclass(frozen=True)
 class Outside:
-    """What acts on a robot from outside.
+    """Forces on a robot from outside.
 
     Attributes:
         forces: Written down beforehand, on the tool and on links.
@@ -47,159 +46,211 @@ class Outside:
     has_sensor: bool
     period: float
 
+    @property
+    def on_links(self) -> bool:
+        """Whether anything acts on links."""
+        return bool(self.pushes) or any(pulse.link for pulse in self.forces)
 
-def add_surroundings(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    task: Task,
-    outside: Outside,
-    ports: dict[str, OutputPort],
-    start: StartPoint,
-    operator: Operator | None = None,
-    mounting: Mounting | None = None,
-    spring: SurfaceSpring | None = None,
-    manifold: Manifold | None = None,
-    reaction: HeldReaction | None = None,
-) -> dict[str, OutputPort]:
-    """Add forces on the robot, and return their signals for the log.
+    @property
+    def on_tool(self) -> bool:
+        """Whether anything acts on the tool."""
+        pulses = any(not pulse.link for pulse in self.forces)
+        return pulses or self.hold_back.force != 0.0 or self.hand is not None
 
-    Args:
-        builder: Builder of the diagram.
+
+@dataclass(frozen=True)
+class Surroundings:
+    """All that acts on a robot, at its tool and on its links.
+
+    Attributes:
         part: The robot.
-        task: What it is to do.
-        outside: What acts on it.
-        ports: ``joint_state``, the true one, ``manifold_point``.
-        start: Where the tool starts.
-        operator: A person who guides the tool, if there is one.
+        task: Its task.
+        manifold: Manifold of ``manifold_point``.
+        outside: Forces from outside.
+        start: Start of the tool.
+        has_operator: Whether a person guides the tool.
         mounting: Plates that are mounted, if there are any.
         spring: What the tool touches in place of contact in the plant, if it does.
-        manifold: That of ``manifold_point``, if it is not the task's.
-        reaction: What bears the opposite of what acts on the tool, if anything does.
-
-    Returns:
-        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there; if
-        something acts on K links ``push_wrench`` of shape (6K,), ``push_point`` of shape (3K,) and
-        ``push_torque`` of shape (N,); what :func:`add_mounting` returns of plates.
-
-    Raises:
-        InputError: If a force does not suit the robot, or it has no such link.
     """
-    period, joint_state = outside.period, ports["joint_state"]
-    followed = task.manifold if manifold is None else manifold
-    sources = _scripted(builder, part, task, followed, outside, ports)
-    mounts = mounting is not None and mounting.parameters.operator is not None
-    if outside.hand is not None and not mounts:
-        sources.append(add_hand(builder, part.robot, task, outside.hand, period, joint_state))
-    if operator is not None:
-        sources.append(add_live_hand(builder, part.robot, operator, joint_state))
-    pushes, signals = _add_pushes(builder, part, followed, outside, ports)
-    if mounting is not None:
-        wrenches, mounted = add_mounting(
-            builder, mounting, part, task, outside.hand, period, start, joint_state
-        )
-        sources, signals = sources + wrenches, signals | mounted
-    acting: list[OutputPort] = []
-    held: OutputPort | None = None
-    if part.contact is not None:
-        # the law's own pose is what encoders make of it, or that of the motors
-        view = _add_view(builder, part, period, ports["joint_state"])
-        builder.Connect(view.GetOutputPort("tool_pose"), part.contact.GetInputPort("tool_pose"))
-        acting.append(part.contact.GetOutputPort("wrench"))
-    if sources:
-        total = _sum(builder, "wrench", sources, period)
-        # held over a tick, so that it is computed once and not in every stage of the integrator
-        hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
-        builder.Connect(total, hold.GetInputPort("value"))
-        held = hold.GetOutputPort("held")
-        acting.append(held)
-        if reaction is not None:
-            view = _add_view(builder, part, period, ports["joint_state"])
-            reaction.act(builder, total, view.GetOutputPort("tool_pose"))
-    if spring is not None:
-        # what is stiff follows the tool within a tick, too
-        touching = _add_spring(builder, part, spring, period, ports["joint_state"])
-        held = touching if held is None else _sum_in_plant(builder, touching, held)
-        acting = [held]
-    if pushes is not None and isinstance(part, Arm):
-        part.connect_pushes(builder, pushes, held, ports["joint_state"])
-    elif held is not None:
-        part.connect_wrench(builder, held, ports["joint_state"])
-    if acting:
-        signals["wrench_ext"] = _sum(builder, "all_wrenches", acting, period)
-    return signals
 
+    part: RobotPart
+    task: Task
+    manifold: Manifold
+    outside: Outside
+    start: StartPoint
+    has_operator: bool = False
+    mounting: Mounting | None = None
+    spring: SurfaceSpring | None = None
 
-def _add_spring(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    spring: SurfaceSpring,
-    period: float,
-    joint_state: OutputPort,
-) -> OutputPort:
-    """Add what the tool touches, and return its wrench on the tool."""
-    view = _add_view(builder, part, period, joint_state)
-    builder.AddNamedSystem("surface_spring", spring)
-    builder.Connect(view.GetOutputPort("tool_pose"), spring.GetInputPort("tool_pose"))
-    return spring.GetOutputPort("wrench")
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals with forces that there are."""
+        acts = (self.mounting, self.spring, self.part.contact)
+        on_tool = self.has_operator or self.outside.on_tool or any(acts)
+        on_links = self.outside.on_links and isinstance(self.part, Arm)
+        return ("wrench_ext",) * on_tool + ("push_torque",) * on_links
 
+    def add(
+        self,
+        builder: DiagramBuilder,
+        ports: dict[str, OutputPort],
+        operator: Operator | None = None,
+        reaction: BlockSystem | None = None,
+    ) -> dict[str, OutputPort]:
+        """Add all forces, and return their signals.
 
-def _add_view(
-    builder: DiagramBuilder, part: RobotPart, period: float, joint_state: OutputPort
-) -> BlockSystem:
-    """Add what tells where the tool truly is."""
-    view = BlockSystem(ToolKinematics(part.robot), period)
-    builder.AddNamedSystem("contact_view", view)
-    builder.Connect(joint_state, view.GetInputPort("joint_state"))
-    return view
+        Args:
+            builder: Builder of the diagram.
+            ports: ``true_state`` of the joints, and ``manifold_point`` for forces along its axes.
+            operator: The person who guides the tool, if there is one.
+            reaction: Reaction on a robot that holds the workpiece; its inputs are connected.
 
+        Returns:
+            ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there; if
+            something acts on K links ``push_wrench`` of shape (6K,), ``push_point`` of shape (3K,)
+            and ``push_torque`` of shape (N,); of plates those of :func:`add_mounting`.
 
-def _scripted(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    task: Task,
-    followed: Manifold,
-    outside: Outside,
-    ports: dict[str, OutputPort],
-) -> list[OutputPort]:
-    """Add the forces on the tool that are written down beforehand."""
-    period, sources = outside.period, []
-    pulses = [pulse for pulse in outside.forces if not pulse.link]
-    if pulses:
-        operator = _add_script(builder, "operator", pulses, followed, period, ports)
-        sources.append(operator.GetOutputPort("wrench"))
-    pulse = outside.hold_back
-    if pulse.force != 0.0:
-        manifold = task.place
-        allowed = "0 unless six axes follow a path with all of its orientation"
-        square = len(manifold.coordinates) == part.robot.dimension == 6
-        along_path = isinstance(manifold, PathManifold)
-        require(square and along_path, "hold_back.force", pulse.force, allowed)
-        assert isinstance(manifold, PathManifold)
-        shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
-        brake = builder.AddNamedSystem(
-            "hold_back", BlockSystem(DecoupledForce(part.robot, manifold, shape, period), period)
-        )
-        for name in ("joint_state", "manifold_point"):
-            builder.Connect(ports[name], brake.GetInputPort(name))
-        sources.append(brake.GetOutputPort("wrench"))
-    return sources
+        Raises:
+            InputError: If a force does not suit the robot, or it has no such link.
+        """
+        part, outside, period = self.part, self.outside, self.outside.period
+        joint_state, mounting = ports["true_state"], self.mounting
+        sources = self._scripted(builder, ports)
+        mounts = mounting is not None and mounting.parameters.operator is not None
+        if outside.hand is not None and not mounts:
+            sources.append(
+                add_hand(builder, part.robot, self.task, outside.hand, period, joint_state)
+            )
+        if operator is not None:
+            sources.append(add_live_hand(builder, part.robot, operator, joint_state))
+        pushes, signals = self._add_pushes(builder, ports)
+        if mounting is not None:
+            wrenches, mounted = add_mounting(
+                builder, mounting, part, self.task, outside.hand, period, self.start, joint_state
+            )
+            sources, signals = sources + wrenches, signals | mounted
+        acting: list[OutputPort] = []
+        held: OutputPort | None = None
+        if part.contact is not None:
+            # the law's own pose is what encoders make of it, or that of the motors
+            view = self._add_view(builder, joint_state)
+            builder.Connect(view, part.contact.GetInputPort("tool_pose"))
+            acting.append(part.contact.GetOutputPort("wrench"))
+        if sources:
+            total = _sum(builder, "wrench", sources, period)
+            # held over a sample, so that it is computed once and not in every stage of the
+            # integrator
+            hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
+            builder.Connect(total, hold.GetInputPort("value"))
+            held = hold.GetOutputPort("held")
+            acting.append(held)
+            if reaction is not None:
+                builder.Connect(total, reaction.GetInputPort("wrench"))
+                builder.Connect(
+                    self._add_view(builder, joint_state), reaction.GetInputPort("tool_pose")
+                )
+        if self.spring is not None:
+            # what is stiff follows the tool within a sample, too
+            builder.AddNamedSystem("surface_spring", self.spring)
+            pose = self._add_view(builder, joint_state)
+            builder.Connect(pose, self.spring.GetInputPort("tool_pose"))
+            touching = self.spring.GetOutputPort("wrench")
+            held = touching if held is None else _sum_in_plant(builder, touching, held)
+            acting = [held]
+        if pushes is not None and isinstance(part, Arm):
+            part.connect_pushes(builder, pushes, held, joint_state)
+        elif held is not None:
+            part.connect_wrench(builder, held, joint_state)
+        if acting:
+            signals["wrench_ext"] = _sum(builder, "all_wrenches", acting, period)
+        return signals
 
+    def _add_view(self, builder: DiagramBuilder, joint_state: OutputPort) -> OutputPort:
+        """Return the actual pose of the tool."""
+        view = BlockSystem(ToolKinematics(self.part.robot), self.outside.period)
+        builder.AddNamedSystem("contact_view", view)
+        builder.Connect(joint_state, view.GetInputPort("joint_state"))
+        return view.GetOutputPort("tool_pose")
 
-def _add_script(
-    builder: DiagramBuilder,
-    name: str,
-    pulses: list[ForcePulse],
-    followed: Manifold,
-    period: float,
-    ports: dict[str, OutputPort],
-) -> BlockSystem:
-    """Add forces at one point that are written down beforehand."""
-    profile = ForceProfile(pulses)
-    script = BlockSystem(ScriptedForce(profile, followed, period), period)
-    builder.AddNamedSystem(name, script)
-    if profile.needs_manifold:
-        builder.Connect(ports["manifold_point"], script.GetInputPort("manifold_point"))
-    return script
+    def _scripted(self, builder: DiagramBuilder, ports: dict[str, OutputPort]) -> list[OutputPort]:
+        """Add the forces on the tool that are written down beforehand."""
+        outside, period, sources = self.outside, self.outside.period, []
+        pulses = [pulse for pulse in outside.forces if not pulse.link]
+        if pulses:
+            operator = self._add_script(builder, "operator", pulses, ports)
+            sources.append(operator.GetOutputPort("wrench"))
+        pulse = outside.hold_back
+        if pulse.force != 0.0:
+            manifold = self.task.place
+            allowed = "0 unless six axes follow a path with all of its orientation"
+            square = len(manifold.coordinates) == self.part.robot.dimension == 6
+            along_path = isinstance(manifold, PathManifold)
+            require(square and along_path, "hold_back.force", pulse.force, allowed)
+            assert isinstance(manifold, PathManifold)
+            shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
+            block = DecoupledForce(self.part.robot, manifold, shape, period)
+            brake = builder.AddNamedSystem("hold_back", BlockSystem(block, period))
+            builder.Connect(ports["true_state"], brake.GetInputPort("joint_state"))
+            builder.Connect(ports["manifold_point"], brake.GetInputPort("manifold_point"))
+            sources.append(brake.GetOutputPort("wrench"))
+        return sources
+
+    def _add_script(
+        self,
+        builder: DiagramBuilder,
+        name: str,
+        pulses: list[ForcePulse],
+        ports: dict[str, OutputPort],
+    ) -> BlockSystem:
+        """Add forces at one point that are written down beforehand."""
+        profile, period = ForceProfile(pulses), self.outside.period
+        script = BlockSystem(ScriptedForce(profile, self.manifold, period), period)
+        builder.AddNamedSystem(name, script)
+        if profile.needs_manifold:
+            builder.Connect(ports["manifold_point"], script.GetInputPort("manifold_point"))
+        return script
+
+    def _add_pushes(
+        self, builder: DiagramBuilder, ports: dict[str, OutputPort]
+    ) -> tuple[LinkPushes | None, dict[str, OutputPort]]:
+        """Add forces on links, and return what is applied to the plant, if any, and signals."""
+        part, period, found = self.part, self.outside.period, _pushes(self.part, self.outside)
+        if not found or not isinstance(part, Arm):
+            return None, {}
+        system = LinkPushes(part.robot, [push.place for push in found])
+        builder.AddNamedSystem("link_pushes", system)
+        size = len(found)
+        told = LinkForces(part.robot, [(push.place.link, push.place.p_LQ) for push in found])
+        forces = builder.AddNamedSystem("link_forces", BlockSystem(told, period))
+        points = forces.GetOutputPort("points")
+        collect = Collect({f"wrench_{k + 1}": 6 for k in range(size)})
+        wrenches = builder.AddNamedSystem("link_wrenches", BlockSystem(collect, period))
+        # held over a sample, so that bodies and joints bear the same, and the integrator sees no
+        # more
+        hold = builder.AddNamedSystem("push_hold", BlockSystem(Hold(6 * size), period))
+        builder.Connect(wrenches.GetOutputPort("all"), hold.GetInputPort("value"))
+        for bearing in (system, forces):
+            builder.Connect(ports["true_state"], bearing.GetInputPort("joint_state"))
+            builder.Connect(hold.GetOutputPort("held"), bearing.GetInputPort("wrenches"))
+        for k, push in enumerate(found):
+            if push.hand is not None:
+                source = builder.AddNamedSystem(
+                    f"link_hand_{k + 1}", BlockSystem(LinkHand(push.hand, period), period)
+                )
+                own = Rows(3 * size, range(3 * k, 3 * k + 3))
+                point = builder.AddNamedSystem(f"pushed_point_{k + 1}", BlockSystem(own, period))
+                builder.Connect(points, point.GetInputPort("whole"))
+                builder.Connect(point.GetOutputPort("part"), source.GetInputPort("point"))
+            else:
+                source = self._add_script(builder, f"link_script_{k + 1}", push.pulses, ports)
+            builder.Connect(
+                source.GetOutputPort("wrench"), wrenches.GetInputPort(f"wrench_{k + 1}")
+            )
+        return system, {
+            "push_wrench": hold.GetOutputPort("held"),
+            "push_point": points,
+            "push_torque": forces.GetOutputPort("tau_ext"),
+        }
 
 
 def _sum(
@@ -236,52 +287,6 @@ class _Push:
     place: LinkPlace
     pulses: list[ForcePulse]
     hand: LinkHandParameters | None = None
-
-
-def _add_pushes(
-    builder: DiagramBuilder,
-    part: RobotPart,
-    followed: Manifold,
-    outside: Outside,
-    ports: dict[str, OutputPort],
-) -> tuple[LinkPushes | None, dict[str, OutputPort]]:
-    """Add forces on links, and return what is to be applied to the plant, if any, and signals."""
-    period, found = outside.period, _pushes(part, outside)
-    if not found or not isinstance(part, Arm):
-        return None, {}
-    system = LinkPushes(part.robot, [push.place for push in found])
-    builder.AddNamedSystem("link_pushes", system)
-    size = len(found)
-    told = LinkForces(part.robot, [(push.place.link, push.place.p_LQ) for push in found])
-    forces = builder.AddNamedSystem("link_forces", BlockSystem(told, period))
-    points = forces.GetOutputPort("points")
-    collect = Collect({f"wrench_{k + 1}": 6 for k in range(size)})
-    wrenches = builder.AddNamedSystem("link_wrenches", BlockSystem(collect, period))
-    # held over a tick, so that bodies and joints bear the same, and the integrator sees no more
-    hold = builder.AddNamedSystem("push_hold", BlockSystem(Hold(6 * size), period))
-    builder.Connect(wrenches.GetOutputPort("all"), hold.GetInputPort("value"))
-    for bearing in (system, forces):
-        builder.Connect(ports["joint_state"], bearing.GetInputPort("joint_state"))
-        builder.Connect(hold.GetOutputPort("held"), bearing.GetInputPort("wrenches"))
-    for k, push in enumerate(found):
-        if push.hand is not None:
-            source = builder.AddNamedSystem(
-                f"link_hand_{k + 1}", BlockSystem(LinkHand(push.hand, period), period)
-            )
-            own = Rows(3 * size, range(3 * k, 3 * k + 3))
-            point = builder.AddNamedSystem(f"pushed_point_{k + 1}", BlockSystem(own, period))
-            builder.Connect(points, point.GetInputPort("whole"))
-            builder.Connect(point.GetOutputPort("part"), source.GetInputPort("point"))
-        else:
-            source = _add_script(
-                builder, f"link_script_{k + 1}", push.pulses, followed, period, ports
-            )
-        builder.Connect(source.GetOutputPort("wrench"), wrenches.GetInputPort(f"wrench_{k + 1}"))
-    return system, {
-        "push_wrench": hold.GetOutputPort("held"),
-        "push_point": points,
-        "push_torque": forces.GetOutputPort("tau_ext"),
-    }
 
 
 def _pushes(part: RobotPart, outside: Outside) -> list[_Push]:

@@ -9,13 +9,13 @@ from diagrams.scenario import HandParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.surroundings.operator import Operator
-from diagrams.tasks.path_following import PathTask
-from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Linear
 from pfsc_drake.control.teleoperation.parameters import PortLimits
 from pfsc_drake.control.teleoperation.port import SIDES, TeleoperationPort
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.tasks.path_task import PathTask
+from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.leader_clutch import Clutch, TurningClutch
 from pfsc_drake.physics.leader_device import LeaderDevice, LeaderWrist
@@ -45,26 +45,32 @@ class Leading:
     start: StartPoint
     period: float
 
-    def limits(
-        self, side: str, force: tuple[float, float], moment: tuple[float, float]
-    ) -> PortLimits:
-        """Return what a port may count on.
 
-        Args:
-            side: ``leader`` or ``follower``, whose robot is a tick late.
-            force: The largest, and the largest speed [N, m/s].
-            moment: The largest, and the largest angular velocity [Nm, rad/s].
+def port_limits(
+    parameters: TeleoperationParameters,
+    side: str,
+    force: tuple[float, float],
+    moment: tuple[float, float],
+    period: float,
+) -> PortLimits:
+    """Return the limits of a port.
 
-        Raises:
-            InputError: If the tank could not pay the forces of a tick or two.
-        """
-        way, turns = self.parameters, self.parameters.rotation is not None
-        late = SIDES.index(side)
-        limits = PortLimits(*force, late, self.period, *(moment if turns else (0.0, 0.0)))
-        initial, least = way.tank.initial, limits.reserve
-        allowed = f"above {least:g} J, what the {side}'s forces take within a tick or two"
-        require(initial > least, "teleoperation.tank.initial", initial, allowed)
-        return limits
+    Args:
+        parameters: The teleoperation.
+        side: ``leader`` or ``follower``, whose robot is a sample late.
+        force: The largest, and the largest speed [N, m/s].
+        moment: The largest, and the largest angular velocity [Nm, rad/s].
+        period: Sampling time [s].
+
+    Raises:
+        InputError: If the tank could not pay the forces of a sample or two.
+    """
+    turns, late = parameters.rotation is not None, SIDES.index(side)
+    limits = PortLimits(*force, late, period, *(moment if turns else (0.0, 0.0)))
+    initial, least = parameters.tank.initial, limits.reserve
+    allowed = f"above {least:g} J, what the {side}'s forces take within a tick or two"
+    require(initial > least, "teleoperation.tank.initial", initial, allowed)
+    return limits
 
 
 @dataclass(frozen=True)
@@ -105,7 +111,7 @@ def add_leader(builder: DiagramBuilder, leading: Leading) -> Leader:
             wrist.torque_limit / parameters.moment_scale,
             wrist.largest_speed * rotation.scale,
         )
-    limits = leading.limits("leader", force, moment)
+    limits = port_limits(parameters, "leader", force, moment, period)
 
     def add(name: str, block: Block) -> BlockSystem:
         return builder.AddNamedSystem(name, BlockSystem(block, period))
@@ -193,7 +199,7 @@ def _add_hand(builder: DiagramBuilder, leading: Leading) -> BlockSystem:
         builder.Connect(operator.pull, held.GetInputPort("asked"))
         return held
     assert hand is not None
-    target, is_open = task.target(), isinstance(task, PathTask) and not task.path.closed
+    target, is_open = task.target, isinstance(task, PathTask) and not task.path.closed
     if hand.frame == "manifold":
         for i, (eta, *beside) in enumerate(hand.places()[1].tolist()):
             # a hand that presses the tool on at an end of its path is beyond it

@@ -28,9 +28,9 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.plate import CarrierParameters, PlateContactParameters, PlateParameters
-from diagrams.tasks.path_following import PathTask
-from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.tasks.path_task import PathTask
+from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.geometry import quaternion_to_matrix
 from pfsc_drake.geometry.workpieces import bore_wedges
 from pfsc_drake.systems.plants.external_forces import PartnerForces

@@ -10,10 +10,10 @@ from pydrake.trajectories import PiecewisePolynomial
 from diagrams.robots.part import RobotPart
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import Mounting, add_plate_plant, tool_transform
-from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.control.compliance.measured_wrench import PayloadCompensation
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.sensed_force import Payload
+from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_hand import MountingHand
@@ -84,7 +84,7 @@ def connect_hand(
         for i, place in enumerate(parameters.places()[1]):
             task.check_place(place, f"hand.waypoints[{i}].position")
     try:
-        block = make(parameters, period, task.target())
+        block = make(parameters, period, task.target)
     except InputError as error:
         raise InputError(f"hand.{error}") from None
     hand = builder.AddNamedSystem("operator_hand", BlockSystem(block, period))
@@ -193,35 +193,12 @@ def _add_operator(
     return connect_hand(builder, robot, task, parameters, period, joint_state, make)
 
 
-def add_payload(
-    builder: DiagramBuilder,
-    mounting: Mounting,
-    gravity: np.ndarray,
-    period: float,
-    ports: dict[str, OutputPort],
-) -> dict[str, OutputPort]:
-    """Take the plate's weight off what the force/torque sensor measures while it is held.
+def payload_of(mounting: Mounting, gravity: np.ndarray) -> Payload:
+    """Return the compensation of a plate behind a force/torque sensor while it is held.
 
     Args:
-        builder: Builder of the diagram.
         mounting: The plates.
         gravity: [m/s^2], world axes, shape (3,).
-        period: Sampling time [s].
-        ports: ``wrench_measured``, ``tared``, ``sensor_fault``, ``tool_pose`` as measured, and
-            ``held``.
-
-    Returns:
-        ``wrench_measured`` without the payload, and ``sensor_fault``, also of what is held.
     """
     plate = mounting.parameters
-    center = np.array([0.0, 0.0, plate.size[2] / 2.0])
-    load = PayloadCompensation(plate.believed_mass, center, gravity)
-    system = builder.AddNamedSystem("payload_compensation", BlockSystem(load, period))
-    inputs = {
-        "wrench": "wrench_measured", "tool_pose": "tool_pose", "held": "held", "tared": "tared",
-        "sensor_fault": "sensor_fault",
-    }  # fmt: skip
-    for name, signal in inputs.items():
-        builder.Connect(ports[signal], system.GetInputPort(name))
-    outputs = {"wrench_measured": "payload_free", "sensor_fault": "fault"}
-    return {name: system.GetOutputPort(port) for name, port in outputs.items()}
+    return Payload(plate.believed_mass, np.array([0.0, 0.0, plate.size[2] / 2.0]), gravity)

@@ -61,14 +61,12 @@ _DRAWN = 2
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnFixture(Fixture):
-    """A region that a tool may not enter, with a name and a look.
+    """A region that a tool may not enter, with its drawing.
 
     Attributes:
-        name: Kind of its shape and its number, from 1 on.
         surfaces: What of its boundary is drawn, where it is at rest.
     """
 
-    name: str
     surfaces: Sequence[Surface]
 
 

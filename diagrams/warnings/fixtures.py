@@ -7,17 +7,17 @@ from diagrams.scenario.fixtures import FixtureParameters
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.parameters import bearable_stiffness
-from pfsc_drake.following.task import Guided
+from pfsc_drake.following.tasks.space_task import SpaceTask
 
 
-def stiff_fixtures(fixtures: FixtureParameters, guided: Guided) -> list[str]:
+def stiff_fixtures(fixtures: FixtureParameters, task: SpaceTask) -> list[str]:
     """Return which soft regions and guides may ring behind servos, one sentence each.
 
     Args:
         fixtures: What the regions and guides are.
-        guided: All that the tool is led through.
+        task: Task of the tool.
     """
-    motion, lead = guided.motion, guided.lead
+    motion, lead = task.admittance, task.lead
     if not isinstance(lead, ServoLead):
         return []
     lag = lead.lag

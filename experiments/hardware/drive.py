@@ -8,7 +8,6 @@ from pydrake.systems.framework import Context
 
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
-from diagrams.tasks.space_guidance import SpaceTask
 from experiments.hardware.bridge import state_between
 from experiments.hardware.check import AT_REST, check_first
 from experiments.hardware.drive_options import (
@@ -30,6 +29,7 @@ from experiments.simulation import SimulationResult
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.physics.driver import torque_rates
 from pfsc_drake.robot.robot_model import gravity_function
 

@@ -15,7 +15,7 @@ TWICE, FASTEST, LEAST_JUMP = 2.0, 10.0, 2e-3
 # ticks that are missing for longer are none of a robot's: its clock was set [s]
 LARGEST_GAP = 1.0
 # where the reference remembers its own time and its pace
-PACE = "reference_generator.pace"
+PACE = "controller.reference_generator.pace"
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from diagrams.scenario_task import make_task
 from pydrake.lcm import DrakeLcmInterface
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -11,7 +12,6 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.signal_log import add_log
-from diagrams.station_parts import make_task
 from diagrams.surroundings.channel_end import ChannelEnd
 from diagrams.surroundings.leader import Leading, add_leader
 from experiments.finished_run import steady_clock

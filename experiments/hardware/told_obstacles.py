@@ -20,10 +20,11 @@ class ToldObstacles:
 
     def __init__(self, station: Station) -> None:
         self._source, self._latency, self._until = None, 0.0, -np.inf
-        if station.waiting is not None:
+        crossing = station.crossing
+        if crossing is not None:
             self._source = station.diagram.GetSubsystemByName(TOLD)
-            self._latency = station.waiting.crossing.watch.latency
-            self._nothing = np.full(6 * len(station.waiting.crossing.moving), np.nan)
+            self._latency = crossing.watch.latency
+            self._nothing = np.full(6 * len(crossing.moving), np.nan)
             self._values = self._nothing
 
     def hear(self, request: Request, time: float) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from diagrams.station import Station
 from diagrams.tasks.arrivals import END, NEW_PATH, WAY_POINT, Event, drawn_text, tell
 from diagrams.tasks.drawn_plane import plane_axes
-from diagrams.tasks.streaming import StreamTask
+from diagrams.tasks.streaming import ScenarioStream
 from pfsc_drake.control.streams.course import POSITION
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
 
@@ -21,7 +21,7 @@ class Pen:
         task: What is drawn.
     """
 
-    def __init__(self, task: StreamTask) -> None:
+    def __init__(self, task: ScenarioStream) -> None:
         assert task.plane is not None
         self._task, self._plane = task, task.plane
         self._axes, self._origin = plane_axes(task.plane), np.array(task.plane.origin)
@@ -35,7 +35,7 @@ class Pen:
             station: The station.
         """
         task = station.task
-        return cls(task) if isinstance(task, StreamTask) and task.plane is not None else None
+        return cls(task) if isinstance(task, ScenarioStream) and task.plane is not None else None
 
     def restart(self) -> None:
         """Begin with an empty plane."""

@@ -78,7 +78,7 @@ class LiveSimulation:
         Args:
             pen: What makes way points of it.
         """
-        taken = self._station.blocks.output(self.root, "waypoint_intake.stream")[1]
+        taken = self._station.blocks.output(self.root, "controller.waypoint_intake.stream")[1]
         self._station.tell_way_points(self.root, pen.message(self.tick, int(taken)))
 
     def step(self) -> None:

@@ -6,13 +6,13 @@ import numpy as np
 
 from diagrams.live_view import felt_force
 from diagrams.station import Station
-from diagrams.tasks.space_guidance import SpaceTask
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import singular_posture, singularity_name
 

@@ -7,9 +7,9 @@ Signals used, as in the log: ``eta``, ``eta_p`` [samples, k] m, ``time_lost`` [s
 import numpy as np
 
 from diagrams.scenario import Scenario
-from diagrams.tasks.task import Task
 from experiments.results.path import tangential_error
 from experiments.results.run_log import RunLog
+from pfsc_drake.following.tasks.task import Task
 from reporting.metrics import Metrics
 
 # m, that a tool which has arrived may be short of its goal
@@ -33,7 +33,7 @@ def arrival_metrics(log: RunLog, task: Task, settings: Scenario) -> Metrics:
         task: Its task.
         settings: Its scenario.
     """
-    metrics, end = Metrics(), task.motion.domain[1]
+    metrics, end = Metrics(), task.end
     if "eta" not in log or "eta_p" not in log or "way_left" in log or not log.time.size:
         return metrics
     length = _distance(task, 0.0)
@@ -58,6 +58,8 @@ def arrival_metrics(log: RunLog, task: Task, settings: Scenario) -> Metrics:
 
 def _distance(task: Task, begin: float) -> float:
     """Return the distance that a motion travels from a time [s] on [m]."""
-    times = np.linspace(max(begin, task.motion.domain[0]), task.motion.domain[1], _SAMPLES)
-    places = task.motion.derivatives(times, 0)[:, 0]
+    motion = task.motion
+    assert motion is not None  # of a station's task
+    times = np.linspace(max(begin, motion.domain[0]), motion.domain[1], _SAMPLES)
+    places = motion.derivatives(times, 0)[:, 0]
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())

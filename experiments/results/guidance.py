@@ -5,12 +5,12 @@ from numpy.typing import NDArray
 
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.guides import add_guides
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord, Mode
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from reporting.metrics import Metrics
 
 # name in the log of what the record has
@@ -59,7 +59,7 @@ def add_guidance(
     log.add("near_regions", rows["near"], labels=slots)
     for name in ("labels", "evaluated", "on"):
         log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), labels=names)
-    distances = task.distances(y_t, region_times(log, task.guided.lead.lag))
+    distances = task.distances(y_t, region_times(log, task.lead.lag))
     distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
     log.add("region_distance", distances, labels=names)
     kinds, forces = limit_forces(rows["near"], len(names), station.robot.dimension)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.guides import GuideRecord
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from reporting.metrics import Metrics
 
 # name in the log of what the record has

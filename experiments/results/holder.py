@@ -25,9 +25,10 @@ def workpiece_motion(station: Station, raw: dict[str, np.ndarray]) -> FloatArray
         (samples, 12 (r + 1)); None of a station where nothing carries one.
     """
     holder, turntable = station.holder, station.turntable
+    order = station.task.manifold.layout.order
     if turntable is not None:
         angles = raw[f"{TURNTABLE}motion"]
-        motion = np.zeros((len(angles), frame_size(turntable.frame.order)))
+        motion = np.zeros((len(angles), frame_size(order)))
         if len(angles):
             mapped = turntable.motion.map(len(angles))
             motion[:, : 2 * POSE_SIZE] = np.array(mapped(angles.T)).T
@@ -35,7 +36,7 @@ def workpiece_motion(station: Station, raw: dict[str, np.ndarray]) -> FloatArray
     if holder is None:
         return None
     state = raw[f"{HOLDER}joint_state"]
-    motion = np.zeros((len(state), frame_size(holder.frame.order)))
+    motion = np.zeros((len(state), frame_size(order)))
     if len(state):
         moving = state[:, : 2 * holder.part.robot.dimension]
         function = flange_motion_function(holder.part.robot, 1).map(len(state))

@@ -23,9 +23,9 @@ def add_obstacles(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> 
         station: The station that was simulated.
         raw: Its logged signals.
     """
-    if station.waiting is None:
+    crossing = station.crossing
+    if crossing is None:
         return
-    crossing = station.waiting.crossing
     count = len(crossing.moving)
     labels = [f"obstacle_{k + 1} {axis}" for k in range(count) for axis in "xyz"]
     for name, source in (("position", "obstacles"), ("measured", "obstacles_measured")):

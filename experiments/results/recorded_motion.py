@@ -13,10 +13,10 @@ from diagrams.drawing.recorded import (
 )
 from diagrams.holder_station import HOLDER
 from diagrams.station import Station
-from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.guidance import region_times
 from experiments.results.mounting import mounting_phases
 from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.following.tasks.space_task import SpaceTask
 
 # of the tool's way over what it presses on, where it would be hidden [m]
 _LIFT = 3e-3
@@ -89,9 +89,9 @@ def _holder(
 
 def _obstacles(station: Station, log: RunLog, frames: NDArray[np.int_]) -> RecordedObstacles | None:
     """Return what moves across the path, if anything does."""
-    if station.waiting is None:
+    crossing = station.crossing
+    if crossing is None:
         return None
-    crossing = station.waiting.crossing
     shapes = [obstacle.shape for obstacle in crossing.moving]
     positions = np.nan_to_num(log["obstacle_position"].values[frames], nan=_OUT_OF_SIGHT)
     return RecordedObstacles(positions, shapes, crossing.watch.margin)
@@ -100,7 +100,7 @@ def _obstacles(station: Station, log: RunLog, frames: NDArray[np.int_]) -> Recor
 def _region_times(station: Station, log: RunLog, frames: NDArray[np.int_]) -> FloatArray | None:
     """Return the clock of moving regions that the tool meets, if there is one, shape (frames,)."""
     task = station.task
-    return region_times(log, task.guided.lead.lag)[frames] if isinstance(task, SpaceTask) else None
+    return region_times(log, task.lead.lag)[frames] if isinstance(task, SpaceTask) else None
 
 
 def _lifted(station: Station, y_t: FloatArray, points: FloatArray) -> FloatArray | None:

@@ -9,13 +9,12 @@ from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
 import numpy as np
+from diagrams.scenario_task import make_task
 from matplotlib.figure import Figure as Canvas
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.station_parts import make_task
-from diagrams.station_start import find_rest
 from experiments.scenario_file import find_scenario, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
@@ -226,8 +225,7 @@ def _built(scenario: str, *overrides: str) -> tuple[Scenario, Station]:
 def _planner(settings: Scenario, station: Station, folder: Path) -> FastestPlanner:
     """Return what plans the motion of a station anew."""
     task = make_task(settings, folder)
-    rest = find_rest(task, station.part, station.start, station.initial_state)
-    start = CourseStart(rest.q_J, station.start.place)
+    start = CourseStart(station.start_posture, station.start.place)
     return FastestPlanner(settings.reference, settings.controller, task, station.law, start, None)
 
 

@@ -120,6 +120,38 @@ class Network:
             initials,
         )
 
+    def restricted(self, outputs: Collection[str]) -> "Network":
+        """Return what is needed for some of the outputs, in their order.
+
+        Args:
+            outputs: Names of the outputs.
+        """
+        made: dict[Source, set[Source]] = {}
+        for kind, nodes in (("wire", self.nodes), ("state", (*self.updates, *self.initials))):
+            for node in nodes:
+                for name in node.results:
+                    made.setdefault(Source(kind, name), set()).update(node.sources)
+        found = needed = {Source("wire", self.outputs[name]) for name in outputs}
+        while needed:
+            needed = set().union(*(made.get(source, ()) for source in needed)) - found
+            found = found | needed
+
+        def kept(nodes: tuple[Node, ...], kind: str) -> tuple[Node, ...]:
+            return tuple(n for n in nodes if any(Source(kind, name) in found for name in n.results))
+
+        nodes = kept(self.nodes, "wire")
+        wires = {name for node in nodes for name in node.results}
+        return Network(
+            {name: p for name, p in self.inputs.items() if Source("input", name) in found},
+            {name: self.outputs[name] for name in outputs},
+            {name: self.units.get(name, "") for name in outputs},
+            {name: n for name, n in self.states.items() if Source("state", name) in found},
+            {name: n for name, n in self.wires.items() if name in wires},
+            nodes,
+            kept(self.updates, "state"),
+            kept(self.initials, "state"),
+        )
+
     @cached_property
     def shown(self) -> dict[str, str]:
         """Outputs at the border that are a state as it is, zero at the start, by port."""

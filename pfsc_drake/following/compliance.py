@@ -27,7 +27,7 @@ from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.task import Task
+from pfsc_drake.following.tasks.task import Task
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 
@@ -92,24 +92,20 @@ def add_compliance(
     robot: RobotModel,
     task: Task,
     posture: np.ndarray,
-    tuning: TuningParameters,
     ports: dict[str, OutputPort],
-    period: float,
 ) -> dict[str, OutputPort]:
     """Add everything between the measured forces on the tool and the reference of the law.
 
     Args:
         builder: Builder of the diagram.
-        options: How the tool complies, and whether its motion ends.
+        options: How the tool complies, whether its motion ends, and an operator's settings.
         linearization: Linearization of the law that follows the reference.
         robot: The robot as it is believed, N joints.
         task: Task of the tool without forces.
         posture: Joint coordinates at the start, shape (N,) [rad or m].
-        tuning: Response of the impedance to an operator's settings.
         ports: Those of :func:`force_ports`, and ``joint_state``, ``manifold_point``,
             ``manifold_state`` and ``desired_reference`` with derivatives up to
             :func:`reference_order`; with an operator ``impedance_request``.
-        period: Sampling time [s].
 
     Returns:
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
@@ -122,6 +118,7 @@ def add_compliance(
         InputError: If the compliance does not suit the law.
     """
     manifold, compliance = linearization.manifold, options.compliance
+    period = options.controller.sampling_time
     impedance_parameters = compliance.impedance()
     if manifold.name == SpaceManifold.name:
         # guidance leads along, see add_guidance
@@ -159,8 +156,9 @@ def add_compliance(
     if limits is not None:
         signals["limit_force"] = _add_limits(builder, limits, impedance, ports)
     # where guidance leads along, the impedance is the one given
-    if "impedance_request" in ports and manifold.name != SpaceManifold.name:
-        signals |= _add_tuner(builder, tuning, manifold.coordinates, law, impedance, ports)
+    operator = options.operator
+    if operator is not None and manifold.name != SpaceManifold.name:
+        signals |= _add_tuner(builder, operator.tuning, manifold.coordinates, law, impedance, ports)
     elif not law.is_constant:
         signals["damping"] = impedance.GetOutputPort("damping")
     return signals | {

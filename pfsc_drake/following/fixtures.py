@@ -21,7 +21,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.compliance import force_ports
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.follower import FixtureOptions
-from pfsc_drake.following.task import Guided
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.near_regions import NearRegions
@@ -68,7 +68,7 @@ def make_lead(
 
 def add_fixture_guidance(
     builder: DiagramBuilder,
-    guided: Guided,
+    task: SpaceTask,
     compliance: ComplianceParameters,
     robot: RobotModel,
     order: int,
@@ -79,7 +79,7 @@ def add_fixture_guidance(
 
     Args:
         builder: Builder of the diagram.
-        guided: What it is led through.
+        task: Task of the tool.
         compliance: Where the forces that lead it come from.
         robot: The robot as it is believed.
         order: Highest derivative of the reference that is needed.
@@ -90,11 +90,11 @@ def add_fixture_guidance(
     Raises:
         InputError: If the rules do not suit the law.
     """
-    period, count = guided.motion.period, len(guided.fixtures)
-    guidance = make_guidance(guided, robot, order, start)
+    period, count = task.admittance.period, len(task.fixtures)
+    guidance = make_guidance(task, robot, order, start)
     system = builder.AddNamedSystem("fixture_guidance", BlockSystem(guidance, period))
     if guidance.tool.near is None:
-        regions = NearRegions(scheduled_regions(guided), count, period)
+        regions = NearRegions(scheduled_regions(task), count, period)
         near = builder.AddNamedSystem("near_regions", regions)
         builder.Connect(system.GetOutputPort("place"), near.GetInputPort("place"))
         builder.Connect(near.GetOutputPort("near"), system.GetInputPort("near"))
@@ -120,12 +120,12 @@ def add_fixture_guidance(
 
 
 def make_guidance(
-    guided: Guided, robot: RobotModel, order: int, start: np.ndarray
+    task: SpaceTask, robot: RobotModel, order: int, start: np.ndarray
 ) -> FixtureGuidance:
     """Return the rules that lead a tool.
 
     Args:
-        guided: What it is led through.
+        task: Task of the tool.
         robot: The robot as it is believed.
         order: Highest derivative of the reference that is needed.
         start: Joint coordinates at the start, shape (N,).
@@ -133,19 +133,19 @@ def make_guidance(
     Raises:
         InputError: If the rules do not suit the law.
     """
-    parameters = guided.options.guidance
+    parameters = task.options.guidance
     tool = LedTool(
         tool_motion_function(robot),
-        guided.lead,
-        guided.motion,
-        len(guided.fixtures),
-        near_expression(guided),
+        task.lead,
+        task.admittance,
+        len(task.fixtures),
+        near_expression(task),
         order,
-        len(guided.place.coordinates),
-        GuidePaths(guided.guides, guided.motion.period) if guided.guides else None,
+        len(task.place.coordinates),
+        GuidePaths([*task.guides.values()], task.admittance.period) if task.guides else None,
     )
     if parameters.rules == "printed":
-        if not isinstance(guided.lead, ServoLead):
+        if not isinstance(task.lead, ServoLead):
             raise InputError(
                 "fixtures.guidance.rules = printed: controller.law must be velocity_servo, as in "
                 "Sec. 5.2.4"
@@ -156,13 +156,13 @@ def make_guidance(
                 "program, which alone knows of paths that attract"
             )
         return PrintedGuidance(tool, parameters.printed)
-    stiffness = [fixture.stiffness for fixture in guided.fixtures]
-    return ProgramGuidance(tool, parameters, stiffness, _robot_limits(guided, robot, start))
+    stiffness = [fixture.stiffness for fixture in task.fixtures]
+    return ProgramGuidance(tool, parameters, stiffness, _robot_limits(task, robot, start))
 
 
-def _robot_limits(guided: Guided, robot: RobotModel, start: np.ndarray) -> RobotLimits | None:
+def _robot_limits(task: SpaceTask, robot: RobotModel, start: np.ndarray) -> RobotLimits | None:
     """Return what of the robot limits the hand, if anything is to."""
-    options, place = guided.options, guided.place
+    options, place = task.options, task.place
     if not options.limits.on:
         return None
     return RobotLimits(
@@ -172,39 +172,39 @@ def _robot_limits(guided: Guided, robot: RobotModel, start: np.ndarray) -> Robot
         oriented=place.is_oriented,
         tool_axis=place.tool.tool_axis,
         yaw_axis=place.tool.yaw_axis,
-        fastest=options.guidance.largest_speed + max(guided.speeds, default=0.0),
+        fastest=options.guidance.largest_speed + max(task.speeds, default=0.0),
     )
 
 
-def near_expression(guided: Guided) -> ca.Function | None:
+def near_expression(task: SpaceTask) -> ca.Function | None:
     """Return what is near as an expression; None where that takes a schedule of distances.
 
     Many regions do, those whose distances are bounded in number, and what has no formula.
 
     Args:
-        guided: What the tool is led through.
+        task: Task of the tool.
     """
-    options = guided.options
-    if len(guided.fixtures) > MOST_NEAR or options.looks:
+    options = task.options
+    if len(task.fixtures) > MOST_NEAR or options.looks:
         return None
-    within = reaches(options.guidance, guided.motion.period, guided.speeds)
+    within = reaches(options.guidance, task.admittance.period, task.speeds)
     try:
-        return near_rows([fixture.region for fixture in guided.fixtures], within)
+        return near_rows([fixture.region for fixture in task.fixtures], within)
     except InputError:  # a fitted surface of many pieces
         return None
 
 
-def scheduled_regions(guided: Guided) -> ScheduledRegions:
+def scheduled_regions(task: SpaceTask) -> ScheduledRegions:
     """Return the schedule of many distances.
 
     Args:
-        guided: What the tool is led through.
+        task: Task of the tool.
     """
-    options = guided.options
+    options = task.options
     return ScheduledRegions(
-        [fixture.region for fixture in guided.fixtures],
+        [fixture.region for fixture in task.fixtures],
         options.guidance,
-        guided.motion.period,
-        speeds=guided.speeds,
+        task.admittance.period,
+        speeds=task.speeds,
         looks=options.looks or None,
     )

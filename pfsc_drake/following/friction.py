@@ -17,7 +17,7 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.rest_hold import RestHold
 from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.law import Believed, Coefficients
+from pfsc_drake.following.believed import Believed, Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.systems.block_system import BlockSystem

@@ -14,19 +14,17 @@ from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedan
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.parameters import Fixture
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
-from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.fixtures import free_motion, make_lead
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ExternalTorqueParameters
 from pfsc_drake.following.options.follower import FixtureOptions, FollowerOptions
-from pfsc_drake.following.task import Followed, Guided
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.geometry import matrix_to_quaternion
 from pfsc_drake.geometry.regions.checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.geometry.regions.region import Region
-from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 # 1/s; slower ones let a hand's changes of force push the tool by tenths of a millimetre
@@ -117,11 +115,10 @@ def add_guidance(
         require_not_negative(key, getattr(chosen, key))
     fixtures = [region if isinstance(region, Fixture) else Fixture(region) for region in regions]
 
-    def followed(robot: RobotModel, near: np.ndarray, relative_degree: int) -> Followed:
+    def task(robot: RobotModel, near: np.ndarray, relative_degree: int) -> SpaceTask:
         y_t, R_e = _pose(robot, start, near)
         _check_start(fixtures, y_t)
         quaternion = matrix_to_quaternion(R_e) if oriented else None
-        place = SpaceManifold(relative_degree, quaternion)
         lead = make_lead(
             relative_degree,
             chosen.fixtures,
@@ -129,14 +126,11 @@ def add_guidance(
             lag=chosen.servo_lag,
             delay=chosen.servo_delay,
         )
-        speeds = [fixture.largest_speed(y_t) for fixture in fixtures]
-        guided = Guided(place, fixtures, speeds, motion, lead, chosen.fixtures, guides)
-        target = ToolTarget(y_t, R_e if oriented else None)
-        return Followed(
-            place, place, Projector(place), None, target, place.point(y_t.tolist()), guided=guided
-        )
+        place = SpaceManifold(relative_degree, quaternion)
+        named = {f"guides[{number}]": guide for number, guide in enumerate(guides)}
+        return SpaceTask(place, y_t, fixtures, motion, lead, chosen.fixtures, named)
 
-    follower = Follower(plant, tool, law, followed, chosen)
+    follower = Follower(plant, tool, law, task, chosen)
     builder.AddSystem(follower)
     return follower
 

@@ -2,7 +2,6 @@
 
 import dataclasses as dc
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from pfsc_drake.control.law.stabilization import (
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.options.controller import ControllerParameters, GainParameters, LawGains
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.posture import make_posture
@@ -204,30 +204,6 @@ def choose_poles(
     for gains in automatic.values():
         poles = rule_of_poles(gains.bandwidth, fast, r)
         gains.poles = [float(f"{pole:.{_DIGITS}g}") for pole in poles]
-
-
-# f_c [Nm or N] and f_v [Nm s/rad or N s/m], each (N,)
-Coefficients = tuple[np.ndarray, np.ndarray]
-
-
-@dataclass(frozen=True)
-class Believed:
-    """A robot as its controller knows it, and how well its motion is measured.
-
-    Attributes:
-        robot: The robot, N joints.
-        friction: Coefficients f_c and f_v, if any are known.
-        resolution: Resolution of the measured positions, shape (N,) [rad or m], or one for all.
-        velocity_delay: How old measured velocities are [s]; a difference quotient is that of
-            mid-interval.
-        filter_time: By how much measured velocities are smoothed besides [s].
-    """
-
-    robot: RobotModel
-    friction: Coefficients | None = None
-    resolution: np.ndarray | float = 0.0
-    velocity_delay: float = 0.0
-    filter_time: float = 0.0
 
 
 # s; a start beside the path takes a drive to its limit for some hundredths

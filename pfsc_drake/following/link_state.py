@@ -15,7 +15,7 @@ from pfsc_drake.control.estimation.link_errors import (
 )
 from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
 from pfsc_drake.control.estimation.robot_state import LinkState
-from pfsc_drake.following.law import Coefficients
+from pfsc_drake.following.believed import Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_system import BlockSystem

@@ -6,7 +6,7 @@ from pfsc_drake.blocks.wiring_blocks import Constant, Rows
 from pfsc_drake.control.estimation.external_forces import ExternalTorque, ToolWrench
 from pfsc_drake.control.estimation.momentum import MomentumObserver, link_momentum
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.law import Believed
+from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.options.compliance import ObservedForceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.robot.robot_model import RobotModel

@@ -5,20 +5,12 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.control.law.reference import rest_to_rest
-from pfsc_drake.control.manifolds.manifold import Projector
-from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint
-from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.task import Followed
-from pfsc_drake.geometry import (
-    Path,
-    PiecewisePolynomialCurve,
-    quaternion_to_matrix,
-    shape_report,
-)
+from pfsc_drake.following.tasks.path_task import PathTask
+from pfsc_drake.geometry import Path, PiecewisePolynomialCurve
 from pfsc_drake.geometry.paths.path_warnings import path_warnings
-from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 
 _VELOCITY, _ACCELERATION = 0.1, 0.5  # m/s, m/s^2
@@ -69,44 +61,12 @@ def add_path_following(
         [0.0, path.length], velocity=_VELOCITY, acceleration=_ACCELERATION
     )
 
-    def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
-        oriented = path.orientation is not None
+    def task(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> PathTask:
         tracks = chosen.controller.manifold == MovingPoint.name
+        made = PathTask(path, along, relative_degree, tracks=tracks)
+        made.warnings += path_warnings(path, made.shape, "path_from_waypoints: ")
+        return made
 
-        def made(kind: type[PathManifold]) -> PathManifold:
-            return kind(
-                relative_degree,
-                oriented=oriented,
-                turning=path.frame.turns,
-                length=None if path.closed else path.length,
-            )
-
-        place = made(PathManifold)
-        manifold = made(MovingPoint) if tracks else place
-        evaluator = path.evaluator(relative_degree)
-        eta = float(along.derivatives(np.array([along.domain[0]]), 0)[0, 0, 0])
-        point = evaluator.evaluate_at(path.arc_length.parameter(eta))
-        R_e = None
-        if oriented:
-            R_e = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
-        start, shape = ToolTarget(point[manifold.layout.position][:3], R_e), shape_report(path)
-        return Followed(
-            manifold,
-            place,
-            Projector(evaluator),
-            along,
-            start,
-            point,
-            path_length=path.length,
-            closed=path.closed,
-            projection=lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
-            prescribed_point=TrajectoryPoint(path, relative_degree, len(manifold.coordinates))
-            if tracks
-            else None,
-            shape=shape,
-            warnings=path_warnings(path, shape, "path_from_waypoints: "),
-        )
-
-    follower = Follower(plant, tool, law, followed, chosen)
+    follower = Follower(plant, tool, law, task, chosen)
     builder.AddSystem(follower)
     return follower

@@ -6,7 +6,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.estimation.robot_state import StatePredictor
 from pfsc_drake.errors import require
-from pfsc_drake.following.law import Believed, ticks_of
+from pfsc_drake.following.believed import Believed
+from pfsc_drake.following.law import ticks_of
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController

@@ -5,12 +5,11 @@ from numpy.typing import ArrayLike
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.streams.parameters import StreamParameters
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.streamed_path import StreamedPath
-from pfsc_drake.following.task import Followed
+from pfsc_drake.following.tasks.stream_task import StreamTask
+from pfsc_drake.following.tasks.streamed_path import StreamedPath
 from pfsc_drake.robot.robot_model import RobotModel
 
 
@@ -61,13 +60,9 @@ def add_path_streaming(
             reach.
     """
 
-    def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
-        path = StreamedPath(start, stream or StreamParameters(), relative_degree)
-        manifold = PathManifold(relative_degree, oriented=path.is_oriented)
-        return Followed(
-            manifold, manifold, path.projector, None, path.target, path.point, streamed=path
-        )
+    def task(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> StreamTask:
+        return StreamTask(StreamedPath(start, stream or StreamParameters(), relative_degree))
 
-    follower = Follower(plant, tool, law, followed, options or FollowerOptions())
+    follower = Follower(plant, tool, law, task, options or FollowerOptions())
     builder.AddSystem(follower)
     return follower

@@ -6,16 +6,13 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.task import Followed
+from pfsc_drake.following.tasks.surface_task import SurfaceTask
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.surface import Surface
-from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 
 
@@ -58,27 +55,11 @@ def add_surface_following(
     chosen = options or FollowerOptions()
     if motion.dimension != 2:
         raise InputError(f"motion: {motion.dimension} coordinates; a surface has 2")
-    theta = [sum(ends) / 2.0 for ends in surface.domain] if start is None else list(start)
 
-    def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
+    def task(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> SurfaceTask:
         manifold = SurfaceManifold(relative_degree, orientation=orientation, offset=offset)
-        evaluator = SurfaceEvaluator(surface, relative_degree)
+        return SurfaceTask(surface, manifold, motion, theta=start or ())
 
-        eta = motion.derivatives(np.array([motion.domain[0]]), 0)[0, 0]
-        y_t = evaluator.evaluate_at(theta)[manifold.layout.position][:3]
-        point = evaluator(y_t.tolist(), list(theta), eta.tolist())
-        R_e = manifold.orientation(point[None])[0] if manifold.is_oriented else None
-        projector = Projector(evaluator, np.append([0.0, 0.0], eta))
-        return Followed(
-            manifold,
-            manifold,
-            projector,
-            motion,
-            ToolTarget(y_t, R_e),
-            point,
-            projection=lambda y_t, memory: evaluator(y_t.tolist(), memory),
-        )
-
-    follower = Follower(plant, tool, law, followed, chosen)
+    follower = Follower(plant, tool, law, task, chosen)
     builder.AddSystem(follower)
     return follower

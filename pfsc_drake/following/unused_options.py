@@ -18,7 +18,9 @@ from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import GainParameters
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.options.motion import MotionLimits
-from pfsc_drake.following.task import Followed
+from pfsc_drake.following.tasks.space_task import SpaceTask
+from pfsc_drake.following.tasks.stream_task import StreamTask
+from pfsc_drake.following.tasks.task import Task
 from pfsc_drake.robot.robot_model import RobotModel
 
 
@@ -37,33 +39,31 @@ class Rule:
     reason: str
 
 
-def refuse_unused(
-    options: FollowerOptions, law: str, robot: RobotModel, followed: Followed
-) -> None:
+def refuse_unused(options: FollowerOptions, law: str, robot: RobotModel, task: Task) -> None:
     """Refuse options that differ from their default and would have no effect.
 
     Args:
         options: The options.
         law: Name of the law.
         robot: The robot, N joints.
-        followed: What is followed.
+        task: Task of the tool.
 
     Raises:
         InputError: If there is one; the message names it, and what would let it have an effect.
     """
-    kinds = {coordinate.kind for coordinate in followed.manifold.coordinates}
-    is_redundant = robot.dimension > len(followed.manifold.coordinates)
+    kinds = {coordinate.kind for coordinate in task.manifold.coordinates}
+    is_redundant = robot.dimension > len(task.manifold.coordinates)
     used = [kind.value for kind in Kind if kind in kinds] + ["posture"] * is_redundant
     changed = dict(_changed(options, type(options)()))
     rules = [
-        *_law_rules(options, law, followed),
+        *_law_rules(options, law, task),
         *_state_rules(options, law, robot),
         *_posture_rules(options, is_redundant),
         *_friction_rules(options, law),
-        *_compliance_rules(options.compliance, followed, kinds),
-        *_motion_rules(followed),
-        *_plan_rules(options, followed),
-        *_fixture_rules(options, law, followed),
+        *_compliance_rules(options.compliance, task, kinds),
+        *_motion_rules(task),
+        *_plan_rules(options, task),
+        *_fixture_rules(options, law, task),
         Rule(
             "bandwidth",
             _leaves_gains(options, law, used),
@@ -90,15 +90,15 @@ def _changed(value: Any, default: Any, key: str = "") -> Iterator[tuple[str, Any
         yield key, value
 
 
-def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[Rule]:
+def _law_rules(options: FollowerOptions, law: str, task: Task) -> list[Rule]:
     chosen, servo = options.controller, RELATIVE_DEGREE[law] == 1
     torques = "needs a law that commands torques"
     return [
         Rule("controller.law", chosen.law == law, f"the law of the call is {law}"),
         Rule(
             "controller.manifold",
-            chosen.manifold == followed.manifold.name,
-            f"the call follows a {followed.manifold.name}",
+            chosen.manifold == task.manifold.name,
+            f"the call follows a {task.manifold.name}",
         ),
         Rule("controller.model", False, "the plant of the call is the model"),
         Rule(
@@ -123,7 +123,7 @@ def _law_rules(options: FollowerOptions, law: str, followed: Followed) -> list[R
         *(Rule(f"faults.brakes.{key}", False, "it is the plant's") for key in ("torque", "delay")),
         Rule(
             "controller.max_beyond_end",
-            bool(np.isfinite([c.ends for c in followed.manifold.coordinates]).any()),
+            bool(np.isfinite([c.ends for c in task.manifold.coordinates]).any()),
             "needs a path with ends",
         ),
     ]
@@ -195,14 +195,12 @@ def _yields(impedance: CoordinateImpedance) -> bool:
     return bool(impedance.stiffness.at) or bool(np.isfinite(impedance.stiffness.value))
 
 
-def _compliance_rules(
-    compliance: ComplianceParameters, followed: Followed, kinds: set[Kind]
-) -> list[Rule]:
+def _compliance_rules(compliance: ComplianceParameters, task: Task, kinds: set[Kind]) -> list[Rule]:
     def finite(kind: str) -> Rule:
         is_soft = _yields(getattr(compliance, kind))
         return Rule(f"compliance.{kind}", is_soft, "needs a finite stiffness of it")
 
-    in_space, turns = followed.guided is not None, Kind.ROTATIONAL in kinds
+    in_space, turns = isinstance(task, SpaceTask), Kind.ROTATIONAL in kinds
     along = _yields(compliance.tangential) and not in_space
     return [
         *(finite(kind) for kind in ("tangential", "transversal", "rotational")),
@@ -213,7 +211,7 @@ def _compliance_rules(
         Rule("compliance.press", not in_space, "needs a surface"),
         Rule(
             "compliance.with_turning",
-            along and turns and isinstance(followed.manifold, PathManifold),
+            along and turns and isinstance(task.manifold, PathManifold),
             "needs a finite tangential stiffness along a path with orientation",
         ),
         Rule(
@@ -230,22 +228,22 @@ def _limit_rules(key: str, is_on: bool) -> list[Rule]:
     return [Rule(f"{key}.{name}", is_on, "needs on") for name in keys]
 
 
-def _motion_rules(followed: Followed) -> list[Rule]:
+def _motion_rules(task: Task) -> list[Rule]:
     timed = "needs a path or surface with a motion over time"
-    tracks = followed.manifold.follows_time
+    tracks = task.manifold.follows_time
     return [
-        Rule(key, followed.motion is not None or followed.streamed is not None, timed)
+        Rule(key, task.is_planned or isinstance(task, StreamTask), timed)
         for key in ("override", "stream")
     ] + [
-        Rule("obstacles", followed.streamed is None, timed),
-        Rule("swings", followed.guided is None and not tracks, "needs a path or surface"),
+        Rule("obstacles", not isinstance(task, StreamTask), timed),
+        Rule("swings", not isinstance(task, SpaceTask) and not tracks, "needs a path or surface"),
         Rule("transition", not tracks, "the reference of a trajectory is a point that moves"),
     ]
 
 
-def _plan_rules(options: FollowerOptions, followed: Followed) -> list[Rule]:
+def _plan_rules(options: FollowerOptions, task: Task) -> list[Rule]:
     motion = "needs a path or surface at rest with a motion over time, and no stream"
-    planned = followed.motion is not None and options.stream is None and options.frame is None
+    planned = task.is_planned and options.stream is None and options.frame is None
     return [Rule("reference", planned and not options.swings, motion)]
 
 
@@ -260,10 +258,10 @@ def _refuse_unused_limits(limits: MotionLimits) -> None:
             raise InputError(f"reference.{key} = {given:g}: has no effect; {reason}")
 
 
-def _fixture_rules(options: FollowerOptions, law: str, followed: Followed) -> list[Rule]:
-    if followed.guided is None:
+def _fixture_rules(options: FollowerOptions, law: str, task: Task) -> list[Rule]:
+    if not isinstance(task, SpaceTask):
         return []
-    guidance, servo = followed.guided.options.guidance, RELATIVE_DEGREE[law] == 1
+    guidance, servo = task.options.guidance, RELATIVE_DEGREE[law] == 1
     program = guidance.rules == "program"
     keys = ("approach_time", "braking", "push_out", "largest_speed", "tank")
     return [
@@ -277,7 +275,7 @@ def _fixture_rules(options: FollowerOptions, law: str, followed: Followed) -> li
         *(Rule(f"fixtures.guidance.{key}", program, "needs rules program") for key in keys),
         Rule("fixtures.guidance.printed", not program, "needs rules printed"),
         Rule("fixtures.limits", program, "needs rules program"),
-        *_limit_rules("fixtures.limits", followed.guided.options.limits.on),
+        *_limit_rules("fixtures.limits", task.options.limits.on),
     ]
 
 

@@ -7,9 +7,10 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.linearization import virtual_output_function
+from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.control.law.waiting_reference import WaitingReference
-from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
+from pfsc_drake.control.obstacles.elbow_room import ElbowParameters, ElbowRoom
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
 from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
@@ -17,10 +18,12 @@ from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.control.planning.stopping import stopping_bandwidth
 from pfsc_drake.errors import InputError, require
+from pfsc_drake.following.believed import Coefficients
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.options.motion import MotionLimits, limits_of
 from pfsc_drake.following.planning.drive_limits import DrivePlanner
-from pfsc_drake.following.task import Followed
+from pfsc_drake.following.tasks.task import Task
+from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import arm_outline, outline_points
 from pfsc_drake.systems.block_system import BlockSystem
@@ -29,6 +32,8 @@ from pfsc_drake.systems.block_system import BlockSystem
 _COURSE_STEP = 4e-3
 # of the planned pace, the most that may count as rest
 _MOST_REST = 0.2
+# m or rad, from which on a tool starts beside its path
+_AT_THE_PATH = 5e-3
 
 
 def waiting_motion(
@@ -90,6 +95,13 @@ class Waiting:
     pace: WaitingPace
     elbow: ElbowParameters | None
 
+    @property
+    def elbow_room(self) -> ElbowRoom:
+        """Block that lets the elbow avoid obstacles, where it does."""
+        assert self.elbow is not None
+        ahead, age = self.ahead, self.watch.latency
+        return ElbowRoom(ahead.chain, ahead.outline, self.shapes, self.elbow, age)
+
 
 def add_waiting(
     builder: DiagramBuilder,
@@ -119,41 +131,92 @@ def add_waiting(
     return generator, watches
 
 
+@dataclass(frozen=True)
+class Approach:
+    """Motion of the tool from where it starts to its path.
+
+    Attributes:
+        q_J: Joint coordinates at the start, shape (N,).
+        duration: Duration of the transition [s].
+    """
+
+    q_J: np.ndarray
+    duration: float
+
+    def reference(
+        self, task: Task, law: FollowingLaw, start: CourseStart
+    ) -> Callable[[np.ndarray], np.ndarray] | None:
+        """Return what is added to derivatives 0..r of the reference at times [s], if anything is.
+
+        Args:
+            task: Task of the tool.
+            law: Its law.
+            start: Start of the robot.
+
+        Raises:
+            InputError: If the tool starts beside its path without a transition.
+        """
+        robot, linearization = law.robot, law.linearization
+        assert task.motion is not None  # else nothing waits
+        y_t = np.array(pose_function(robot)(self.q_J)).ravel()[:3]
+        point = task.evaluate(y_t, start.memory)
+        output = virtual_output_function(robot, linearization.manifold)
+        distance = np.array(output(self.q_J, np.zeros(robot.dimension), point))[:, 0]
+        begun = task.motion.derivatives(task.motion.domain[:1], 0)[0, 0]
+        distance[: len(begun)] -= begun
+        if self.duration == 0.0:
+            far = float(np.abs(distance).max())
+            allowed = (
+                f"0.1 to 10 s where the tool starts beside its path (by {far:.3g} m or rad): only "
+                "a transition waits for obstacles"
+            )
+            require(far < _AT_THE_PATH, "start.transition", self.duration, allowed)
+            return None
+        transition = Transition(self.duration, linearization.relative_degree)
+
+        def added(times: np.ndarray) -> np.ndarray:
+            shares = np.array([transition.at(time).full().ravel() for time in times.tolist()])
+            return shares[:, :, None] * distance
+
+        return added
+
+
 def plan_waiting(
-    law: FollowingLaw, followed: Followed, options: FollowerOptions, q_J: np.ndarray
+    options: FollowerOptions,
+    task: Task,
+    law: FollowingLaw,
+    start: CourseStart,
+    friction: Coefficients | None,
+    q_J: np.ndarray,
 ) -> Waiting:
-    """Return how a motion along a path waits for obstacles.
+    """Return how progress along a manifold waits for obstacles.
 
     Args:
-        law: The law.
-        followed: What is followed.
-        options: What is chosen, with obstacles; its controller has the law's name.
-        q_J: Joints' coordinates at the start, shape (N,).
+        options: Options, with obstacles.
+        task: Task of the tool, its motion as the drives can follow it.
+        law: Its law.
+        start: Start of the robot.
+        friction: Coefficients f_c and f_v of the nominal model, each (N,), if there are any.
+        q_J: Joint coordinates at the start, shape (N,).
 
     Raises:
-        InputError: If what is followed or chosen cannot wait, or the joints cannot follow.
+        InputError: If task or options cannot wait, or the joints cannot follow.
     """
-    obstacles, motion = options.obstacles, followed.motion
+    obstacles, motion, chosen = options.obstacles, task.motion, options.controller
     assert obstacles is not None
-    allowed = "None unless a path at rest is followed by a motion over time, without yielding"
-    manifold = followed.manifold
-    on_path = isinstance(manifold, PathManifold) and not manifold.follows_time
-    waits = motion is not None and on_path and options.stream is None
+    allowed = "None unless a path or surface at rest is followed by a motion over time, stiffly"
+    waits = task.is_planned and not task.manifold.follows_time and options.stream is None
     waits = waits and options.frame is None and not options.compliance.is_given
-    waits = waits and not options.swings
-    require(waits, "obstacles", "given", allowed)
+    require(waits and not options.swings, "obstacles", "given", allowed)
     assert motion is not None
-    planned = "0 with obstacles, which are avoided along the path alone; bring the tool there first"
-    require(options.transition == 0.0, "transition", options.transition, planned)
-    watch = obstacles.watch
     if not isinstance(law.robot, SerialChain):
-        raise InputError("obstacles: given; must be None for a robot that is no chain of links")
+        raise InputError("obstacles = given: must be null for a robot that is no chain of links")
     if obstacles.elbow is not None:
-        allowed = "None for an arm without joints to spare, and one whose posture yields to forces"
-        spare = law.posture is not None and options.controller.posture.yields == "none"
+        allowed = "null for an arm without joints to spare, and one whose posture yields to forces"
+        spare = law.posture is not None and chosen.posture.yields == "none"
         require(spare, "obstacles.elbow", "given", allowed)
-    start = CourseStart(q_J, followed.point[followed.place.layout.memory])
-    known = options.controller, 0.0, followed, law, start, options.friction
-    planner = DrivePlanner(limits_of(motion, MotionLimits()), *known)
-    ahead, pace = waiting_motion(planner, law, watch)
-    return Waiting(obstacles.shapes, watch, ahead, pace, obstacles.elbow)
+    limits = options.reference or limits_of(motion, MotionLimits())
+    planner = DrivePlanner(limits, chosen, 0.0, task, law, start, friction)
+    added = Approach(q_J, options.transition).reference(task, law, start)
+    ahead, pace = waiting_motion(planner, law, obstacles.watch, added)
+    return Waiting(obstacles.shapes, obstacles.watch, ahead, pace, obstacles.elbow)

@@ -25,14 +25,15 @@ class FaultAccess:
         diagram: With a ``fault_latch``, a ``safe_stop`` and, where joints are watched, a
             ``supervision``; in a builder under its name.
         period: Sampling time of its blocks [s].
+        path: Names of the diagrams that it is in, each with a dot.
 
     Attributes:
-        name: Name of the diagram.
+        name: Name of the diagram, with its path.
         period: Sampling time [s].
     """
 
-    def __init__(self, diagram: Diagram, period: float) -> None:
-        self.name, self.period = diagram.get_name(), period
+    def __init__(self, diagram: Diagram, period: float, path: str = "") -> None:
+        self.name, self.period = f"{path}{diagram.get_name()}", period
         self._is_supervised = diagram.HasSubsystemNamed("supervision")
 
     def fault(self, blocks: BlockAccess, root: Context) -> Fault:
@@ -202,13 +203,14 @@ class ControllerAccess(FaultAccess):
 
     Args:
         controller: The controller, in a builder under its name.
+        path: Names of the diagrams that it is in, each with a dot.
 
     Attributes:
         drive_port: Name of the port that leads to the drives.
     """
 
-    def __init__(self, controller: FollowingController) -> None:
-        super().__init__(controller, controller.period)
+    def __init__(self, controller: FollowingController, path: str = "") -> None:
+        super().__init__(controller, controller.period, path)
         self.drive_port = controller.drive_port
 
     def drive(self, blocks: BlockAccess, root: Context) -> np.ndarray:

@@ -40,7 +40,7 @@ class FusedSystem(BlockSystem):
 
     def DoGetGraphvizFragment(self, params: System.GraphvizFragmentParams) -> Any:
         """Draw all parts and their connections, within one frame."""
-        drawn = {name: part.GetGraphvizFragment(max_depth=0) for name, part in self._parts.items()}
+        drawn = {name: part.GetGraphvizFragment(max_depth=1) for name, part in self._parts.items()}
         fed: dict[str, list[str]] = {}
         lines = []
         for (name, port), source in self._wiring.connections.items():

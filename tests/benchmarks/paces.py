@@ -26,7 +26,7 @@ from diagrams.robots.arm import add_arm
 from diagrams.robots.friction import add_friction
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.station_parts import belief_source, friction_options
+from diagrams.station_options import belief_source, friction_options
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from experiments.simulation import configure
 from pfsc_drake.systems.plants.external_forces import LinkPushes

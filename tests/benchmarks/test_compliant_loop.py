@@ -20,19 +20,24 @@ SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
 SPAN = 0.2
 # system, output port
 OUTPUTS = [
-    ("tool_kinematics", "tool_pose"),
-    ("path_projector", "manifold_point"),
-    ("reference_generator", "reference"),
-    ("following_controller", "law"),
+    ("controller/tool_kinematics", "tool_pose"),
+    ("controller/path_projector", "manifold_point"),
+    ("controller/reference_generator", "reference"),
+    ("controller/following_controller", "law"),
     ("force_torque_sensor", "measured_wrench"),
-    ("tool_compensation", "wrench"),
-    ("manifold_force_transform", "manifold_force"),
-    ("impedance_filter", "reference"),
+    ("controller/tool_compensation", "wrench"),
+    ("controller/manifold_force_transform", "manifold_force"),
+    ("controller/impedance_filter", "reference"),
     ("operator", "wrench"),
     ("external_wrench", "applied_spatial_force"),
     ("external_wrench", "tau_ext"),
 ]
-UPDATES = ["force_torque_sensor", "tool_compensation", "impedance_filter", "operator"]
+UPDATES = [
+    "force_torque_sensor",
+    "controller/tool_compensation",
+    "controller/impedance_filter",
+    "operator",
+]
 
 
 class Loop:
@@ -64,7 +69,9 @@ class Loop:
 
     def isolate(self, name):
         """Return a system, its inputs' values, and a context of its own that holds them."""
-        system = self.station.diagram.GetSubsystemByName(name)
+        system = self.station.diagram
+        for part in name.split("/"):
+            system = system.GetSubsystemByName(part)
         inside = system.GetMyContextFromRoot(self.root)
         context, fixed = system.CreateDefaultContext(), []
         context.SetTimeStateAndParametersFrom(inside)

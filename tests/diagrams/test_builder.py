@@ -15,26 +15,16 @@ ENCODERS = ("joint_encoders", "y0")
 WIRES = {
     ("plant", "state"): {("joint_encoders", "u0")},
     ENCODERS: {
-        ("tool_kinematics", "joint_state"),
-        ("following_controller", "joint_state"),
+        ("controller", "joint_state"),
         ("brake_torque", "joint_state"),
         ("holding_brakes", "joint_state"),
         ("log_signals", "joint_state"),
     },
-    ("tool_kinematics", "tool_pose"): {
-        ("path_projector", "tool_pose"),
-        ("log_signals", "tool_pose"),
+    **{
+        ("controller", name): {("log_signals", name)}
+        for name in ("tool_pose", "manifold_point", "reference", "law")
     },
-    ("path_projector", "manifold_point"): {
-        ("following_controller", "manifold_point"),
-        ("log_signals", "manifold_point"),
-    },
-    ("reference_generator", "reference"): {
-        ("following_controller", "reference"),
-        ("log_signals", "reference"),
-    },
-    ("following_controller", "law"): {("log_signals", "law")},
-    ("following_controller", "stop_category"): {
+    ("controller", "stop_category"): {
         ("holding_brakes", "request_0"),
         ("log_signals", "stop_category"),
     },
@@ -42,10 +32,19 @@ WIRES = {
     ("holding_brakes", "give"): {("brake_torque", "give")},
     ("brake_torque", "resistance"): {("resistance", "u0")},
     ("resistance", "y0"): {("plant", "applied_generalized_force")},
-    ("following_controller", "drive_torque"): {("hold", "value")},
+    ("controller", "drive_torque"): {("hold", "value")},
     ("hold", "held"): {("drives", "u0")},
     ("drives", "y0"): {("plant", "actuation")},
     ("log_signals", "all"): {("log", "data")},
+}
+OF_CONTROLLER = {
+    ("measured_state", "all"): {
+        ("tool_kinematics", "joint_state"),
+        ("following_controller", "joint_state"),
+    },
+    ("tool_kinematics", "tool_pose"): {("path_projector", "tool_pose")},
+    ("path_projector", "manifold_point"): {("following_controller", "manifold_point")},
+    ("reference_generator", "reference"): {("following_controller", "reference")},
 }
 
 
@@ -99,6 +98,7 @@ def test_a_station_that_differs_in_one_number_has_functions_of_its_own(settings,
 
 def test_wiring(station):
     assert wires(station.diagram) == WIRES
+    assert wires(station.diagram.GetSubsystemByName("controller")) == OF_CONTROLLER
     assert station.diagram.get_name() == "pfc_elastic_3r"
     assert station.diagram.num_input_ports() == 0
 
@@ -108,8 +108,8 @@ def test_the_rigid_law_sees_the_motors_only(settings):
     settings.controller.law = "rigid"
     station = build_station(settings, Path())
     _, root = start(station)
-    kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
-    pose = kinematics.GetOutputPort("tool_pose").Eval(kinematics.GetMyContextFromRoot(root))
+    controller = station.diagram.GetSubsystemByName("controller")
+    pose = controller.GetOutputPort("tool_pose").Eval(controller.GetMyContextFromRoot(root))
     x = station.initial_state.copy()
     assert np.abs(x[1:6:2]).max() > 1e-3
     x[1:6:2] = 0.0  # the joints' deflections
@@ -130,7 +130,8 @@ def test_a_failing_sensor_is_between_encoders_and_everything_else(settings):
     assert found[ENCODERS] == log | {("sensor_failure", "measured")}
     delivered = found[("sensor_failure", "delivered")]
     assert readers - log <= delivered
-    assert {system for system, _ in delivered - readers} == {"log_signals"}
+    assert delivered == readers - log
+    assert found["controller", "joint_state"] == {("log_signals", "joint_state_measured")}
 
 
 @pytest.mark.parametrize("component", [-1, 12])
@@ -167,7 +168,7 @@ def test_start(station):
     plant = station.part.plant.GetMyContextFromRoot(root)
     x = station.part.plant.GetPositionsAndVelocities(plant)
     np.testing.assert_array_equal(x, station.initial_state)
-    point = station.blocks.output(root, f"{station.projector}.manifold_point")
+    point = station.blocks.output(root, "controller.path_projector.manifold_point")
     layout = station.task.place.layout
     assert point[layout.theta][0] == pytest.approx(station.initial_place[0], abs=1e-12)
     assert point[layout.eta][0] == pytest.approx(0.96, abs=1e-9)
@@ -216,8 +217,8 @@ def test_log_holds_every_signal(station):
         "law": (3, station.law.layout.size),
         "stop_category": (3, 1),
     }
-    kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
-    pose = kinematics.GetOutputPort("tool_pose").Eval(kinematics.GetMyContextFromRoot(root))
+    controller = station.diagram.GetSubsystemByName("controller")
+    pose = controller.GetOutputPort("tool_pose").Eval(controller.GetMyContextFromRoot(root))
     np.testing.assert_array_equal(signals["tool_pose"][-1], pose)
 
 

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
@@ -17,7 +18,6 @@ from diagrams.scenario import (
     ReferenceParameters,
     StartParameters,
 )
-from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe

@@ -88,8 +88,8 @@ def test_rates_are_those_of_the_true_coordinates(known):
 def test_what_the_drives_are_asked_for_is_known_beforehand(known):
     """Of both robots: torques and speeds of the plan are those of Drake's plants."""
     station, _, log = known
-    for part, prefix in ((station, ""), (station.holder, HOLDER)):
-        plan, last = part.task.drive_plan, part.law.robot.dimension - 1
+    for robot, prefix in ((station.controlled, ""), (station.holder.robot, HOLDER)):
+        plan, last = robot.task.drive_plan, robot.controller.robot.dimension - 1
         assert not plan.said
         at = np.flatnonzero((plan.times >= BEGIN) & (plan.times <= END))
         ticks = np.rint(plan.times[at] / 1e-3).astype(int)

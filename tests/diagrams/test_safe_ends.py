@@ -221,7 +221,7 @@ def test_a_sensor_that_is_not_tared_may_be_at_the_end_of_its_range(six_axes):
     six_axes.sensor.measurement_range = np.full(6, 1.0)
     station, result, *_ = go_on(six_axes, 0.2)
     assert result.fault is None
-    told = station.blocks.output(result.root, "tool_compensation.fault")
+    told = station.blocks.output(result.root, "controller.tool_compensation.fault")
     assert told == SensorFault.SATURATED
 
 

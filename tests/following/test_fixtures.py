@@ -1,8 +1,7 @@
 """What is near a tool that is led by hand, as an expression or by a schedule."""
 
-import dataclasses as dc
-
 import casadi as ca
+import numpy as np
 import pytest
 
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
@@ -11,7 +10,7 @@ from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following import fixtures as fixtures_module
 from pfsc_drake.following.fixtures import _robot_limits, make_lead, near_expression
 from pfsc_drake.following.options.follower import FixtureOptions
-from pfsc_drake.following.task import Guided
+from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.geometry import torus
 from pfsc_drake.geometry.regions.shapes import SphereRegion
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
@@ -25,7 +24,7 @@ def guided(regions, looks=0):
     lead = make_lead(2, options, PERIOD, lag=0.0, delay=0.0)
     fixtures = [Fixture(region) for region in regions]
     motion = Admittance(3.0, 60.0, PERIOD)
-    return Guided(SpaceManifold(2), fixtures, [0.0] * len(fixtures), motion, lead, options)
+    return SpaceTask(SpaceManifold(2), np.zeros(3), fixtures, motion, lead, options, {})
 
 
 def test_what_has_no_formula_is_left_to_a_schedule():
@@ -52,7 +51,8 @@ def test_before_servos_their_lag_counts_before_torques_a_filter():
 
 def test_robot_limits_are_for_tools_as_fast_as_regions_that_push_them(monkeypatch):
     monkeypatch.setattr(fixtures_module, "RobotLimits", lambda *given, **more: (given, more))
-    led = dc.replace(guided([BALL, BALL]), speeds=[0.05, 0.3])
+    led = guided([BALL, BALL])
+    led.speeds = [0.05, 0.3]
     (_, limits, _), more = _robot_limits(led, None, None)
     assert limits is led.options.limits
     assert more["fastest"] == led.options.guidance.largest_speed + 0.3

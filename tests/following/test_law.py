@@ -15,7 +15,8 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following import law as law_module
-from pfsc_drake.following.law import Believed, make_law, safe_state, sampled_robot, supervision
+from pfsc_drake.following.believed import Believed
+from pfsc_drake.following.law import make_law, safe_state, sampled_robot, supervision
 from pfsc_drake.following.options.follower import FaultParameters
 
 

@@ -12,8 +12,8 @@ from pfsc_drake.control.estimation.momentum import (
     link_momentum,
 )
 from pfsc_drake.following import friction as friction_module
+from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.friction import add_friction_compensation
-from pfsc_drake.following.law import Believed
 from pfsc_drake.following.observed_forces import add_observed_forces
 from pfsc_drake.following.options.compliance import ObservedForceParameters
 from pfsc_drake.following.options.controller import ControllerParameters

@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.law import Believed
+from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.prediction import add_prediction, connect_predictor
 

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context
 from diagrams.linearization import RestSlope
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
-from diagrams.station_parts import belief_source
+from diagrams.station_options import belief_source
 from experiments.studies.margins.box import (
     Error,
     ErrorBox,

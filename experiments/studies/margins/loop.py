@@ -18,7 +18,7 @@ from diagrams.robots.arm import Arm
 from diagrams.robots.arm_model import believe_arm
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.station_parts import belief_source
+from diagrams.station_options import belief_source
 from experiments.simulation import configure
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
@@ -34,7 +34,7 @@ _SCHEME, _MOST_STEPS = "runge_kutta5", 100
 _ROUNDING = 1e-10
 # times its stiffness, up to which a surface that is touched is looked at
 STIFFEST = 64.0
-_SENSOR, _FAULT = "tool_compensation", "fault_latch.fault"
+_SENSOR, _FAULT = "controller.tool_compensation", "fault_latch.fault"
 
 
 class StationLoop:

@@ -108,6 +108,7 @@ def walk(
 def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, tuple[float, ...], float]]:
     """Return ticks with place [m] and speed [m/s] of the reference."""
     motion, period = station.task.motion, station.controller.period
+    assert motion is not None  # of a station's task
     last = max(int(duration / period + 1e-6) - 1, 1)
     times = np.linspace(period, last * period, _SAMPLES)
     inside = np.clip(times, *motion.domain)

@@ -5,15 +5,15 @@ from functools import cached_property
 from pathlib import Path as FilePath
 
 import numpy as np
+from diagrams.scenario_task import make_task
 
 from diagrams.robot_station import RobotStation, build_robot_station
 from diagrams.robots.arm import Arm
 from diagrams.scenario import Scenario
-from diagrams.station_parts import make_task
-from diagrams.tasks.path_following import PathTask
 from experiments.scenario_file import SCENARIO_DIRECTORY, read_scenario
 from experiments.studies.peers.laws import MovingPose, moving_pose
 from experiments.studies.peers.plan import JointPlan, fastest, joint_path
+from pfsc_drake.following.tasks.path_task import PathTask
 from pfsc_drake.yaml.typed import load_typed
 
 SCENARIO = "pfc_panda_7r"

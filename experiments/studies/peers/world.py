@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from diagrams.builder import build_station
 from diagrams.robot_station import RobotStation, build_robot_station
 from diagrams.scenario import Scenario
-from diagrams.tasks.path_following import PathTask
 from experiments.simulation import configure, simulate
 from experiments.studies.peers.laws import Law
+from pfsc_drake.following.tasks.path_task import PathTask
 from pfsc_drake.geometry import quaternion_to_matrix
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 from reporting.progress import NoProgress

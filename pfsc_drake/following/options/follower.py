@@ -1,19 +1,23 @@
 """Options of a whole controller, of its faults, and of regions that a led tool stays out of."""
 
 import dataclasses as dc
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from pfsc_drake.checks import require, require_between, require_not_negative, require_positive
+from pfsc_drake.control.compliance.tuned_impedance import REQUESTS, TuningParameters
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters, RobotLimitParameters
 from pfsc_drake.control.law.swing import Swing
 from pfsc_drake.control.law.timed_reference import StreamLimits
 from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
 from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
+from pfsc_drake.following.extension import Extension
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.motion import MotionLimits
+from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 
@@ -125,6 +129,27 @@ class ObstacleOptions:
         require(bool(self.shapes), "shapes", "none", "one or more")
 
 
+@dc.dataclass
+class OperatorOptions:
+    """Settings of an operator that change while the robot moves, by ports of their own.
+
+    Attributes:
+        tuning: Response of the impedance to settings, input ``impedance_request``, see
+            :class:`~pfsc_drake.control.compliance.tuned_impedance.ImpedanceTuner`.
+        switches: Number of regions and guides that are switched on and off one by one, input
+            ``regions_on``; 0 for none.
+    """
+
+    tuning: TuningParameters = dc.field(default_factory=TuningParameters)
+    switches: int = 0
+
+    @property
+    def requests(self) -> dict[str, int]:
+        """Sizes of the inputs, by name."""
+        switches = {"regions_on": self.switches} if self.switches else {}
+        return {"impedance_request": REQUESTS} | switches
+
+
 # 1/s, of poles that nobody chooses
 BANDWIDTH = 20.0
 
@@ -157,6 +182,16 @@ class FollowerOptions:
         swings: Oscillations of the manifold along its normals (5.1), (5.2).
         reference: What the motion may take of the drives: where it takes more it is slowed, or
             there is a warning; or it is made as fast as they allow. None to leave it as it is.
+        operator: Settings of an operator, by ports of their own; none if omitted.
+        stop_request: Whether there is a port that stops the robot at any value but 0.
+        carries: Whether there is a port for the motion of the joints, ``joint_jet``, of a robot
+            that carries a workpiece.
+        known_forces: Names of the inputs with forces that are known, of ``wrench_ext`` (on the
+            tool point, world axes, shape (6,) [N, Nm]) and ``push_torque`` (of forces on links,
+            shape (N,) [Nm or N]); None to take the port ``wrench`` for known as for measured ones.
+        frame_motion: Returns the planned motion of the frame that carries the manifold, ``[p_WC,
+            R_WC by rows]`` over time, with which the demand on the drives is planned.
+        extensions: Further blocks, such as the compensation of a tool behind a force sensor.
     """
 
     bandwidth: float = BANDWIDTH
@@ -173,3 +208,9 @@ class FollowerOptions:
     frame: np.ndarray | None = None
     swings: list[Swing] = dc.field(default_factory=list)
     reference: MotionLimits | None = None
+    operator: OperatorOptions | None = None
+    stop_request: bool = False
+    carries: bool = False
+    known_forces: tuple[str, ...] | None = None
+    frame_motion: Callable[[], PiecewisePolynomialCurve] | None = None
+    extensions: Sequence[Extension] = ()

@@ -17,7 +17,7 @@ from pfsc_drake.following.options.motion import MotionLimits
 from pfsc_drake.following.planning.drive_plan import DrivePlan
 from pfsc_drake.following.planning.fastest_motion import FastestPlanner
 from pfsc_drake.following.planning.motion_demand import MotionDemand
-from pfsc_drake.following.task import Task
+from pfsc_drake.following.tasks.task import Task
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
 
@@ -75,8 +75,7 @@ def keep_drive_limits(
     """
     fastest = reference.speed == "fastest"
     along = indices(task.place.coordinates, Kind.TANGENTIAL)
-    unplanned = task.guided is not None or task.streamed is not None
-    led = unplanned or bool(law.stabilization.is_free[along].any())
+    led = not task.is_planned or bool(law.stabilization.is_free[along].any())
     if task.drive_plan is not None:
         return
     if led:

@@ -15,7 +15,7 @@ from pfsc_drake.control.planning.drive_demand import (
 from pfsc_drake.following.fault_description import describe_singularity
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.motion import MotionLimits
-from pfsc_drake.following.task import Task
+from pfsc_drake.following.tasks.task import Task
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.robot_model import largest_speeds

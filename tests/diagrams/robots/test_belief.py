@@ -44,16 +44,8 @@ def _build(settings, **robot):
     return build_station(settings, find_scenario("pfc_delta").parent)
 
 
-def _is_control(system):
-    module = type(system).__module__
-    if isinstance(system, BlockSystem):
-        return type(system.block).__module__.startswith("pfsc_drake.control")
-    # the surroundings look at the tool, too
-    return module in (
-        "pfsc_drake.systems.physics.velocity_servo",
-        "pfsc_drake.systems.following_controller",
-        "pfsc_drake.systems.near_regions",
-    )
+# systems that control
+CONTROL = ("controller", "velocity_servo")
 
 
 def _is_wire(system):
@@ -73,12 +65,11 @@ def _crossings(station):
         for source in sources.get(name, []):
             if _is_wire(source):
                 follow(source.get_name())
-            elif not _is_control(source):
+            elif source.get_name() not in CONTROL:
                 found.add(source.get_name())
 
-    for system in station.diagram.GetSystems():
-        if _is_control(system) and system.get_name() != "contact_view":
-            follow(system.get_name())
+    for name in CONTROL:
+        follow(name)
     return found
 
 
@@ -87,30 +78,31 @@ def _crossings(station):
 def test_only_measurements_reach_the_controller(load_scenario, name):
     settings = load_scenario(name)
     station = _build(settings)
-    crossings = _crossings(station) - {"reference_generator"}
+    crossings = _crossings(station)
     assert crossings <= MEASUREMENTS
     encoders = settings.encoders != EncoderOptions()
     assert ("encoder_increments" if encoders else "joint_encoders") in crossings
     assert ("force_torque_sensor" in crossings) == station.diagram.HasSubsystemNamed(
         "force_torque_sensor"
     )
-    for system in station.diagram.GetSystems():
-        assert not (_is_control(system) and isinstance(system, MultibodyPlant))
+    for system in station.diagram.GetSubsystemByName("controller").GetSystems():
+        assert not isinstance(system, MultibodyPlant)
 
 
 @pytest.mark.slow
 def test_a_posture_yields_to_what_is_observed_of_forces(load_scenario):
     """Told of them, the law knew what no machine measures."""
     settings = load_scenario("pfc_elbow_7r")
-    crossings = _crossings(_build(settings)) - {"reference_generator"}
+    crossings = _crossings(_build(settings))
     assert crossings - MEASUREMENTS == {"link_forces"}
     settings.controller.posture.yields = "observed"
     settings.controller.external_torque.source = "observed"
     station = _build(settings)
-    assert _crossings(station) - {"reference_generator"} <= MEASUREMENTS
+    assert _crossings(station) <= MEASUREMENTS
+    controller = station.diagram.GetSubsystemByName("controller")
     reads = [
         source.get_name()
-        for (system, _), (source, _) in station.diagram.connection_map().items()
+        for (system, _), (source, _) in controller.connection_map().items()
         if system.get_name() == "posture_reference"
     ]
     assert len(reads) == 3
@@ -135,11 +127,14 @@ def _outputs(system, seed):
 
 
 def _controlling(station):
-    systems = {s.get_name(): s for s in station.diagram.GetSystems() if _is_control(s)}
+    diagram = station.diagram
+    systems = [*diagram.GetSubsystemByName("controller").GetSystems(), *diagram.GetSystems()]
+    # a projector knows no robot
     return {
-        name: system
-        for name, system in systems.items()
-        if name != "contact_view" and "projector" not in name
+        system.get_name(): system
+        for k, system in enumerate(systems)
+        if (k < len(systems) - len(diagram.GetSystems()) or system.get_name() in CONTROL[1:])
+        and "projector" not in system.get_name()
     }
 
 
@@ -251,5 +246,6 @@ def test_kinematics_that_are_believed_wrongly(load_scenario):
     settings.model_error.joint_offset_deg = [0.1]
     station = _build(settings)
     assert not station.part.belief.sees_truth
-    kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
+    controller = station.diagram.GetSubsystemByName("controller")
+    kinematics = controller.GetSubsystemByName("tool_kinematics")
     assert isinstance(kinematics.block, ToolKinematics)

@@ -10,6 +10,7 @@ from diagrams.builder import build_station
 from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import build_delta_replay, record
 from diagrams.scenario import Scenario
+from diagrams.tasks.task_drawing import drawing_of
 from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
@@ -249,7 +250,7 @@ def test_replay_draws_robot_and_path_upside_down():
         PERIOD * np.arange(3), np.tile(q, (3, 1)), np.tile(pose, (3, 1)), np.tile(point, (3, 1))
     )
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    drawn = station.task.drawing
+    drawn = drawing_of(station.task)
     diagram = build_delta_replay(station.robot, drawn, motion, meshcat, PERIOD)
     page = record(diagram, meshcat, motion.times[-1], PERIOD)
     assert "</html>" in page

@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.robots.arm import add_arm
-from diagrams.station_parts import belief_source
+from diagrams.station_options import belief_source
 from experiments.studies.margins.analysis import _believable
 from experiments.studies.margins.box import ErrorBox
 from pfsc_drake.errors import InputError

@@ -40,4 +40,8 @@ def test_what_a_controller_is_told(settings, told):
     part = controller_part(station)
     found = {name: port.size for name, port in part.network.inputs.items()}
     assert found == told | {"override": 1}
-    assert part.inputs["joint_state"].get_system() is station.part.measured
+    sources = {
+        (target.get_name(), target.get_input_port(i).get_name()): source
+        for (target, i), (source, _) in station.diagram.connection_map().items()
+    }
+    assert sources["controller", "joint_state"] is station.part.measured

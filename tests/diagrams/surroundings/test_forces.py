@@ -100,7 +100,7 @@ def test_a_law_that_knows_of_a_push_stays_on_the_path(six_axes, source):
     assert off[1] < 0.1 * off[0]
     assert log["push_force"].labels[::3] == ["link_3 x", "link_4 x"]
     assert np.abs(log["push_force"].values[:, 3:]).max() > 10.0
-    told = station.diagram.HasSubsystemNamed("external_torque")
+    told = station.controllers[0].HasSubsystemNamed("external_torque")
     assert told == (source == "known")
 
 
@@ -179,8 +179,8 @@ def test_a_posture_is_told_of_pushes(six_axes, source):
     assert np.abs(truth).max() > 10.0
     if source == "known":
         assert np.array_equal(
-            station.blocks.output(root, "external_torque_of_posture.tau_ext"), truth
+            station.blocks.output(root, "controller.external_torque_of_posture.tau_ext"), truth
         )
     else:
-        seen = station.blocks.output(root, "posture_torque_observer.estimate")
+        seen = station.blocks.output(root, "controller.posture_torque_observer.estimate")
         assert np.allclose(seen, truth, rtol=0, atol=0.1 * np.abs(truth).max())

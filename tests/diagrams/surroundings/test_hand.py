@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 
 from diagrams.builder import build_station
 from diagrams.scenario import (
@@ -13,7 +14,6 @@ from diagrams.scenario import (
     Line,
     Scenario,
 )
-from diagrams.station_parts import make_task
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile

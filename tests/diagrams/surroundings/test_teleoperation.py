@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 from scipy.spatial.transform import Rotation
 
 from diagrams.builder import build_station
 from diagrams.scenario import HandParameters, HandWaypoint
 from diagrams.scenario.schema import driven
 from diagrams.scenario.teleoperation import TeleoperationParameters
-from diagrams.station_parts import make_task
 from diagrams.surroundings import leader
 from experiments.results.run_signals import collect_log
 from experiments.results.teleoperation import teleoperation_metrics

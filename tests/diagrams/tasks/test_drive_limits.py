@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
@@ -16,7 +17,6 @@ from diagrams.scenario import (
     OrientationParameters,
     PathParameters,
 )
-from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.manifolds.coordinate import Kind

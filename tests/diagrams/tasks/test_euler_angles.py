@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 
 from diagrams.scenario import SurfaceParameters
 from diagrams.scenario.motion import StartParameters
 from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import Plane
-from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix

@@ -38,7 +38,7 @@ def test_the_rate_of_the_torques_is_as_fast_as_the_bandwidth(load_scenario, band
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.AdvanceTo(BEGIN + RAMP / 2)
-    system = station.diagram.GetSubsystemByName("external_torque")
+    system = station.diagram.GetSubsystemByName("controller").GetSubsystemByName("external_torque")
     _, rate = system.GetOutputPort("tau_ext").Eval(system.GetMyContextFromRoot(root)).reshape(2, 3)
     # the smooth step is steepest there, 15/8 of a linear one
     swelling = 15.0 / 8.0 * FORCE / RAMP

@@ -110,7 +110,9 @@ def test_the_belief_is_the_plants_with_its_error_or_what_is_written(arm):
 
     def torque(velocity=1.0):
         station = build_station(arm, Path())
-        model = station.diagram.GetSubsystemByName("friction_compensation")
+        model = station.diagram.GetSubsystemByName("controller").GetSubsystemByName(
+            "friction_compensation"
+        )
         context = model.CreateDefaultContext()
         model.GetInputPort("velocity").FixValue(context, np.full(12, velocity))
         return model.GetOutputPort("friction_torque").Eval(context)

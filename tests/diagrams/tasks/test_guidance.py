@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.scenario.simulation import OperatorParameters
-from diagrams.station_parts import make_task
+from diagrams.scenario_task import make_task
 from diagrams.surroundings.operator import controls_text, idle_controls
 from diagrams.warnings.fixtures import stiff_fixtures
 from experiments.scenario_file import find_scenario
@@ -37,7 +37,7 @@ def test_a_soft_region_that_is_stiffer_than_the_damping_bears(wedge):
     settings, folder = copy.deepcopy(wedge[0]), wedge[1]
 
     def warnings() -> list[str]:
-        return stiff_fixtures(settings.fixtures, make_task(settings, folder).guided)
+        return stiff_fixtures(settings.fixtures, make_task(settings, folder))
 
     assert warnings() == []
     settings.fixtures.regions[1].stiffness = 3e3

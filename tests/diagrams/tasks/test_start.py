@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 from scipy.spatial.transform import Rotation
 
 from diagrams.robots.arm import MultibodyArm
@@ -12,7 +13,6 @@ from diagrams.robots.arm_model import ArmModel
 from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
-from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.inverse_kinematics import ToolTarget

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from diagrams.scenario_task import make_task
 
 from diagrams.scenario.schema import driven
 from diagrams.scenario.streamed import DrawnPlane
-from diagrams.station_parts import make_task
 from diagrams.tasks.drawn_plane import border, plane_axes
-from diagrams.tasks.streaming import StreamTask
+from diagrams.tasks.streaming import ScenarioStream
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.control.streams.parameters import StreamParameters
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.streamed_path import StreamedPath
+from pfsc_drake.following.tasks.streamed_path import StreamedPath
 from tests.scenarios import shipped_scenario
 
 
@@ -21,7 +21,7 @@ def make(name="pfc_stream_6r", **changes):
     for key, value in changes.items():
         setattr(scenario.path.shape, key, value)
     task = make_task(scenario, SCENARIO_DIRECTORY)
-    assert isinstance(task, StreamTask)
+    assert isinstance(task, ScenarioStream)
     return task
 
 

@@ -10,7 +10,7 @@ from diagrams.scenario import SurfaceParameters
 from diagrams.scenario.motion import ReferenceParameters, SecondReference, StartParameters
 from diagrams.scenario.surface import Extruded, SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import Cylinder, Paraboloid, Plane
-from diagrams.station_parts import make_task
+from diagrams.scenario_task import check_joints, make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
 
@@ -173,8 +173,12 @@ def test_joints_too_few(scenario, kind, axes, needed):
     settings = scenario(kind=kind)
     settings.surface.orientation.task = axes
     made = make_task(settings, Path())
-    made.require_joints(needed)
-    refusal(lambda: made.require_joints(needed - 1), f"{needed - 1} joints", f"{needed} outputs")
+    check_joints(settings, made, needed)
+    refusal(
+        lambda: check_joints(settings, made, needed - 1),
+        f"{needed - 1} joints",
+        f"{needed} outputs",
+    )
 
 
 @pytest.mark.parametrize("kind", ["given", "normal"])
@@ -196,7 +200,7 @@ def test_places_that_a_hand_goes_to(task):
         "hand.waypoints[0].position",
         "theta within",
     )
-    point, velocity = made.target()(np.array([0.1, 0.0, 0.02]), np.zeros(3))
+    point, velocity = made.target(np.array([0.1, 0.0, 0.02]), np.zeros(3))
     normal = np.array([-0.2, 0.0, 1.0]) / np.sqrt(1.04)
     np.testing.assert_allclose(point, np.array([0.9, 0.0, 1.01]) + 0.02 * normal, atol=1e-12)
     np.testing.assert_array_equal(velocity, 0.0)

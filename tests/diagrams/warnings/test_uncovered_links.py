@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robots.arm import add_arm
-from diagrams.station_parts import belief_source
+from diagrams.station_options import belief_source
 from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.control.obstacles.obstacle_watch import ArmAhead
 from pfsc_drake.robot.serial.outline import arm_outline
