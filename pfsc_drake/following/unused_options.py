@@ -63,6 +63,7 @@ def refuse_unused(options: FollowerOptions, law: str, robot: RobotModel, task: T
         *_compliance_rules(options.compliance, task, kinds),
         *_motion_rules(task),
         *_plan_rules(options, task),
+        *_input_rules(options, task),
         *_fixture_rules(options, law, task),
         Rule(
             "bandwidth",
@@ -243,8 +244,23 @@ def _motion_rules(task: Task) -> list[Rule]:
 
 def _plan_rules(options: FollowerOptions, task: Task) -> list[Rule]:
     motion = "needs a path or surface at rest with a motion over time, and no stream"
-    planned = task.is_planned and options.stream is None and options.frame is None
-    return [Rule("reference", planned and not options.swings, motion)]
+    planned = task.is_planned and options.stream is None and not options.swings
+    rests = options.frame is None or options.frame_motion is not None
+    moves = options.frame is not None and options.reference is not None
+    return [
+        Rule("reference", planned and rests, f"{motion}; or the planned motion of its frame"),
+        Rule("frame_motion", moves, "needs frame and reference"),
+    ]
+
+
+def _input_rules(options: FollowerOptions, task: Task) -> list[Rule]:
+    chosen, in_space = options.controller, isinstance(task, SpaceTask)
+    known = chosen.external_torque.source == "known" or chosen.posture.yields == "known"
+    return [
+        Rule("operator", in_space or options.compliance.is_given, "needs a tool that complies"),
+        Rule("operator.switches", in_space, "needs regions or guides"),
+        Rule("known_forces", known, "needs forces that are known to law or posture"),
+    ]
 
 
 def _refuse_unused_limits(limits: MotionLimits) -> None:

@@ -13,6 +13,7 @@ from pfsc_drake import (
     ComplianceParameters,
     ControllerParameters,
     CoordinateImpedance,
+    Extension,
     FaultParameters,
     Fixture,
     FollowerOptions,
@@ -23,6 +24,7 @@ from pfsc_drake import (
     MotionLimits,
     ObstacleOptions,
     ObstacleShape,
+    OperatorOptions,
     Profile,
     SphereRegion,
     StreamLimits,
@@ -36,6 +38,7 @@ from pfsc_drake import (
     path_from_waypoints,
     straight_lines,
 )
+from pfsc_drake.blocks.wiring_blocks import Constant
 from pfsc_drake.compiled.content import NoContentError, content
 from pfsc_drake.control.compliance.pressing import PressParameters
 from pfsc_drake.control.estimation.link_deviation import StateUncertainty
@@ -47,6 +50,14 @@ from pfsc_drake.physics.friction import FrictionDrift
 POINTS = [[0.9, -0.3, 0.8], [1.0, 0.0, 0.9], [0.9, 0.3, 0.8], [0.8, 0.0, 0.75]]
 SOFT = CoordinateImpedance(Profile(3.0), Profile(60.0), Profile(500.0))
 FREE = CoordinateImpedance(Profile(3.0), Profile(60.0), Profile(0.0))
+
+
+class Constantly(Extension):
+    """Adds one block."""
+
+    def after_law(self, assembly):
+        assembly.add("one", Constant([1.0]))
+
 
 # another value of options whose type does not tell one
 OTHERS = {
@@ -91,6 +102,10 @@ OTHERS = {
     "frame": np.array([0.01, 0.0, 0.0, *np.eye(3).ravel()]),
     "fixtures.guidance.rules": "printed",
     "fixtures.looks": 2,
+    "operator": OperatorOptions(),
+    "known_forces": ("wrench_ext",),
+    "frame_motion": lambda: None,
+    "extensions": [Constantly()],
 }
 # blocks that are changed as a whole
 WHOLE = (CoordinateImpedance, StateUncertainty)
