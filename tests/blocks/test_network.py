@@ -235,3 +235,23 @@ def test_what_is_remembered_is_evaluated_with_the_stage_that_needs_as_much():
     later = value(program.update)
     np.testing.assert_array_equal(later, [1.7**2 + 1.0])
     np.testing.assert_array_equal(value(joined), [*value(stage), *later])
+
+
+def test_a_network_without_what_some_outputs_do_not_need():
+    """Two lags side by side, and a clock that only one of them is fed by."""
+    wiring = Wiring(
+        {"lag": Network.of(Lag(0.5), ["bias"]), "other": Network.of(Lag(0.25), ["bias"])},
+        {("lag", "value"): "value", ("other", "value"): ("lag", "rate")},
+        {"far": ("other", "lagged"), "near": ("lag", "lagged")},
+    )
+    whole = wiring.network()
+    near = whole.restricted(["near"])
+    assert set(near.states) == {"lag.value"} and list(near.outputs) == ["near"]
+    far = whole.restricted(["far", "near"])
+    assert set(far.states) == {"lag.value", "other.value"} and list(far.outputs) == ["far", "near"]
+    steppers = [Stepper(network) for network in (whole, near, far)]
+    for k in range(4):
+        rows = [stepper.step(value=np.array([1.0 + k, -2.0])) for stepper in steppers]
+        for row in rows[1:]:
+            for name, value in row.items():
+                np.testing.assert_array_equal(value, rows[0][name])
