@@ -157,10 +157,9 @@ class Assembly:
         Raises:
             InputError: If the joints cannot follow the motion.
         """
-        limits, chosen = self.options.reference, self.options.controller
-        assert limits is not None and self.task.motion is not None  # of a robot that carries
+        assert self.task.motion is not None  # of a robot that carries something
         known = self.task, self.law, self._begun, self.believed.friction
-        return planned_frame(MotionDemand(limits, chosen, *known), self.task.motion, placement)
+        return planned_frame(MotionDemand(self.options, *known), self.task.motion, placement)
 
     @property
     def estimates_state(self) -> bool:

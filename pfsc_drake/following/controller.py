@@ -133,10 +133,10 @@ class Controller(Diagram):
         super().__init__()
         self._plan(task, believed, options, start, posture)
         begun = CourseStart(posture, start.place)
-        chosen, friction = options.controller, believed.friction
+        friction = believed.friction
         if options.reference is not None:
-            known = self.law, begun, friction, progress, options.frame_motion
-            keep_drive_limits(options.reference, chosen, duration, task, *known)
+            known = task, self.law, begun, friction
+            keep_drive_limits(options, *known, duration, progress)
         self.waiting: Waiting | None = None if like is None else like.waiting
         if options.obstacles is not None and like is None:
             self.waiting = plan_waiting(options, task, self.law, begun, friction, posture)

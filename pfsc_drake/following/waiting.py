@@ -1,7 +1,7 @@
 """Progress that waits for obstacles: the arm's way ahead, how it can be stopped, and the blocks."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -216,7 +216,8 @@ def plan_waiting(
         spare = law.posture is not None and chosen.posture.yields == "none"
         require(spare, "obstacles.elbow", "given", allowed)
     limits = options.reference or limits_of(motion, MotionLimits())
-    planner = DrivePlanner(limits, chosen, 0.0, task, law, start, friction)
+    planned = replace(options, reference=limits)
+    planner = DrivePlanner(planned, task, law, start, friction)
     added = Approach(q_J, options.transition).reference(task, law, start)
     ahead, pace = waiting_motion(planner, law, obstacles.watch, added)
     return Waiting(obstacles.shapes, obstacles.watch, ahead, pace, obstacles.elbow)

@@ -12,8 +12,8 @@ from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.control.planning.course import CourseError, CourseStart
 from pfsc_drake.control.planning.drive_demand import Clock, find_pace, with_pace
 from pfsc_drake.errors import InputError, require
-from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.motion import MotionLimits
+from pfsc_drake.following.believed import Coefficients
+from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.planning.drive_plan import DrivePlan
 from pfsc_drake.following.planning.fastest_motion import FastestPlanner
 from pfsc_drake.following.planning.motion_demand import MotionDemand
@@ -42,38 +42,34 @@ _SLOW = 0.99
 
 
 def keep_drive_limits(
-    reference: MotionLimits,
-    controller: ControllerParameters,
-    duration: float,
+    options: FollowerOptions,
     task: Task,
     law: FollowingLaw,
     start: CourseStart,
-    friction: tuple[np.ndarray, np.ndarray] | None,
+    friction: Coefficients | None,
+    duration: float = 0.0,
     progress: Progress | None = None,
-    carrier: Callable[[], PiecewisePolynomialCurve] | None = None,
 ) -> None:
-    """Give a task its plan, and the reference that the drives can follow, unless it has them.
+    """Give a task its plan, and the motion that the drives can follow, unless it has them.
 
-    Where a hand leads, way points come while the tool moves, or the motion is longer than any run,
-    nobody plans it.
+    Motions that a hand or waypoints that come decide on, or that are longer than any run, are not
+    planned. Where a frame carries the manifold (``frame_motion``), nothing is slowed down.
 
     Args:
-        reference: The reference, and whether it may be slowed.
-        controller: What is chosen of the controller.
-        duration: Duration of the run [s]; 0 for that of the reference.
-        task: What the tool is to do.
-        law: The law that does it.
-        start: Where the robot starts, near the first place of the reference.
-        friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
-            are believed.
-        progress: Told the fraction done and what is done, where that takes its time.
-        carrier: Returns the planned motion of the frame that carries the task's manifold, if one
-            does, see :class:`MotionDemand`; nothing is slowed down then.
+        options: Options, with the demand on the drives that the motion may make.
+        task: Task of the tool.
+        law: Its law.
+        start: Start of the robot, near the first place of the motion.
+        friction: Coefficients f_c and f_v of the nominal model, each (N,), if there are any.
+        duration: Duration of the run [s]; 0 for that of the motion.
+        progress: Receives the fraction done and the name of the step.
 
     Raises:
-        InputError: If the fastest motion is asked for, and there is none.
+        InputError: If the fastest motion is requested, and there is none.
     """
-    fastest = reference.speed == "fastest"
+    limits, carrier = options.reference, options.frame_motion
+    assert limits is not None  # else nothing is planned
+    fastest = limits.speed == "fastest"
     along = indices(task.place.coordinates, Kind.TANGENTIAL)
     led = not task.is_planned or bool(law.stabilization.is_free[along].any())
     if task.drive_plan is not None:
@@ -81,38 +77,46 @@ def keep_drive_limits(
     if led:
         require(not fastest, "reference.speed", "fastest", "asked; where a hand leads nobody plans")
         return
-    assert task.motion is not None  # as it is neither guided nor streamed
+    assert task.motion is not None  # as it is planned
+    known = options, task, law, start, friction
     if fastest:
-        planner = FastestPlanner(reference, controller, task, law, start, friction)
-        task.drive_plan = planner.plan(progress=progress)
+        task.drive_plan = FastestPlanner(*known).plan(progress=progress)
     elif task.motion.domain[1] <= _LONGEST:
-        known = reference, controller, duration, task, law, start, friction
         try:
             frame = None if carrier is None else carrier()
         except InputError as error:
-            task.drive_plan = DrivePlanner(*known).unknown(str(error))
+            task.drive_plan = DrivePlanner(*known, duration=duration).unknown(str(error))
             return
-        task.drive_plan = DrivePlanner(*known, frame).plan()
+        task.drive_plan = DrivePlanner(*known, frame, duration).plan()
     else:
         return
     task.motion = task.drive_plan.motion
 
 
 class DrivePlanner(MotionDemand):
-    """Plans one reference of one robot."""
+    """Plans one motion of one robot.
+
+    Args:
+        options: See :class:`MotionDemand`, and all below.
+        task: The task.
+        law: Its law.
+        start: Start of the robot.
+        friction: Coefficients of the nominal model.
+        carrier: Motion of the frame that carries the manifold.
+        duration: Duration of the run [s]; 0 for that of the motion.
+    """
 
     def __init__(
         self,
-        reference: MotionLimits,
-        controller: ControllerParameters,
-        duration: float,
+        options: FollowerOptions,
         task: Task,
         law: FollowingLaw,
         start: CourseStart,
-        friction: tuple[np.ndarray, np.ndarray] | None,
+        friction: Coefficients | None,
         carrier: PiecewisePolynomialCurve | None = None,
+        duration: float = 0.0,
     ) -> None:
-        super().__init__(reference, controller, task, law, start, friction, carrier)
+        super().__init__(options, task, law, start, friction, carrier)
         self._run_duration = duration
 
     @once_per_content()

@@ -12,9 +12,9 @@ from pfsc_drake.control.planning.drive_demand import (
     allowed_demand,
     with_pace,
 )
+from pfsc_drake.following.believed import Coefficients
 from pfsc_drake.following.fault_description import describe_singularity
-from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.motion import MotionLimits
+from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.tasks.task import Task
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.coordinate_text import posture_text
@@ -32,8 +32,7 @@ class MotionDemand:
     """What the motions of one task ask of one robot.
 
     Args:
-        reference: The reference, with what it leaves of the drives.
-        controller: What is chosen of the controller.
+        options: Options of the controller; ``reference`` says what a motion leaves of the drives.
         task: What the tool is to do.
         law: The law that does it.
         start: Where the robot starts, near the first place of the reference.
@@ -50,15 +49,15 @@ class MotionDemand:
 
     def __init__(
         self,
-        reference: MotionLimits,
-        controller: ControllerParameters,
+        options: FollowerOptions,
         task: Task,
         law: FollowingLaw,
         start: CourseStart,
-        friction: tuple[np.ndarray, np.ndarray] | None,
+        friction: Coefficients | None,
         carrier: PiecewisePolynomialCurve | None = None,
     ) -> None:
-        self._carrier = carrier
+        self._carrier, reference, controller = carrier, options.reference, options.controller
+        assert reference is not None  # of a motion that is planned
         self._reference, self._period = reference, controller.sampling_time
         self._task, self._law, self._start = task, law, start
         self._posture = controller.posture
