@@ -17,8 +17,8 @@ from diagrams.robots.remote_arm import add_remote_arm
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario, Streamed
 from diagrams.scenario.checks import require, require_whole_fraction
-from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.massless import check_massless
+from diagrams.scenario.virtual_fixtures import FixtureParameters
 from diagrams.surroundings.forces import Outside
 from diagrams.surroundings.leader import Leading
 from diagrams.surroundings.mounting import Mounting, make_mounting

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from diagrams.robots.workpiece import WorkpieceLook
-from diagrams.tasks.fixtures import DrawnFixture
+from diagrams.tasks.regions_and_guides import DrawnFixture
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold

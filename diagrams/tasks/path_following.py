@@ -15,10 +15,15 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.checks import require
 from diagrams.tasks.drawing import PathDrawing
-from diagrams.tasks.path import make_path, require_orientation
-from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
-from diagrams.tasks.surface import followed_angles, require_joints
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.task_geometry import (
+    followed_angles,
+    make_path,
+    make_path_on_surface,
+    require_joints,
+    require_orientation,
+    surface_of_path,
+)
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint

@@ -7,12 +7,11 @@ import numpy as np
 
 from diagrams.scenario import StartParameters
 from diagrams.scenario.checks import require
-from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.virtual_fixtures import FixtureParameters
 from diagrams.tasks.drawing import SpaceDrawing
-from diagrams.tasks.fixtures import make_fixtures
-from diagrams.tasks.guides import make_guides
-from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
+from diagrams.tasks.regions_and_guides import make_fixtures, make_guides
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.task_geometry import followed_angles, require_joints
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.manifolds.space import SpaceManifold
@@ -63,7 +62,7 @@ class SpaceTask(Task):
         progress: Progress | None = None,
     ) -> None:
         said = parameters.orientation
-        self.place = SpaceManifold(relative_degree, given_quaternion(said), **followed_angles(said))
+        self.place = SpaceManifold(relative_degree, said.quaternion, **followed_angles(said))
         self.manifold = self.place
         given, allowed = start.position, "the tool point where it starts [m], 3 numbers"
         require(bool(given), "start.position", given, allowed)

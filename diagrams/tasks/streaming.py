@@ -10,8 +10,8 @@ from diagrams.scenario import ControllerParameters, PathParameters, StartParamet
 from diagrams.scenario.checks import require
 from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, strokes, told_messages
 from diagrams.tasks.drawn_plane import SIDE, StreamDrawing, border
-from diagrams.tasks.surface import followed_angles
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.task_geometry import followed_angles
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import PlaceEvaluator, ToolKinematics

@@ -14,13 +14,8 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.checks import require, require_numbers
 from diagrams.tasks.drawing import SurfaceDrawing
-from diagrams.tasks.surface import (
-    given_quaternion,
-    make_surface,
-    make_surface_manifold,
-    require_joints,
-)
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.tasks.task_geometry import make_surface, make_surface_manifold, require_joints
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import straight_lines, together
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
@@ -81,7 +76,7 @@ class SurfaceTask(Task):
         self.place = make_surface_manifold(self.relative_degree, parameters)
         self.manifold = self.place
         self._evaluator = SurfaceEvaluator(
-            self.surface, self.relative_degree, given_quaternion(parameters.orientation)
+            self.surface, self.relative_degree, parameters.orientation.quaternion
         )
         self.shape: SurfaceReport = surface_report(self.surface)
         self.warnings = list(made.notes)

@@ -44,6 +44,13 @@ from pfsc_drake.geometry.rotation import (
     zyz_to_matrix,
     zyz_to_quaternion,
 )
+from pfsc_drake.geometry.shapes.cone import cone
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.plane import plane
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.shapes.sphere import sphere
+from pfsc_drake.geometry.shapes.torus import torus
 from pfsc_drake.geometry.surfaces.curvature import FundamentalForms, fundamental_forms
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.generated import (
@@ -61,15 +68,6 @@ from pfsc_drake.geometry.surfaces.projection import (
 )
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport, surface_report
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, SurfaceFit, fit_scattered
-from pfsc_drake.geometry.surfaces.shapes import (
-    Turned,
-    cone,
-    cylinder,
-    paraboloid,
-    plane,
-    sphere,
-    torus,
-)
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
 from pfsc_drake.geometry.surfaces.surface import (
     Surface,

@@ -163,7 +163,3 @@ def check_order(order: int) -> int:
     if isinstance(order, bool) or int(order) != order or order < 0 or not math.isfinite(order):
         raise InputError(f"order of derivative: {order}; an integer >= 0 is required")
     return int(order)
-
-
-# m: shorter ones are no motion of a robot, and coordinates beyond leave no digits for it.
-SHORTEST, FARTHEST = 1e-4, 1e4

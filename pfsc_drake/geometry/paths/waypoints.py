@@ -6,8 +6,9 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from pfsc_drake.checks import FARTHEST, SHORTEST
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST, Curve
+from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import (
     OrientationCurve,
     check_neighbours,

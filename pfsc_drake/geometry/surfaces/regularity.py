@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pfsc_drake.checks import FARTHEST, SHORTEST
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
 from pfsc_drake.geometry.surfaces.surface import Surface
 

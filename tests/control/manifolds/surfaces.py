@@ -8,8 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.geometry import FourierCurve, zyx_to_matrix
 from pfsc_drake.geometry.path_on_surface import path_on_surface
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.shapes.torus import torus
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid, torus
 from pfsc_drake.geometry.surfaces.surface import partial_orders
 
 # about horizontal, within reach of six axes

@@ -13,7 +13,7 @@ from scipy.optimize import newton
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Scenario
-from diagrams.tasks.path import make_path
+from diagrams.tasks.task_geometry import make_path
 from pfsc_drake.geometry import FourierCurve
 from pfsc_drake.geometry import Path as GeometricPath
 from pfsc_drake.robot.models.files import models_directory, resolve_model

@@ -14,13 +14,11 @@ from pfsc_drake.geometry.regions.checks import (
     tangent_regions,
 )
 from pfsc_drake.geometry.regions.moving import ShiftedRegion
-from pfsc_drake.geometry.regions.polyhedron import PolyhedronRegion, box_corners
-from pfsc_drake.geometry.regions.shapes import (
-    CylinderRegion,
-    HalfSpace,
-    ParaboloidRegion,
-    SphereRegion,
-)
+from pfsc_drake.geometry.shapes.box import PolyhedronRegion, box_corners
+from pfsc_drake.geometry.shapes.cylinder import CylinderRegion
+from pfsc_drake.geometry.shapes.paraboloid import ParaboloidRegion
+from pfsc_drake.geometry.shapes.plane import HalfSpace
+from pfsc_drake.geometry.shapes.sphere import SphereRegion
 
 START = (1.094, 0.02, 1.077)
 UP = (0.0, 0.0, 1.0)

@@ -19,14 +19,12 @@ from pfsc_drake.geometry import (
     torus,
     zyx_to_matrix,
 )
-from pfsc_drake.geometry.regions.shapes import (
-    ConeRegion,
-    CylinderRegion,
-    HalfSpace,
-    ParaboloidRegion,
-    SphereRegion,
-    TorusRegion,
-)
+from pfsc_drake.geometry.shapes.cone import ConeRegion
+from pfsc_drake.geometry.shapes.cylinder import CylinderRegion
+from pfsc_drake.geometry.shapes.paraboloid import ParaboloidRegion
+from pfsc_drake.geometry.shapes.plane import HalfSpace
+from pfsc_drake.geometry.shapes.sphere import SphereRegion
+from pfsc_drake.geometry.shapes.torus import TorusRegion
 from tests.geometry.regions.brute_force import BruteForce, gradient
 
 ORIGIN = np.array([0.3, -0.2, 0.7])

@@ -1,6 +1,9 @@
-"""Obstacles bounded by planes."""
+"""Boxes, and other convex polyhedra."""
 
+import dataclasses as dc
+import itertools
 import math
+from collections.abc import Sequence
 from functools import reduce
 
 import casadi as ca
@@ -8,13 +11,54 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
+from pfsc_drake.checks import equal, require, require_length, require_numbers
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.regions.region import FormulaRegion, Symbol, Triple, direction
-from pfsc_drake.geometry.surfaces.surface import checked_placement
+from pfsc_drake.geometry.regions.region import FormulaRegion, Region, Symbol, Triple, direction
+from pfsc_drake.geometry.shapes.plane import plane
+from pfsc_drake.geometry.shapes.shape import PlacedShape, ShapeInputs
+from pfsc_drake.geometry.surfaces.surface import Surface, checked_placement
 
 # Planes whose coefficients differ by less are one, m.
 _SAME = 1e-9
 _ROUNDING = 1e-12
+
+
+@dc.dataclass
+class Box(PlacedShape):
+    """A box, as an obstacle; its origin is its middle.
+
+    Attributes:
+        size: Along its three axes [m]; one number for a cube.
+    """
+
+    size: list[float] = dc.field(default_factory=lambda: [0.1, 0.1, 0.1], metadata=equal(3))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_numbers("size", self.size, 3)
+        for length in self.size:
+            require_length("size", length)
+
+    def check_side(self, admissible: str) -> None:
+        """Refuse an admissible side that its region does not have."""
+        allowed = "outside of a !Box; for its inside a !Plane at each of its sides"
+        require(admissible in ("", "outside"), "admissible", admissible, allowed)
+        super().check_side(admissible)
+
+    def region(self, inputs: ShapeInputs, *, inside: bool) -> Region:
+        """Return the region that it bounds."""
+        return PolyhedronRegion(box_corners(self.size, self.origin, self.rotation))
+
+    def drawn_surfaces(self, inputs: ShapeInputs) -> Sequence[Surface]:
+        """Return its six sides."""
+        axes, half = self.rotation, np.array(self.size) / 2.0
+        faces = []
+        for k, sign in itertools.product(range(3), (-1.0, 1.0)):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            rotation = np.column_stack([axes[:, i], axes[:, j], axes[:, k]])
+            size = ((-half[i], half[i]), (-half[j], half[j]))
+            faces.append(plane(size, self.origin + sign * half[k] * axes[:, k], rotation))
+        return faces
 
 
 class PolyhedronRegion(FormulaRegion):
@@ -65,8 +109,8 @@ class PolyhedronRegion(FormulaRegion):
         """Signed distance and normal as expressions."""
         heights = [a * point[0] + b * point[1] + c * point[2] + d for a, b, c, d in self._planes]
         h, n = heights[0], ca.SX(self._planes[0][:3])
-        for height, plane in zip(heights[1:], self._planes[1:], strict=True):
-            n = ca.if_else(height >= h, ca.DM(plane[:3]), n)
+        for height, face in zip(heights[1:], self._planes[1:], strict=True):
+            n = ca.if_else(height >= h, ca.DM(face[:3]), n)
             h = ca.fmax(h, height)
         foot = point - h * n
         over = [a * foot[0] + b * foot[1] + c * foot[2] + d for a, b, c, d in self._planes]

@@ -15,8 +15,11 @@ from pfsc_drake.geometry import (
     surface_of_revolution,
     zyx_to_matrix,
 )
-from pfsc_drake.geometry.regions.profile import ExtrudedRegion, PlaneCurve, RevolvedRegion
-from pfsc_drake.geometry.regions.shapes import ConeRegion, CylinderRegion, HalfSpace
+from pfsc_drake.geometry.regions.plane_curve import PlaneCurve
+from pfsc_drake.geometry.shapes.cone import ConeRegion
+from pfsc_drake.geometry.shapes.cylinder import CylinderRegion
+from pfsc_drake.geometry.shapes.plane import HalfSpace
+from pfsc_drake.geometry.shapes.profiles import ExtrudedRegion, RevolvedRegion
 from tests.geometry.regions.brute_force import BruteForce, gradient
 
 ORIGIN = np.array([0.3, -0.2, 0.7])
