@@ -2,14 +2,11 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
-
-Sampler = Callable[[float], np.ndarray]
 
 
 class Curve(ABC):
@@ -114,32 +111,6 @@ class Curve(ABC):
         Raises:
             InputError: theta lies outside the domain of an open curve.
         """
-
-    @abstractmethod
-    def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`, result flattened (derivative index slow).
-
-        Args:
-            order: Highest order of derivative, at least 0.
-
-        Returns:
-            Function of a float theta that returns a new array [(order + 1) * dimension].
-            Closed curves wrap; open curves are continued analytically, which only
-            serves rounding errors at the ends.
-        """
-
-    def sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`.
-
-        Args:
-            order: Highest order of derivative, at least 0.
-
-        Returns:
-            Function of a float theta that returns an array [order + 1, dimension].
-        """
-        sample = self.flat_sampler(order)
-        shape = (order + 1, self.dimension)
-        return lambda theta: sample(theta).reshape(shape)
 
     def _checked(self, theta: ArrayLike) -> np.ndarray:
         """Wrapped parameters; refuses those outside of an open curve."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
+from pfsc_drake.geometry.curves.curve import Curve, check_order
 
 # Between the axes of a circle: from smaller ones its plane is not known well.
 _LEAST_ANGLE_DEG = 0.1
@@ -111,24 +111,6 @@ class FourierCurve(Curve):
         basis[..., 1::2] = np.cos(angles)
         basis[..., 2::2] = np.sin(angles)
         return np.einsum("kdj,...j->...kd", self._table(order), basis)
-
-    def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
-        harmonics = range(1, len(self.cosine) + 1)
-        matrix = self._table(order).reshape(-1, 2 * len(harmonics) + 1)
-        cos, sin = math.cos, math.sin
-
-        def sample_two_harmonics(theta: float) -> np.ndarray:
-            c, s = cos(theta), sin(theta)
-            return matrix.dot((1.0, c, s, c * c - s * s, 2.0 * s * c))
-
-        def sample_any(theta: float) -> np.ndarray:
-            basis = [1.0]
-            for k in harmonics:
-                basis += (cos(k * theta), sin(k * theta))
-            return matrix.dot(basis)
-
-        return sample_two_harmonics if len(harmonics) == 2 else sample_any
 
     def _table(self, order: int) -> np.ndarray:
         """Map from [1, cos, sin, cos 2, ...] to derivatives, [order + 1, dimension, terms]."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import Curve, Sampler
+from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import check_parameters, check_smoothness, interpolate_at
 from pfsc_drake.geometry.rotation import quaternion_to_matrix
@@ -71,10 +71,6 @@ class OrientationCurve(Curve):
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
         """Derivatives 0..order with respect to theta, for set-up and figures. Dimension 4."""
         return self._curve.derivatives(theta, order)
-
-    def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`, dimension 4, flattened (derivative index slow)."""
-        return self._curve.flat_sampler(order)
 
     def rotation_matrix(self, theta: ArrayLike) -> np.ndarray:
         """Rotation matrices R(theta).

@@ -88,7 +88,7 @@ def test_tool_is_beside_the_lemniscate(load_scenario, start, name):
     assert slope @ (y_t - sigma) == pytest.approx(0.0, abs=1e-8)
     assert e_perp @ (y_t - sigma) == pytest.approx(0.01, abs=1e-8)
     assert e_cross @ (y_t - sigma) == pytest.approx(-0.02, abs=1e-8)
-    assert path.arc_length.at(theta) == pytest.approx(settings.reference.points[0], abs=1e-9)
+    assert path.arc_length(theta) == pytest.approx(settings.reference.points[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (3.0, -2.0, 1.0)])

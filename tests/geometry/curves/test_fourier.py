@@ -15,8 +15,6 @@ def test_bent_lemniscate_is_3_87(lemniscate: FourierCurve) -> None:
     c, s = np.cos(theta), np.sin(theta)
     expected = np.stack([0.25 * c + 0.7, 0.25 * s * c + 0.2, 0.1 * s**2 + 1.103], axis=1)
     np.testing.assert_allclose(lemniscate.derivatives(theta, 0)[:, 0], expected, atol=1e-15)
-    sample = lemniscate.sampler(0)
-    np.testing.assert_allclose([sample(t)[0] for t in theta.tolist()], expected, atol=1e-15)
 
 
 def test_derivatives_by_contour_integral(lemniscate: FourierCurve, twisted: FourierCurve) -> None:

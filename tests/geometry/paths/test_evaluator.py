@@ -16,7 +16,6 @@ from pfsc_drake.geometry import (
     PathEvaluator,
     PiecewisePolynomialCurve,
     ProjectionStatus,
-    Projector,
     WaypointTable,
     foot,
     interpolate,
@@ -24,6 +23,7 @@ from pfsc_drake.geometry import (
     path_from_waypoints,
     zyx_to_quaternion,
 )
+from tests.geometry.paths.newton_projector import Projector
 
 
 def _path(closed: bool) -> Path:
@@ -157,7 +157,7 @@ def test_laps_turn_the_normal(twisted: FourierCurve, laps: int) -> None:
         for out in (evaluator.evaluate_at(unwrapped), evaluator(sigma.tolist(), unwrapped + 1e-3)):
             np.testing.assert_allclose(out[4:7], expected, atol=1e-12)
             assert out[0] == pytest.approx(unwrapped, abs=1e-13)
-            eta = path.arc_length.at(theta) + laps * path.length
+            eta = path.arc_length(theta) + laps * path.length
             assert out[1] == pytest.approx(eta, abs=1e-12)
 
 
@@ -169,7 +169,7 @@ def test_the_seam_is_crossed_both_ways() -> None:
             point = curve.derivatives(seam + theta, 0)[0]
             out = evaluator(point.tolist(), seam + guess)
             assert out[0] == pytest.approx(seam + theta, abs=1e-13)
-            assert out[1] == pytest.approx(CLOSED.arc_length.at(seam + theta), abs=1e-12)
+            assert out[1] == pytest.approx(CLOSED.arc_length(seam + theta), abs=1e-12)
 
 
 def test_centre_of_a_circle_has_no_foot() -> None:

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from pfsc_drake.geometry import (
     FourierCurve,
     PiecewisePolynomialCurve,
-    Projector,
     interpolate,
 )
 from pfsc_drake.geometry.curves.curve import Curve
+from tests.geometry.paths.newton_projector import Projector
 
 LEMNISCATE = FourierCurve.bent_lemniscate()
 COORDINATE = st.floats(-0.5, 0.5)

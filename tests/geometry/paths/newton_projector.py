@@ -1,4 +1,4 @@
-"""Closest point on a curve."""
+"""Closest point on a curve by Newton's method on numbers, to compare with."""
 
 import math
 from collections.abc import Sequence
@@ -50,7 +50,6 @@ class Projector:
         self.curve = curve
         self._begin, self._end = curve.domain
         self._closed = curve.closed
-        self._sample = curve.sampler(2)
 
     def project(self, point: Sequence[float], theta_guess: float) -> Projection:
         """Closest point near the guess.
@@ -74,7 +73,7 @@ class Projector:
             theta = min(max(theta, begin), end)
         origin, step, least, alpha = theta, 0.0, math.inf, math.nan
         for iteration in range(1, _MAX_ITERATIONS + 1):
-            sigma, first, second = self._sample(theta)
+            sigma, first, second = self.curve.derivatives(theta, 2)
             error = y - sigma
             cost, slope, square, bend = (
                 float(one @ other)
