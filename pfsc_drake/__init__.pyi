@@ -205,12 +205,12 @@ from pfsc_drake.geometry.regions.moving import (
 )
 from pfsc_drake.geometry.regions.region import Region as Region
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion as SurfaceRegion
-from pfsc_drake.geometry.shapes.box import PolyhedronRegion as PolyhedronRegion
-from pfsc_drake.geometry.shapes.box import box_corners as box_corners
 from pfsc_drake.geometry.shapes.cone import ConeRegion as ConeRegion
 from pfsc_drake.geometry.shapes.cylinder import CylinderRegion as CylinderRegion
 from pfsc_drake.geometry.shapes.paraboloid import ParaboloidRegion as ParaboloidRegion
 from pfsc_drake.geometry.shapes.plane import HalfSpace as HalfSpace
+from pfsc_drake.geometry.shapes.polyhedron import PolyhedronRegion as PolyhedronRegion
+from pfsc_drake.geometry.shapes.polyhedron import box_corners as box_corners
 from pfsc_drake.geometry.shapes.profiles import ExtrudedRegion as ExtrudedRegion
 from pfsc_drake.geometry.shapes.profiles import RevolvedRegion as RevolvedRegion
 from pfsc_drake.geometry.shapes.sphere import SphereRegion as SphereRegion

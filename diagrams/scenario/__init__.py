@@ -28,7 +28,7 @@ from pfsc_drake.following.options.follower import BrakeParameters, FaultParamete
 from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.geometry.shapes.intersection import Intersection
 from pfsc_drake.geometry.shapes.on_surface import OnSurface
-from pfsc_drake.geometry.shapes.plain_paths import BentLemniscate, Circle, Line
+from pfsc_drake.geometry.shapes.path_shapes import BentLemniscate, Circle, Line
 from pfsc_drake.geometry.shapes.through_waypoints import Waypoints
 from pfsc_drake.geometry.shapes.tool_orientation import Keyframe, OrientationParameters
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint

@@ -7,7 +7,7 @@ from diagrams.scenario.streamed import Streamed
 from pfsc_drake.geometry.shapes.intersection import Intersection
 from pfsc_drake.geometry.shapes.on_surface import OnSurface
 from pfsc_drake.geometry.shapes.paraboloid import Paraboloid
-from pfsc_drake.geometry.shapes.plain_paths import BentLemniscate, Circle, Line
+from pfsc_drake.geometry.shapes.path_shapes import BentLemniscate, Circle, Line
 from pfsc_drake.geometry.shapes.surface_list import SurfaceShape
 from pfsc_drake.geometry.shapes.through_waypoints import Waypoints
 from pfsc_drake.geometry.shapes.tool_orientation import (

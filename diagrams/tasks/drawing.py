@@ -19,7 +19,7 @@ from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.geometry.path_on_surface import CurveOnSurface
 from pfsc_drake.geometry.regions.moving import MovingRegion
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.systems.drawing.manifold_visualizer import (
     PathVisualizer,
     RegionVisualizer,

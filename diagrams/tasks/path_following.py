@@ -34,8 +34,8 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
     shape_report,
 )
-from pfsc_drake.geometry.paths.evaluator import PathEvaluator
-from pfsc_drake.geometry.paths.path import PathTarget
+from pfsc_drake.geometry.paths.geometric_path import PathTarget
+from pfsc_drake.geometry.paths.path_evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.path_warnings import closing_gap, euler_warnings, path_warnings
 from pfsc_drake.geometry.progress import Progress
 

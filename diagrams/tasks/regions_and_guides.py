@@ -14,17 +14,17 @@ from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.parameters import Fixture
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.geometry.regions.checks import (
+from pfsc_drake.geometry.regions.moving import MovingRegion
+from pfsc_drake.geometry.regions.region import Region
+from pfsc_drake.geometry.regions.region_checks import (
     blocked_start,
     refuse_forbidden_start,
     refuse_same_regions,
     tangent_regions,
 )
-from pfsc_drake.geometry.regions.moving import MovingRegion
-from pfsc_drake.geometry.regions.region import Region
 from pfsc_drake.geometry.shapes.shape import ShapeInputs
 from pfsc_drake.geometry.shapes.tool_orientation import OrientationParameters
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 # a place on it is all that is asked of a guide
 _AS_SMOOTH_AS_FOR = "velocity_servo"

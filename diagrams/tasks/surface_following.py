@@ -24,9 +24,9 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.paths.path_warnings import euler_warnings
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.length import way_on_surface
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport, surface_report
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
 # s, between the places of the way along the surface

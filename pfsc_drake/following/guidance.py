@@ -23,9 +23,9 @@ from pfsc_drake.following.options.controller import ExternalTorqueParameters
 from pfsc_drake.following.options.follower import FixtureOptions, FollowerOptions
 from pfsc_drake.following.task import Followed, Guided
 from pfsc_drake.geometry import matrix_to_quaternion
-from pfsc_drake.geometry.regions.checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.geometry.regions.region import Region
+from pfsc_drake.geometry.regions.region_checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 

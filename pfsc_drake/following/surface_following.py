@@ -13,8 +13,8 @@ from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.task import Followed
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 

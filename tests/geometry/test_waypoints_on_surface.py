@@ -13,7 +13,7 @@ from pfsc_drake.geometry.path_on_surface import (
     path_on_surface,
     project_waypoints,
 )
-from pfsc_drake.geometry.paths.path import PathTarget
+from pfsc_drake.geometry.paths.geometric_path import PathTarget
 from pfsc_drake.geometry.shapes.cylinder import cylinder
 from pfsc_drake.geometry.shapes.paraboloid import paraboloid
 

@@ -14,7 +14,7 @@ from pfsc_drake.checks import (
     require_place,
 )
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.files.unit import UNITS, Unit
+from pfsc_drake.geometry.files.number_table import UNITS, Unit
 from pfsc_drake.geometry.regions.region import Region
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion, normal_points_outwards
 from pfsc_drake.geometry.shapes.shape import (
@@ -25,10 +25,10 @@ from pfsc_drake.geometry.shapes.shape import (
 )
 from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.point_file import read_surface_file
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
-from pfsc_drake.geometry.surfaces.surface import Surface
 
 _BASES = ("auto", "plane", "cylinder")
 _SHORTEST_TOLERANCE = 1e-7  # m

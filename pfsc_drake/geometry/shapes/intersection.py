@@ -7,10 +7,10 @@ from pfsc_drake.checks import FARTHEST, require, require_place
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.intersections.edge import Edge, find_edge, find_edges
-from pfsc_drake.geometry.shapes.path_shape import CurveShape
+from pfsc_drake.geometry.shapes.path_shapes import CurveShape
 from pfsc_drake.geometry.shapes.shape import ShapeInputs
 from pfsc_drake.geometry.shapes.surface_list import SurfaceShape
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 
 @dc.dataclass

@@ -8,19 +8,19 @@ import numpy as np
 from pfsc_drake.checks import FARTHEST, FILE, require, require_numbers, require_one_of
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.orientation import OrientationCurve
-from pfsc_drake.geometry.files.unit import UNITS, Unit
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve
+from pfsc_drake.geometry.files.number_table import UNITS, Unit
 from pfsc_drake.geometry.path_on_surface import (
     curve_through,
     normal_orientation,
     path_on_surface,
     project_waypoints,
 )
-from pfsc_drake.geometry.paths.path import Path
+from pfsc_drake.geometry.paths.geometric_path import Path
 from pfsc_drake.geometry.paths.waypoints import read_waypoints
 from pfsc_drake.geometry.shapes.shape import PlacedSurface, ShapeInputs
 from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 
 @dc.dataclass

@@ -15,9 +15,9 @@ from pfsc_drake.checks import FARTHEST, require, require_direction, require_numb
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.regions.region import Region
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface, rotation_from_axes
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
-from pfsc_drake.geometry.surfaces.surface import Surface, rotation_from_axes
 
 Pair = tuple[float, float]
 # class C^k of the surface of a region, and of one that is drawn

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.checks import require, require_length, require_numbers
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.fourier import FourierCurve
+from pfsc_drake.geometry.curves.fourier_curve import FourierCurve
 from pfsc_drake.geometry.regions.region import (
     FormulaRegion,
     Region,

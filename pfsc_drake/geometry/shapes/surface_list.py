@@ -2,12 +2,12 @@
 
 from typing import Union
 
-from pfsc_drake.geometry.shapes.box import Box
 from pfsc_drake.geometry.shapes.cone import Cone
 from pfsc_drake.geometry.shapes.cylinder import Cylinder
 from pfsc_drake.geometry.shapes.fitted import Fitted
 from pfsc_drake.geometry.shapes.paraboloid import Paraboloid
 from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.polyhedron import Box
 from pfsc_drake.geometry.shapes.profiles import Extruded, Revolved
 from pfsc_drake.geometry.shapes.sphere import Sphere
 from pfsc_drake.geometry.shapes.torus import Torus

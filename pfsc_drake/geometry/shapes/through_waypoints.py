@@ -8,8 +8,8 @@ import numpy as np
 
 from pfsc_drake.checks import FARTHEST, FILE, SHORTEST, require, require_one_of
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.files.unit import UNITS, Unit
-from pfsc_drake.geometry.paths.path import Path
+from pfsc_drake.geometry.files.number_table import UNITS, Unit
+from pfsc_drake.geometry.paths.geometric_path import Path
 from pfsc_drake.geometry.paths.path_warnings import far_waypoints, turning_back
 from pfsc_drake.geometry.paths.waypoints import (
     Tolerance,
@@ -24,7 +24,7 @@ from pfsc_drake.geometry.rotation import (
     rotation_to_axis,
     rotation_vector_to_quaternion,
 )
-from pfsc_drake.geometry.shapes.path_shape import PathShape
+from pfsc_drake.geometry.shapes.path_shapes import PathShape
 from pfsc_drake.geometry.shapes.shape import ShapeInputs
 from pfsc_drake.geometry.shapes.tool_orientation import OrientationParameters
 

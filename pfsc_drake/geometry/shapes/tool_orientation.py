@@ -15,7 +15,7 @@ from pfsc_drake.checks import (
 )
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.orientation import OrientationCurve, interpolate_orientation
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve, interpolate_orientation
 from pfsc_drake.geometry.rotation import (
     EULER_TO_QUATERNION,
     quaternion_to_matrix,

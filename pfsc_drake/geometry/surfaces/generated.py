@@ -9,9 +9,9 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.basis import TrigonometricBasis, curve_on_basis
+from pfsc_drake.geometry.surfaces.parametric_surface import checked_placement
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.geometry.surfaces.regularity import check_regular
-from pfsc_drake.geometry.surfaces.surface import checked_placement
 
 _TURN = 2.0 * math.pi
 

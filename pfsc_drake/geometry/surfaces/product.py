@@ -7,7 +7,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import UniformKnots, interpolate_at
 from pfsc_drake.geometry.surfaces.basis import Basis, PowerBasis
-from pfsc_drake.geometry.surfaces.surface import (
+from pfsc_drake.geometry.surfaces.parametric_surface import (
     Sampler,
     Surface,
     check_partial_order,

@@ -14,7 +14,7 @@ from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.geometry.shapes.cylinder import cylinder
 from pfsc_drake.geometry.shapes.paraboloid import paraboloid
 from pfsc_drake.geometry.shapes.revolution import Turned
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from tests.control.law.closed_loop import (
     FEW_STEPS,
     ClosedLoop,

@@ -11,7 +11,7 @@ from diagrams.station_parts import make_task
 from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import make_guidance
-from pfsc_drake.geometry.shapes.plain_paths import Line
+from pfsc_drake.geometry.shapes.path_shapes import Line
 from pfsc_drake.geometry.shapes.through_waypoints import Waypoints
 from tests.control.conftest import Robot
 from tests.scenarios import shipped_scenario

@@ -6,7 +6,7 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve
-from pfsc_drake.geometry.paths.path import PathTarget
+from pfsc_drake.geometry.paths.geometric_path import PathTarget
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
 from tests.geometry.paths.newton_projector import Projector
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.orientation import OrientationCurve, check_neighbours
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve, check_neighbours
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.smoothing import SmoothFit, noise_level, smoothest_within
 from pfsc_drake.geometry.progress import Progress

@@ -9,15 +9,18 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.evaluator import ManifoldEvaluator, alpha_function
 from pfsc_drake.geometry.foot import Foot, FootFinder
-from pfsc_drake.geometry.nearest import ProjectionStatus, nearest_samples
-from pfsc_drake.geometry.point import SurfacePointLayout
+from pfsc_drake.geometry.manifold_point import ManifoldEvaluator, SurfacePointLayout, alpha_function
+from pfsc_drake.geometry.nearest_samples import ProjectionStatus, nearest_samples
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
 from pfsc_drake.geometry.surfaces.length import TangentialLength
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface, partial_count
 from pfsc_drake.geometry.surfaces.product import ProductSurface, checked_product
-from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, GlobalProjector, SurfaceProjection
-from pfsc_drake.geometry.surfaces.surface import Surface, partial_count
+from pfsc_drake.geometry.surfaces.surface_projection import (
+    LONGEST_STEP,
+    GlobalProjector,
+    SurfaceProjection,
+)
 
 # Of the lengths of the domain: a way after which it is asked whether another place is nearer.
 _FAR = 1.0 / 8.0

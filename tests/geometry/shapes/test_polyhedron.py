@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
-from pfsc_drake.geometry.shapes.box import PolyhedronRegion, box_corners
+from pfsc_drake.geometry.shapes.polyhedron import PolyhedronRegion, box_corners
 from tests.geometry.regions.brute_force import gradient
 
 R = zyx_to_matrix([0.4, -0.7, 1.1])

@@ -10,15 +10,14 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.orientation import OrientationCurve
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve
 from pfsc_drake.geometry.curves.polynomial import PieceTable
-from pfsc_drake.geometry.evaluator import ManifoldEvaluator, alpha_function
 from pfsc_drake.geometry.foot import FootFinder
-from pfsc_drake.geometry.nearest import nearest_samples
+from pfsc_drake.geometry.manifold_point import ManifoldEvaluator, PathPointLayout, alpha_function
+from pfsc_drake.geometry.nearest_samples import nearest_samples
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.frame import Frame
 from pfsc_drake.geometry.paths.table import Continuation, PathTable, continuations, tabulate
-from pfsc_drake.geometry.point import PathPointLayout
 
 # Of the domain.
 _LONGEST_STEP = 1.0 / 32.0

@@ -9,10 +9,10 @@ from scipy.optimize import minimize_scalar
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.orientation import OrientationCurve
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve
 from pfsc_drake.geometry.paths.arc_length import ArcLength
-from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import Frame, ParallelTransportFrame, manifold_axes
+from pfsc_drake.geometry.paths.path_evaluator import PathEvaluator
 
 _IRREGULAR = 1e-6
 _SUSPICIOUS = 0.2

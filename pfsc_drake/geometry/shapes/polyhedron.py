@@ -16,7 +16,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.region import FormulaRegion, Region, Symbol, Triple, direction
 from pfsc_drake.geometry.shapes.plane import plane
 from pfsc_drake.geometry.shapes.shape import PlacedShape, ShapeInputs
-from pfsc_drake.geometry.surfaces.surface import Surface, checked_placement
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface, checked_placement
 
 # Planes whose coefficients differ by less are one, m.
 _SAME = 1e-9

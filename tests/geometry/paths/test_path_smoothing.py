@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Tolerance, WaypointTable, path_from_waypoints, zyx_to_quaternion
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.paths.smoothing import smooth_positions
+from pfsc_drake.geometry.paths.path_smoothing import smooth_positions
 
 CIRCLE_RADIUS = 0.1
 

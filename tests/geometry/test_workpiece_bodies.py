@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.workpieces import bore_wedges
+from pfsc_drake.geometry.workpiece_bodies import bore_wedges
 
 RADIUS, RING, DEPTH, COUNT = 4.15e-3, 16e-3, 10e-3, 24
 WEDGES = bore_wedges(RADIUS, RING, DEPTH, COUNT)

@@ -13,8 +13,8 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.foot import FootFinder
 from pfsc_drake.geometry.surfaces.extended import SurfaceTable
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
-from pfsc_drake.geometry.surfaces.surface import Surface
 
 _MAX_STARTS = 8
 # Of the domain: feet that are nearer to each other are one.

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.spline import UniformKnots
-from pfsc_drake.geometry.surfaces.surface import rotation_from_axes
+from pfsc_drake.geometry.surfaces.parametric_surface import rotation_from_axes
 
 # Sites per knot interval at which a circle is fitted by a spline.
 _SITES = 3

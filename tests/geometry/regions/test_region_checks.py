@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.regions.checks import (
+from pfsc_drake.geometry.regions.moving import ShiftedRegion
+from pfsc_drake.geometry.regions.region_checks import (
     blocked_start,
     refuse_forbidden_start,
     refuse_same_regions,
     tangent_regions,
 )
-from pfsc_drake.geometry.regions.moving import ShiftedRegion
-from pfsc_drake.geometry.shapes.box import PolyhedronRegion, box_corners
 from pfsc_drake.geometry.shapes.cylinder import CylinderRegion
 from pfsc_drake.geometry.shapes.paraboloid import ParaboloidRegion
 from pfsc_drake.geometry.shapes.plane import HalfSpace
+from pfsc_drake.geometry.shapes.polyhedron import PolyhedronRegion, box_corners
 from pfsc_drake.geometry.shapes.sphere import SphereRegion
 
 START = (1.094, 0.02, 1.077)
