@@ -48,13 +48,11 @@ from pfsc_drake.geometry.shapes.cylinder import cylinder as cylinder
 from pfsc_drake.geometry.shapes.paraboloid import paraboloid as paraboloid
 from pfsc_drake.geometry.shapes.plane import plane as plane
 from pfsc_drake.geometry.shapes.revolution import Turned as Turned
+from pfsc_drake.geometry.shapes.revolution import surface_of_revolution as surface_of_revolution
 from pfsc_drake.geometry.shapes.sphere import sphere as sphere
 from pfsc_drake.geometry.shapes.torus import torus as torus
 from pfsc_drake.geometry.surfaces.curvature import FundamentalForms as FundamentalForms
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms as fundamental_forms
-from pfsc_drake.geometry.surfaces.generated import extruded_surface as extruded_surface
-from pfsc_drake.geometry.surfaces.generated import surface_of_revolution as surface_of_revolution
-from pfsc_drake.geometry.surfaces.generated import translated_surface as translated_surface
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid as smooth_surface_near_grid
 from pfsc_drake.geometry.surfaces.grid import surface_through_grid as surface_through_grid
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface as Surface
@@ -64,6 +62,8 @@ from pfsc_drake.geometry.surfaces.parametric_surface import partial_orders as pa
 from pfsc_drake.geometry.surfaces.parametric_surface import rotation_from_axes as rotation_from_axes
 from pfsc_drake.geometry.surfaces.point_file import read_surface_points as read_surface_points
 from pfsc_drake.geometry.surfaces.product import ProductSurface as ProductSurface
+from pfsc_drake.geometry.surfaces.product import extruded_surface as extruded_surface
+from pfsc_drake.geometry.surfaces.product import translated_surface as translated_surface
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport as SurfaceReport
 from pfsc_drake.geometry.surfaces.regularity import surface_report as surface_report
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions as ScatteredFitOptions

@@ -24,9 +24,8 @@ from pfsc_drake.geometry.shapes.shape import (
     pair,
     require_ends,
 )
-from pfsc_drake.geometry.surfaces.generated import translated_surface
 from pfsc_drake.geometry.surfaces.parametric_surface import checked_placement
-from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.product import ProductSurface, translated_surface
 
 
 @dc.dataclass

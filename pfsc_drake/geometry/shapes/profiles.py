@@ -14,15 +14,20 @@ from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import interpolate
 from pfsc_drake.geometry.regions.plane_curve import PlaneCurve
 from pfsc_drake.geometry.regions.region import FormulaRegion, Region, Symbol, axes_along
-from pfsc_drake.geometry.shapes.revolution import Meridian, OfRevolution, TurnedRegion
+from pfsc_drake.geometry.shapes.revolution import (
+    Meridian,
+    OfRevolution,
+    TurnedRegion,
+    surface_of_revolution,
+)
 from pfsc_drake.geometry.shapes.shape import (
     MadeSurface,
     PlacedSurface,
     ShapeInputs,
     require_smoothness,
 )
-from pfsc_drake.geometry.surfaces.generated import extruded_surface, surface_of_revolution
 from pfsc_drake.geometry.surfaces.point_file import read_profile
+from pfsc_drake.geometry.surfaces.product import extruded_surface
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
 
 Profile = tuple[PiecewisePolynomialCurve, tuple[str, ...]]

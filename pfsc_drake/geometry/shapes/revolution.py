@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.regions.region import (
     FormulaRegion,
@@ -21,10 +22,13 @@ from pfsc_drake.geometry.regions.region import (
     direction,
 )
 from pfsc_drake.geometry.shapes.shape import Pair, PlacedSurface, pair
-from pfsc_drake.geometry.surfaces.generated import surface_of_revolution
+from pfsc_drake.geometry.surfaces.basis import TrigonometricBasis, curve_on_basis
+from pfsc_drake.geometry.surfaces.parametric_surface import checked_placement
 from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.regularity import check_regular
 
 _LARGEST_TURN = 720.0  # deg
+_TURN = 2.0 * math.pi
 
 
 class Turned(NamedTuple):
@@ -80,6 +84,54 @@ class OfRevolution(PlacedSurface):
         super().check_side(admissible)
         allowed = "empty: a region goes all the way round"
         require(not self.angles_deg, "shape.angles_deg", self.angles_deg, allowed)
+
+
+def surface_of_revolution(
+    profile: Curve,
+    *,
+    part: tuple[float, float] | None = None,
+    origin: ArrayLike = (0.0, 0.0, 0.0),
+    rotation: ArrayLike | None = None,
+    angles: tuple[float, float] | None = None,
+    inward: bool = False,
+) -> ProductSurface:
+    """Surface that a profile leaves when it is turned about an axis.
+
+    sigma = o + rho(theta_2) (e_x cos(theta_1) + e_y sin(theta_1)) + h(theta_2) e_z, with the
+    columns e of the rotation. Where h grows with theta_2 the normal (4.3) points away from the
+    axis.
+
+    Args:
+        profile: (rho, h), a curve in the plane, m.
+        part: Parameters of the profile that are used, of a Fourier curve; all by default.
+        origin: o, [3], m.
+        rotation: [3, 3]; the identity by default.
+        angles: First and last theta_1, rad; closed by default.
+        inward: Turn the other way, -e_y instead of e_y, and with it the normal round.
+
+    Raises:
+        InputError: A profile of another dimension, one that meets the axis or is not
+            regular, or angles that do not increase or exceed a turn.
+    """
+    if profile.dimension != 2:
+        raise InputError(f"profile: dimension {profile.dimension}; (radius, height) is required")
+    begin, end = angles or (0.0, _TURN)
+    if not 0.0 < end - begin <= _TURN * (1.0 + 1e-12):
+        raise InputError(
+            f"angles: [{begin:.9g}, {end:.9g}] rad; must increase, by at most {_TURN:.9g}"
+        )
+    o, R = checked_placement(origin, rotation)
+    second, table = curve_on_basis(profile, part)
+    coefficients = np.zeros((1, len(table), 3, second.size, 3))
+    rho, height = table[..., 0, None], table[..., 1, None]
+    coefficients[0, :, 0] = height * R[:, 2]
+    coefficients[0, :, 0, 0] += o
+    coefficients[0, :, 1] = rho * R[:, 0]
+    coefficients[0, :, 2] = rho * (-R[:, 1] if inward else R[:, 1])
+    first = TrigonometricBasis((begin, end), 1, closed=angles is None)
+    surface = ProductSurface(first, second, coefficients, smoothness=profile.smoothness)
+    check_regular(surface)
+    return surface
 
 
 def turned_line(start: Pair, slope: Pair, ends: Pair, turned: Turned | None) -> ProductSurface:

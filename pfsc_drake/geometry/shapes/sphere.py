@@ -22,9 +22,9 @@ from pfsc_drake.geometry.shapes.revolution import (
     OfRevolution,
     Turned,
     check_positive,
+    surface_of_revolution,
 )
 from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs, pair
-from pfsc_drake.geometry.surfaces.generated import surface_of_revolution
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 
 

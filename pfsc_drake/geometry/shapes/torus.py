@@ -21,9 +21,9 @@ from pfsc_drake.geometry.shapes.revolution import (
     Turned,
     TurnedRegion,
     check_positive,
+    surface_of_revolution,
 )
 from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs
-from pfsc_drake.geometry.surfaces.generated import surface_of_revolution
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 
 

@@ -15,8 +15,8 @@ from pfsc_drake.geometry.shapes.plane import plane
 from pfsc_drake.geometry.shapes.revolution import Turned
 from pfsc_drake.geometry.shapes.sphere import sphere
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
-from pfsc_drake.geometry.surfaces.generated import extruded_surface, translated_surface
 from pfsc_drake.geometry.surfaces.parametric_surface import partial_orders
+from pfsc_drake.geometry.surfaces.product import extruded_surface, translated_surface
 from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 
 ORDER = 5
