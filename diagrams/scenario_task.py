@@ -7,19 +7,18 @@ import numpy as np
 
 from diagrams.scenario import OrientationParameters, ReferenceParameters, Scenario, Streamed
 from diagrams.scenario.checks import require, require_numbers
-from diagrams.scenario.fixtures import FixtureParameters
-from diagrams.scenario.surface import SurfaceOrientationParameters
-from diagrams.tasks.fixtures import make_fixtures
-from diagrams.tasks.guides import make_guides
-from diagrams.tasks.path import make_path, require_orientation
-from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
+from diagrams.scenario.virtual_fixtures import FixtureParameters
+from diagrams.tasks.regions_and_guides import make_fixtures, make_guides
 from diagrams.tasks.streaming import stream_task
-from diagrams.tasks.surface import (
+from diagrams.tasks.task_geometry import (
     followed_angles,
-    given_quaternion,
+    make_path,
+    make_path_on_surface,
     make_surface,
     make_surface_manifold,
     require_joints,
+    require_orientation,
+    surface_of_path,
 )
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
@@ -36,6 +35,7 @@ from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve
 from pfsc_drake.geometry.paths.path_warnings import closing_gap, euler_warnings, path_warnings
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
 _ORIENTATIONS = 1001
@@ -141,7 +141,7 @@ def _surface_task(scenario: Scenario, folder: FilePath, progress: Progress | Non
         made.surface,
         manifold,
         motion,
-        given_quaternion(parameters.orientation),
+        parameters.orientation.quaternion,
         theta=start.theta,
         offset=start.offset[0],
         position=start.position,
@@ -192,7 +192,7 @@ def _space_task(scenario: Scenario, folder: FilePath, progress: Progress | None)
     admittance, lead = free_motion(scenario.compliance, period), choose_lead(scenario)
     said, given = parameters.orientation, start.position
     place = SpaceManifold(
-        RELATIVE_DEGREE[scenario.controller.law], given_quaternion(said), **followed_angles(said)
+        RELATIVE_DEGREE[scenario.controller.law], said.quaternion, **followed_angles(said)
     )
     allowed = "the tool point where it starts [m], 3 numbers"
     require(bool(given), "start.position", given, allowed)

@@ -215,38 +215,18 @@ from pfsc_drake.geometry.regions.moving import (
 from pfsc_drake.geometry.regions.moving import (
     TurningRegion as TurningRegion,
 )
-from pfsc_drake.geometry.regions.polyhedron import (
-    PolyhedronRegion as PolyhedronRegion,
-)
-from pfsc_drake.geometry.regions.polyhedron import (
-    box_corners as box_corners,
-)
-from pfsc_drake.geometry.regions.profile import (
-    ExtrudedRegion as ExtrudedRegion,
-)
-from pfsc_drake.geometry.regions.profile import (
-    RevolvedRegion as RevolvedRegion,
-)
 from pfsc_drake.geometry.regions.region import Region as Region
-from pfsc_drake.geometry.regions.shapes import (
-    ConeRegion as ConeRegion,
-)
-from pfsc_drake.geometry.regions.shapes import (
-    CylinderRegion as CylinderRegion,
-)
-from pfsc_drake.geometry.regions.shapes import (
-    HalfSpace as HalfSpace,
-)
-from pfsc_drake.geometry.regions.shapes import (
-    ParaboloidRegion as ParaboloidRegion,
-)
-from pfsc_drake.geometry.regions.shapes import (
-    SphereRegion as SphereRegion,
-)
-from pfsc_drake.geometry.regions.shapes import (
-    TorusRegion as TorusRegion,
-)
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion as SurfaceRegion
+from pfsc_drake.geometry.shapes.cone import ConeRegion as ConeRegion
+from pfsc_drake.geometry.shapes.cylinder import CylinderRegion as CylinderRegion
+from pfsc_drake.geometry.shapes.paraboloid import ParaboloidRegion as ParaboloidRegion
+from pfsc_drake.geometry.shapes.plane import HalfSpace as HalfSpace
+from pfsc_drake.geometry.shapes.polyhedron import PolyhedronRegion as PolyhedronRegion
+from pfsc_drake.geometry.shapes.polyhedron import box_corners as box_corners
+from pfsc_drake.geometry.shapes.profiles import ExtrudedRegion as ExtrudedRegion
+from pfsc_drake.geometry.shapes.profiles import RevolvedRegion as RevolvedRegion
+from pfsc_drake.geometry.shapes.sphere import SphereRegion as SphereRegion
+from pfsc_drake.geometry.shapes.torus import TorusRegion as TorusRegion
 from pfsc_drake.physics.friction import FrictionDrift as FrictionDrift
 from pfsc_drake.robot.models.actuators import add_actuators as add_actuators
 from pfsc_drake.robot.models.files import models_directory as models_directory

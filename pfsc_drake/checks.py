@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +12,25 @@ from pfsc_drake.errors import require_one_of as require_one_of
 from pfsc_drake.errors import require_positive as require_positive
 
 LARGEST_ANGLE = 3600.0  # deg; ten turns
+# m: shorter ones are no motion of a robot, and coordinates beyond leave no digits for it.
+SHORTEST, FARTHEST = 1e-4, 1e4
 # Text that is a number. Python's float() would take more: underscores, the digits of all scripts.
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _ROUNDING = 1e-6
+
+# metadata of a dataclass's text, or mapping to text, that names a file, or a folder
+FILE = {"file": True}
+
+
+def equal(count: int, parts: int = 1) -> dict[str, Any]:
+    """Return metadata of a list of a fixed length, for which fewer numbers may stand.
+
+    Args:
+        count: Length of the list.
+        parts: How many parts it has; one number stands for equal ones in all of the list, so many
+            numbers for equal ones in each part.
+    """
+    return {"equal": count, "parts": parts}
 
 
 def require_not_negative(key: str, value: float) -> None:
@@ -30,6 +47,24 @@ def require_numbers(key: str, values: Sequence[float], count: int) -> None:
     """Refuse a list of another length, or with values that are not finite."""
     valid = len(values) == count and bool(np.isfinite(values).all())
     require(valid, key, list(values), f"{count} finite numbers")
+
+
+def require_length(key: str, value: float) -> None:
+    """Refuse what is no length of anything that a robot meets [m]."""
+    require(SHORTEST <= value <= FARTHEST, key, value, f"{SHORTEST:g} m to {FARTHEST:g} m")
+
+
+def require_place(key: str, values: Sequence[float]) -> None:
+    """Refuse what is no point [m] within reach of numbers."""
+    require_numbers(key, values, 3)
+    near = max(map(abs, values)) <= FARTHEST
+    require(near, key, values, f"3 numbers of at most {FARTHEST:g} m")
+
+
+def require_direction(key: str, values: Sequence[float]) -> None:
+    """Refuse what is no direction, of whatever length."""
+    require_numbers(key, values, 3)
+    require(any(values), key, values, "3 numbers, not all zero")
 
 
 def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:

@@ -11,7 +11,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.drawing.tour import Stage
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import PAD, Mounting, pin_shape
-from pfsc_drake.geometry.workpieces import bore_wedges
+from pfsc_drake.geometry.workpiece_bodies import bore_wedges
 from pfsc_drake.robot.delta.shapes import METAL
 from pfsc_drake.systems.drawing.robot_visualizer import Triangles
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart, ToolVisualizer

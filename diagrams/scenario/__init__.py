@@ -1,19 +1,9 @@
 """What a scenario file says: its schema, one file per block."""
 
 from diagrams.scenario.holder import HeldWorkpieceParameters, HolderParameters, SolidParameters
+from diagrams.scenario.manifolds import PathParameters, SurfaceParameters
 from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
-from diagrams.scenario.path import (
-    BentLemniscate,
-    Circle,
-    Intersection,
-    Keyframe,
-    Line,
-    OnSurface,
-    OrientationParameters,
-    PathParameters,
-    Waypoints,
-)
 from diagrams.scenario.robot import (
     DriverParameters,
     RobotParameters,
@@ -27,7 +17,6 @@ from diagrams.scenario.simulation import (
     SimulationParameters,
 )
 from diagrams.scenario.streamed import Streamed
-from diagrams.scenario.surface import SurfaceParameters
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
     ControllerParameters,
@@ -37,6 +26,11 @@ from pfsc_drake.following.options.controller import (
 )
 from pfsc_drake.following.options.follower import BrakeParameters, FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters
+from pfsc_drake.geometry.shapes.intersection import Intersection
+from pfsc_drake.geometry.shapes.on_surface import OnSurface
+from pfsc_drake.geometry.shapes.path_shapes import BentLemniscate, Circle, Line
+from pfsc_drake.geometry.shapes.through_waypoints import Waypoints
+from pfsc_drake.geometry.shapes.tool_orientation import Keyframe, OrientationParameters
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.physics.link_forces import LinkHandParameters

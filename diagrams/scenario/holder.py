@@ -8,9 +8,9 @@ from diagrams.scenario.checks import (
     require_numbers,
     require_one_of,
 )
+from diagrams.scenario.manifolds import PathParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
-from diagrams.scenario.path import PathParameters
 from diagrams.scenario.robot import PoseParameters, RobotParameters
 from diagrams.scenario.simulation import SensorFailureParameters
 from pfsc_drake.following.options.controller import ControllerParameters

@@ -13,7 +13,7 @@ from diagrams.scenario.checks import (
     require_positive,
 )
 from diagrams.scenario.workpiece import require_contact_step, require_up_to
-from pfsc_drake.geometry.workpieces import FEWEST_WEDGES
+from pfsc_drake.geometry.workpiece_bodies import FEWEST_WEDGES
 from pfsc_drake.physics.mounting_hand import MountingHandParameters
 from pfsc_drake.physics.suction import SuctionParameters
 from pfsc_drake.yaml.typed import equal

@@ -12,12 +12,11 @@ from diagrams.scenario.checks import (
     require_one_of,
     require_positive,
 )
-from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.holder import HolderParameters
+from diagrams.scenario.manifolds import PathParameters, SurfaceParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.obstacles import CrossingParameters
-from diagrams.scenario.path import PathParameters
 from diagrams.scenario.plate import PlateParameters
 from diagrams.scenario.robot import (
     DriverParameters,
@@ -31,9 +30,9 @@ from diagrams.scenario.simulation import (
     SimulationParameters,
 )
 from diagrams.scenario.streamed import Streamed
-from diagrams.scenario.surface import SurfaceParameters
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.scenario.turntable import TurntableParameters
+from diagrams.scenario.virtual_fixtures import FixtureParameters
 from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.following.options.compliance import ComplianceParameters

@@ -32,7 +32,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.tasks.path_task import PathTask
 from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.geometry import quaternion_to_matrix
-from pfsc_drake.geometry.workpieces import bore_wedges
+from pfsc_drake.geometry.workpiece_bodies import bore_wedges
 from pfsc_drake.systems.plants.external_forces import PartnerForces
 
 _ORIENTED = 6  # coordinates of a path with all of its orientation

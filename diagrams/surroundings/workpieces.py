@@ -23,9 +23,9 @@ from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, PathPointLayout, zyx_to_matrix
 from pfsc_drake.geometry.surfaces.curvature import surface_axes
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.surface import Surface
-from pfsc_drake.geometry.workpieces import surface_mesh, swept_surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.workpiece_bodies import surface_mesh, swept_surface
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL
 from pfsc_drake.systems.drawing.robot_visualizer import Triangles
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart

@@ -12,14 +12,14 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from diagrams.robots.workpiece import WorkpieceLook
-from diagrams.tasks.fixtures import DrawnFixture
+from diagrams.tasks.regions_and_guides import DrawnFixture
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.geometry.path_on_surface import CurveOnSurface
 from pfsc_drake.geometry.regions.moving import MovingRegion
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.systems.drawing.manifold_visualizer import (
     PathVisualizer,
     RegionVisualizer,

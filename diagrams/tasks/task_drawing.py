@@ -6,7 +6,7 @@ from typing import cast
 
 from diagrams.tasks.drawing import ManifoldDrawing, PathDrawing, SpaceDrawing, SurfaceDrawing
 from diagrams.tasks.drawn_plane import StreamDrawing
-from diagrams.tasks.fixtures import DrawnFixture
+from diagrams.tasks.regions_and_guides import DrawnFixture
 from diagrams.tasks.streaming import ScenarioStream
 from pfsc_drake.following.tasks.path_task import PathTask
 from pfsc_drake.following.tasks.space_task import SpaceTask

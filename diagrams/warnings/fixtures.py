@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.virtual_fixtures import FixtureParameters
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.parameters import bearable_stiffness

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagrams.scenario import ComplianceParameters, ControllerParameters, ForcePulse
-from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.virtual_fixtures import FixtureParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.laws import LAWS
 from pfsc_drake.control.law.linearization import Linearization, decoupling_function

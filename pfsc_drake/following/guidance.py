@@ -22,9 +22,9 @@ from pfsc_drake.following.options.controller import ExternalTorqueParameters
 from pfsc_drake.following.options.follower import FixtureOptions, FollowerOptions
 from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.geometry import matrix_to_quaternion
-from pfsc_drake.geometry.regions.checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.geometry.regions.region import Region
+from pfsc_drake.geometry.regions.region_checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 # 1/s; slower ones let a hand's changes of force push the tool by tenths of a millimetre

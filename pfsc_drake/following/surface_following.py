@@ -12,7 +12,7 @@ from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.tasks.surface_task import SurfaceTask
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.robot.robot_model import RobotModel
 
 

@@ -8,18 +8,18 @@ from scipy.optimize import brentq
 
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
-from pfsc_drake.geometry.curves.orientation import OrientationCurve, interpolate_orientation
+from pfsc_drake.geometry.curves.curve import Curve, check_order
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve, interpolate_orientation
 from pfsc_drake.geometry.curves.spline import accumulate, close_polygon, interpolate_at
-from pfsc_drake.geometry.paths.path import Path
+from pfsc_drake.geometry.paths.geometric_path import Path
 from pfsc_drake.geometry.rotation import (
     check_rotation_matrix,
     matrix_to_quaternion,
     quaternion_to_matrix,
 )
 from pfsc_drake.geometry.surfaces.curvature import surface_axes
-from pfsc_drake.geometry.surfaces.projection import GlobalProjector
-from pfsc_drake.geometry.surfaces.surface import Surface, partial_index, partial_orders
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface, partial_index, partial_orders
+from pfsc_drake.geometry.surfaces.surface_projection import GlobalProjector
 from pfsc_drake.jets import Jet
 
 # Between two breakpoints of a curve, to find where it leaves a cell of the surface.
@@ -56,10 +56,6 @@ class CurveOnSurface(Curve):
         """Derivatives 0..order with respect to theta, for set-up and figures."""
         jet = self._composed(theta, check_order(order), [(0, 0)])[0]
         return np.stack(jet.derivatives(), axis=-2)
-
-    def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
-        return lambda theta: self.derivatives(theta, order).ravel()
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """The surface's normal e_perp (4.3), and e_cross = e_par x e_perp, each [..., 3]."""

@@ -173,16 +173,6 @@ def zyz_to_quaternion(angles: ArrayLike) -> np.ndarray:
 EULER_TO_QUATERNION = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
-def quaternion_to_zyx(quaternion: ArrayLike) -> np.ndarray:
-    """ZYX angles [..., 3], rad, of quaternions [..., 4], see `matrix_to_zyx`."""
-    return matrix_to_zyx(quaternion_to_matrix(quaternion))
-
-
-def quaternion_to_zyz(quaternion: ArrayLike) -> np.ndarray:
-    """ZYZ angles [..., 3], rad, of quaternions [..., 4], see `matrix_to_zyz`."""
-    return matrix_to_zyz(quaternion_to_matrix(quaternion))
-
-
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angles between directions, accurate for small ones too.
 

@@ -6,6 +6,7 @@ import typing
 from collections.abc import Sequence
 from typing import Any
 
+from pfsc_drake.checks import equal as equal
 from pfsc_drake.yaml.reading import TAG_KEY
 from pfsc_drake.yaml.schema_check import Place, is_number
 
@@ -31,17 +32,6 @@ def spread(values: list[float], count: int) -> list[float]:
         count: How many are needed.
     """
     return list(values) * count if isinstance(values, OneForAll) else values
-
-
-def equal(count: int, parts: int = 1) -> dict[str, Any]:
-    """Return metadata of a list of a fixed length, for which fewer numbers may stand.
-
-    Args:
-        count: Length of the list.
-        parts: How many parts it has; one number stands for equal ones in all of the list, so many
-            numbers for equal ones in each part.
-    """
-    return {"equal": count, "parts": parts}
 
 
 def as_lists(schema: Any, data: Any, place: Place, singles: list[Place]) -> Any:

@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 import yaml
 
+from pfsc_drake.checks import FILE as FILE
 from pfsc_drake.errors import InputError, nearest_file, shortened
 
 MAX_BYTES = 1_000_000  # of a YAML file
@@ -71,9 +72,8 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
         raise InputError(f"{path}: cannot be read: not UTF-8 text") from None
 
 
-# metadata of text, or of a mapping to text, that names a file, or a folder
-FILE = {"file": True}
-# the same of text that is a name of something known unless it has a suffix
+# metadata of text, or of a mapping to text, that is a name of something known unless it has a
+# suffix
 NAME_OR_FILE = {"file": False}
 
 

@@ -22,7 +22,8 @@ from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
-from pfsc_drake.geometry.regions.shapes import HalfSpace, SphereRegion
+from pfsc_drake.geometry.shapes.plane import HalfSpace
+from pfsc_drake.geometry.shapes.sphere import SphereRegion
 from pfsc_drake.yaml.typed import load_file
 from tests.control.fixtures.point_robot import Guide, point
 from tests.scenarios import shipped_scenario

@@ -12,17 +12,15 @@ import pytest
 from pfsc_drake.control.fixtures.schedule import DistanceSchedule
 from pfsc_drake.geometry import interpolate, surface_through_grid, torus
 from pfsc_drake.geometry.regions.moving import ShiftedRegion, TurningRegion
-from pfsc_drake.geometry.regions.polyhedron import PolyhedronRegion, box_corners
-from pfsc_drake.geometry.regions.profile import ExtrudedRegion, RevolvedRegion
-from pfsc_drake.geometry.regions.shapes import (
-    ConeRegion,
-    CylinderRegion,
-    HalfSpace,
-    ParaboloidRegion,
-    SphereRegion,
-    TorusRegion,
-)
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
+from pfsc_drake.geometry.shapes.cone import ConeRegion
+from pfsc_drake.geometry.shapes.cylinder import CylinderRegion
+from pfsc_drake.geometry.shapes.paraboloid import ParaboloidRegion
+from pfsc_drake.geometry.shapes.plane import HalfSpace
+from pfsc_drake.geometry.shapes.polyhedron import PolyhedronRegion, box_corners
+from pfsc_drake.geometry.shapes.profiles import ExtrudedRegion, RevolvedRegion
+from pfsc_drake.geometry.shapes.sphere import SphereRegion
+from pfsc_drake.geometry.shapes.torus import TorusRegion
 from tests.control.fixtures.walks import SPEED, START, TICK, Operator, admissible, reach_of, scene
 
 COUNT = 200

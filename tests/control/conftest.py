@@ -169,7 +169,7 @@ def virtual_output():
         sigma, slope = path.position.derivatives(theta, 1)
         e_par, e_perp = slope / np.linalg.norm(slope), path.frame.normals(theta)[0]
         offset = y_t - sigma
-        y = [path.arc_length.at(theta), e_perp @ offset, np.cross(e_par, e_perp) @ offset]
+        y = [path.arc_length(theta), e_perp @ offset, np.cross(e_par, e_perp) @ offset]
         if path.orientation is None:
             return np.array(y)
         R_d = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[0])

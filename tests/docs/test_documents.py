@@ -16,7 +16,7 @@ import experiments.cli
 import identification.cli
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from diagrams.tasks.surface import make_surface
+from diagrams.tasks.task_geometry import make_surface
 from experiments.scenario_file import read_scenario, scenario_names
 from experiments.sweep.sweep import define_sweep
 from pfsc_drake.robot.models.reading import ModelOptions, read_model

@@ -30,7 +30,7 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following import compliance as compliance_module
 from pfsc_drake.following.options.controller import ExternalTorqueParameters
-from pfsc_drake.geometry.surfaces.shapes import paraboloid
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
 from pfsc_drake.robot.models.files import models_directory
 from tests.following.pulled import Pulled
 

@@ -12,8 +12,8 @@ from pfsc_drake.following.fixtures import _robot_limits, make_lead, near_express
 from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.geometry import torus
-from pfsc_drake.geometry.regions.shapes import SphereRegion
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
+from pfsc_drake.geometry.shapes.sphere import SphereRegion
 
 PERIOD = 1e-3
 BALL = SphereRegion((0.0, 0.0, 0.0), 0.1, inside=False)

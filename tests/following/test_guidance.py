@@ -26,7 +26,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.guidance import _told
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.regions.moving import CurveCourse, ShiftedRegion
-from pfsc_drake.geometry.regions.shapes import HalfSpace
+from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.robot.models.files import models_directory
 from tests.following.pulled import Pulled
 

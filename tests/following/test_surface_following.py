@@ -16,7 +16,7 @@ from pfsc_drake import (
 )
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.surfaces.shapes import paraboloid
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
 from pfsc_drake.robot.models.files import models_directory
 
 

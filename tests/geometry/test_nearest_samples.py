@@ -5,7 +5,7 @@ import math
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.geometry.nearest import nearest_samples
+from pfsc_drake.geometry.nearest_samples import nearest_samples
 
 RNG = np.random.default_rng(4)
 PARAMETERS = RNG.uniform(size=(300, 2))

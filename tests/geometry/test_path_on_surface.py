@@ -14,8 +14,10 @@ from pfsc_drake.geometry import (
     ProjectionStatus,
 )
 from pfsc_drake.geometry.path_on_surface import CurveOnSurface, path_on_surface
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.torus import torus
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
-from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid, torus
 
 RADIUS = 0.25
 

@@ -5,7 +5,7 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import FourierCurve, PiecewisePolynomialCurve
-from pfsc_drake.geometry.workpieces import swept_surface
+from pfsc_drake.geometry.workpiece_bodies import swept_surface
 
 UP = np.array([0.0, 0.0, 1.0])
 TENT = np.array([[0.2, -0.1], [0.0, 0.05], [-0.2, -0.1]])

@@ -13,8 +13,9 @@ from pfsc_drake.geometry.path_on_surface import (
     path_on_surface,
     project_waypoints,
 )
-from pfsc_drake.geometry.paths.path import PathTarget
-from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
+from pfsc_drake.geometry.paths.geometric_path import PathTarget
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
 
 RADIUS = 0.2
 TUBE = cylinder(RADIUS, (-0.5, 0.5))

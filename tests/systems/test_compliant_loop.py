@@ -96,7 +96,7 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
     plant.Finalize()
     chain, coordinates = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
     theta, force = 0.6, np.array([3.0, -4.0, 5.0, 0.0, 0.0, 0.0])
-    desired = np.array([path.arc_length.at(theta), *np.zeros(8)])
+    desired = np.array([path.arc_length(theta), *np.zeros(8)])
     controller = FollowingController(request.getfixturevalue("make_law")(), PERIOD)
     rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
     parts = {

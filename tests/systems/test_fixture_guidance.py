@@ -13,7 +13,7 @@ from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
 from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
-from pfsc_drake.geometry.regions.shapes import HalfSpace
+from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.robot.robot_model import tool_motion_function
 from pfsc_drake.systems.block_system import BlockSystem
 from tests.control.conftest import BENT, Robot

@@ -288,7 +288,7 @@ def closed_loop(arm, path, law, theta):
     rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
     r = law.linearization.relative_degree
     reference = np.zeros(3 * (r + 1))
-    reference[0] = path.arc_length.at(theta)
+    reference[0] = path.arc_length(theta)
     measured = builder.AddSystem(MatrixGain(rows))
     kinematics = builder.AddSystem(BlockSystem(ToolKinematics(chain), PERIOD))
     projector = builder.AddSystem(BlockSystem(Projector(path.evaluator(r)), PERIOD))
@@ -319,7 +319,7 @@ def test_the_loop_over_a_plant_is_not_algebraic_and_converges(arm, path, make_la
     inner = controller.GetMyContextFromRoot(context)
     output = controller.GetOutputPort("manifold_state")
     before = output.Eval(inner)[:3].copy()
-    eta_p = path.arc_length.at(THETA)
+    eta_p = path.arc_length(THETA)
     simulator.AdvanceTo(0.1)
     expected = (before - [eta_p, 0.0, 0.0]) * 3.0 * np.exp(-2.0)
     assert np.abs(expected).min() > 1e-4

@@ -9,7 +9,7 @@ from pfsc_drake.control.fixtures.near_regions import NOTHING, ScheduledRegions, 
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.geometry.regions.moving import ShiftedRegion
-from pfsc_drake.geometry.regions.shapes import SphereRegion
+from pfsc_drake.geometry.shapes.sphere import SphereRegion
 from pfsc_drake.systems.near_regions import NearRegions
 from tests.control.fixtures.walks import Swinging
 

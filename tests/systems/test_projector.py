@@ -7,8 +7,10 @@ from pydrake.systems.analysis import Simulator
 from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.geometry import ProjectionStatus
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD, ORDER, RADIUS = 1e-3, 2, 0.3

@@ -21,7 +21,7 @@ from pfsc_drake.control.teleoperation.message import MESSAGE
 from pfsc_drake.control.teleoperation.parameters import CouplingParameters, PortLimits
 from pfsc_drake.control.teleoperation.port import RECORD, TeleoperationPort
 from pfsc_drake.control.teleoperation.reaction import FixtureReaction
-from pfsc_drake.geometry.regions.shapes import HalfSpace
+from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.physics.channel import ChannelParameters, message_ages
 from pfsc_drake.physics.leader_clutch import Clutch
 from pfsc_drake.physics.leader_device import LeaderDevice, LeaderParameters

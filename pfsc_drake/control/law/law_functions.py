@@ -16,7 +16,7 @@ from pfsc_drake.control.law.posture import Posture, posture_expressions
 from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.geometry.nearest import ProjectionStatus
+from pfsc_drake.geometry.nearest_samples import ProjectionStatus
 from pfsc_drake.robot.robot_model import RobotModel
 
 # rad, of an error angle; from there on (3.38) is not defined

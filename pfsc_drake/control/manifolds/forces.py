@@ -8,7 +8,7 @@ import numpy as np
 
 from pfsc_drake.control.manifolds.orientation import quaternion_rotation
 from pfsc_drake.geometry import PathPointLayout
-from pfsc_drake.geometry.point import SurfacePointLayout
+from pfsc_drake.geometry.manifold_point import SurfacePointLayout
 from pfsc_drake.jets import Jet
 
 

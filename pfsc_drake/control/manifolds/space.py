@@ -18,7 +18,7 @@ from pfsc_drake.control.manifolds.forces import (
 )
 from pfsc_drake.control.manifolds.orientation import ToolOrientation, quaternion_rotation
 from pfsc_drake.geometry import quaternion_to_matrix
-from pfsc_drake.geometry.nearest import ProjectionStatus
+from pfsc_drake.geometry.nearest_samples import ProjectionStatus
 from pfsc_drake.jets import Jet
 
 _TRANSLATIONAL = tuple(

@@ -22,8 +22,8 @@ from pfsc_drake.control.manifolds.forces import (
 from pfsc_drake.control.manifolds.orientation import ToolOrientation, quaternion_rotation
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import check_rotation_matrix, quaternion_to_matrix
-from pfsc_drake.geometry.point import SurfacePointLayout
-from pfsc_drake.geometry.surfaces.surface import partial_index, partial_orders
+from pfsc_drake.geometry.manifold_point import SurfacePointLayout
+from pfsc_drake.geometry.surfaces.parametric_surface import partial_index, partial_orders
 from pfsc_drake.jets import Jet
 
 _TRANSLATIONAL = (

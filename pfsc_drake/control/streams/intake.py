@@ -23,7 +23,7 @@ from pfsc_drake.control.streams.growth import Growth, chosen, no_direction
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
 from pfsc_drake.control.streams.parameters import StreamParameters
 from pfsc_drake.errors import require
-from pfsc_drake.geometry.point import PathPointLayout
+from pfsc_drake.geometry.manifold_point import PathPointLayout
 
 # spans that stay behind the tool
 _BEHIND = 4.0

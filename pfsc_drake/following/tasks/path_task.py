@@ -18,8 +18,8 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
     shape_report,
 )
-from pfsc_drake.geometry.paths.evaluator import PathEvaluator
-from pfsc_drake.geometry.paths.path import PathTarget
+from pfsc_drake.geometry.paths.geometric_path import PathTarget
+from pfsc_drake.geometry.paths.path_evaluator import PathEvaluator
 
 # m, between the positions along the path
 _SPACING = 2e-3

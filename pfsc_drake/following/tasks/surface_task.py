@@ -10,10 +10,10 @@ from pfsc_drake.errors import InputError, require
 from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.length import way_on_surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import surface_report
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 
 # s, between the positions along the motion
 _SPACING = 0.02

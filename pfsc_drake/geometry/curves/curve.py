@@ -2,14 +2,11 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
-
-Sampler = Callable[[float], np.ndarray]
 
 
 class Curve(ABC):
@@ -115,32 +112,6 @@ class Curve(ABC):
             InputError: theta lies outside the domain of an open curve.
         """
 
-    @abstractmethod
-    def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`, result flattened (derivative index slow).
-
-        Args:
-            order: Highest order of derivative, at least 0.
-
-        Returns:
-            Function of a float theta that returns a new array [(order + 1) * dimension].
-            Closed curves wrap; open curves are continued analytically, which only
-            serves rounding errors at the ends.
-        """
-
-    def sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`.
-
-        Args:
-            order: Highest order of derivative, at least 0.
-
-        Returns:
-            Function of a float theta that returns an array [order + 1, dimension].
-        """
-        sample = self.flat_sampler(order)
-        shape = (order + 1, self.dimension)
-        return lambda theta: sample(theta).reshape(shape)
-
     def _checked(self, theta: ArrayLike) -> np.ndarray:
         """Wrapped parameters; refuses those outside of an open curve."""
         values = self.wrap(theta)
@@ -163,7 +134,3 @@ def check_order(order: int) -> int:
     if isinstance(order, bool) or int(order) != order or order < 0 or not math.isfinite(order):
         raise InputError(f"order of derivative: {order}; an integer >= 0 is required")
     return int(order)
-
-
-# m: shorter ones are no motion of a robot, and coordinates beyond leave no digits for it.
-SHORTEST, FARTHEST = 1e-4, 1e4

@@ -1,7 +1,6 @@
 """Piecewise polynomial curves, and tables of their pieces."""
 
 import math
-from bisect import bisect_right
 
 import casadi as ca
 import numpy as np
@@ -9,13 +8,12 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
+from pfsc_drake.geometry.curves.curve import Curve, check_order
 
 # A jump counts if it exceeds this part of the largest derivative of its order ...
 _RELATIVE_JUMP = 1e-9
 # ... and would move the curve by more than this part of its size over one segment.
 _ROUNDING = 1e-12
-_FAST_TERMS = 8
 # of curves between rests
 _DEGREE = 7
 
@@ -129,42 +127,13 @@ class PiecewisePolynomialCurve(Curve):
         segment = np.searchsorted(self.breakpoints[1:-1], values, side="right")
         local = values - self.breakpoints[segment]
         powers = local[..., None] ** np.arange(self.degree + 1)
-        table = self._table(order, self.degree + 1)
+        table = self._table(order)
         return np.einsum("...kdj,...j->...kd", table[segment], powers)
 
-    def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
-        terms = max(self.degree + 1, _FAST_TERMS)
-        table = self._table(order, terms)
-        matrices = list(table.reshape(len(table), -1, terms))
-        starts = self.breakpoints[:-1].tolist()
-        interior = self.breakpoints[1:-1].tolist()
-        begin, end = self.domain
-        period, closed = self.period, self.closed
-
-        def sample_fast(theta: float) -> np.ndarray:
-            if closed and not begin <= theta <= end:
-                theta = begin + (theta - begin) % period
-            segment = bisect_right(interior, theta)
-            u = theta - starts[segment]
-            u2 = u * u
-            u3 = u2 * u
-            u4 = u2 * u2
-            return matrices[segment].dot((1.0, u, u2, u3, u4, u2 * u3, u3 * u3, u3 * u4))
-
-        def sample_any_degree(theta: float) -> np.ndarray:
-            if closed and not begin <= theta <= end:
-                theta = begin + (theta - begin) % period
-            segment = bisect_right(interior, theta)
-            u = theta - starts[segment]
-            return matrices[segment].dot([u**j for j in range(terms)])
-
-        return sample_fast if terms == _FAST_TERMS else sample_any_degree
-
-    def _table(self, order: int, terms: int) -> np.ndarray:
-        """Map from powers to derivatives, [segments, order + 1, dimension, terms]."""
+    def _table(self, order: int) -> np.ndarray:
+        """Map from powers to derivatives, [segments, order + 1, dimension, powers]."""
         segments, count, dimension = self.coefficients.shape
-        table = np.zeros((segments, check_order(order) + 1, dimension, terms))
+        table = np.zeros((segments, check_order(order) + 1, dimension, count))
         for k in range(min(order + 1, count)):
             for j in range(k, count):
                 table[:, k, :, j - k] = math.perm(j, k) * self.coefficients[:, j, :]
@@ -173,7 +142,7 @@ class PiecewisePolynomialCurve(Curve):
     def _find_discontinuities(self, known_smoothness: int) -> list[float | None]:
         """For each order 0..degree the first parameter at which that derivative jumps."""
         lengths = np.diff(self.breakpoints)
-        table = self._table(self.degree, self.degree + 1)
+        table = self._table(self.degree)
         powers = lengths[:, None] ** np.arange(self.degree + 1)
         left = table[..., 0]
         right = np.einsum("skdj,sj->skd", table, powers)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
+from pfsc_drake.geometry.curves.curve import Curve, check_order
 
 # How much a term of the Taylor series may change the tangent, relative to it.
 _BEND = 0.5
@@ -55,13 +55,6 @@ class RunOut(Curve):
         x = (self._checked(theta) - self._theta) / self._length
         powers = x[..., None] ** np.arange(self._degree + 1)
         return np.einsum("kdj,...j->...kd", self._table(order), powers)
-
-    def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
-        matrix = self._table(order).reshape(-1, self._degree + 1)
-        exponents = np.arange(self._degree + 1)
-        theta_0, length = self._theta, self._length
-        return lambda theta: matrix.dot(((theta - theta_0) / length) ** exponents)
 
     def expression(self, theta: ca.SX, order: int) -> ca.SX:
         """`derivatives` at a scalar as an expression, [order + 1, dimension]."""

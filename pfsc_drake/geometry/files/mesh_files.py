@@ -180,8 +180,13 @@ def read_stl(file: FilePath) -> Triangles:
         corners = _text(data, file)
     if not len(corners) or not np.isfinite(corners).all():
         raise InputError(f"{file}: holds no triangles with finite corners")
-    vertices, indices = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    return Triangles(vertices, indices.reshape(-1, 3))
+    points = corners.reshape(-1, 3)
+    # as np.unique by rows, several times as fast
+    order = np.lexsort(points.T[::-1])
+    is_new = np.any(np.diff(points[order], axis=0, prepend=np.nan) != 0.0, axis=1)
+    indices = np.empty(len(points), dtype=int)
+    indices[order] = np.cumsum(is_new) - 1
+    return Triangles(points[order[is_new]], indices.reshape(-1, 3))
 
 
 def _binary(data: bytes) -> np.ndarray | None:

@@ -1,10 +1,10 @@
-"""CSV files: columns of numbers under a line of names."""
+"""CSV files: columns of numbers under a line of names, and their units of length."""
 
 import re
 import stat
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path as FilePath
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -258,3 +258,23 @@ def _number(name: str, line: int, label: str, cell: str) -> float:
             f"{name}, line {line}, column {label}: '{quote(cell)}'; a finite number is required"
         )
     return value
+
+
+Unit = Literal["m", "cm", "mm", "inch"]
+
+_METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+UNITS = tuple(_METRES)
+
+
+def metres(unit: str) -> float:
+    """Return how many metres a unit is.
+
+    Args:
+        unit: One of `UNITS`.
+
+    Raises:
+        InputError: If it is none.
+    """
+    if unit not in _METRES:
+        raise InputError(f"unit: '{unit}'; one of {', '.join(UNITS)} is required")
+    return _METRES[unit]

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.fourier import FourierCurve
+from pfsc_drake.geometry.curves.fourier_curve import FourierCurve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import interpolate
 from pfsc_drake.geometry.intersections.meeting import (
@@ -20,7 +20,7 @@ from pfsc_drake.geometry.intersections.meeting import (
     starts,
 )
 from pfsc_drake.geometry.intersections.trace import Trace, Tracer
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 # Of the size of a curve: how far from it its points may be.
 _EXACT = 1e-10

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
-from pfsc_drake.geometry.surfaces.surface import Surface
 
 _ITERATIONS = 40
 # Of the lengths of the domain: the longest step, and one that is none.

@@ -57,7 +57,7 @@ class ArcLength:
         self._begin, self._end = begin, end
         self._breaks, self._sums = breaks.tolist(), sums.tolist()
         self._function = PiecewisePolynomialCurve(breaks, table, known_smoothness=1)
-        self._sample = self._function.flat_sampler(0)
+        self._rows = list(table.transpose(0, 2, 1).copy())
         # Highest power first, for Horner's scheme.
         self._coefficients = table[:, ::-1, 0].tolist()
 
@@ -80,17 +80,19 @@ class ArcLength:
             laps = self._laps(theta)
             local = np.clip(theta - laps * (self._end - self._begin), self._begin, self._end)
             return self._function.derivatives(local, 0)[..., 0, 0] + laps * self.length
-        return self.at(theta)
-
-    def at(self, theta: float) -> float:
-        """Arc length at one parameter, m; the fast form of calling the object."""
-        if self._begin <= theta <= self._end:
-            return self._sample(theta).item()
-        if not self._closed:
-            return 0.0 if theta < self._begin else self.length
-        period = self._end - self._begin
-        laps = math.floor((theta - self._begin) / period)
-        return self._sample(theta - laps * period).item() + laps * self.length
+        lap = 0
+        if not self._begin <= theta <= self._end:
+            if not self._closed:
+                return 0.0 if theta < self._begin else self.length
+            period = self._end - self._begin
+            lap = math.floor((theta - self._begin) / period)
+            theta -= lap * period
+        piece = min(max(bisect_right(self._breaks, theta), 1), len(self._rows)) - 1
+        u = theta - self._breaks[piece]
+        u2 = u * u
+        u3, u4 = u2 * u, u2 * u2
+        powers = (1.0, u, u2, u3, u4, u2 * u3, u3 * u3, u3 * u4)
+        return self._rows[piece].dot(powers).item() + lap * self.length
 
     def parameter(self, s: float) -> float:
         """The parameter theta with arc length s.

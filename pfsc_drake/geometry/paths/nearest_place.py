@@ -9,7 +9,7 @@ import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.geometry.paths.path import Path
+from pfsc_drake.geometry.paths.geometric_path import Path
 
 # ticks in which all of a path is looked at, and least samples that a tick looks at
 _TICKS, _FEWEST = 16, 16

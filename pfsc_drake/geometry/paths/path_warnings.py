@@ -7,9 +7,9 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.smoothing import noise_level
-from pfsc_drake.geometry.paths.path import Path, PathWaypoints
+from pfsc_drake.geometry.paths.geometric_path import Path, PathWaypoints
+from pfsc_drake.geometry.paths.path_smoothing import allows_tolerance
 from pfsc_drake.geometry.paths.shape_report import ShapeReport
-from pfsc_drake.geometry.paths.smoothing import allows_tolerance
 from pfsc_drake.geometry.rotation import euler_margin
 
 # m: robots' paths are shorter, and distances below count for nothing

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.paths.path import Path, PathWaypoints
+from pfsc_drake.geometry.paths.geometric_path import Path, PathWaypoints
 
 _SAMPLES_PER_SEGMENT = 16
 _FEWEST_SAMPLES = 2048

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.orientation import OrientationCurve
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve
 from pfsc_drake.geometry.curves.piecewise_fit import fit_pieces
 from pfsc_drake.geometry.curves.run_out import RunOut, straightening_length
+from pfsc_drake.geometry.manifold_point import PathPointLayout
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.frame import Frame, ParallelTransportFrame, TurnedFrame
-from pfsc_drake.geometry.point import PathPointLayout
 
 _DEGREE = 7
 # Of each quantity, relative to its size on the path.

@@ -6,9 +6,10 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from pfsc_drake.checks import FARTHEST, SHORTEST
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST, Curve
-from pfsc_drake.geometry.curves.orientation import (
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.orientation_curve import (
     OrientationCurve,
     check_neighbours,
     interpolate_orientation,
@@ -21,10 +22,15 @@ from pfsc_drake.geometry.curves.spline import (
     close_polygon,
     interpolate,
 )
-from pfsc_drake.geometry.files.number_table import NumberTable, check_columns, read_numbers
-from pfsc_drake.geometry.files.unit import Unit, metres
-from pfsc_drake.geometry.paths.path import Path, PathWaypoints
-from pfsc_drake.geometry.paths.smoothing import smooth_orientation, smooth_positions
+from pfsc_drake.geometry.files.number_table import (
+    NumberTable,
+    Unit,
+    check_columns,
+    metres,
+    read_numbers,
+)
+from pfsc_drake.geometry.paths.geometric_path import Path, PathWaypoints
+from pfsc_drake.geometry.paths.path_smoothing import smooth_orientation, smooth_positions
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.rotation import (
     EULER_TO_QUATERNION,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.compiled.bound_function import PlainFunction
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.surfaces.surface import rotation_from_axes
+from pfsc_drake.geometry.surfaces.parametric_surface import rotation_from_axes
 
 Triple = tuple[float, float, float]
 

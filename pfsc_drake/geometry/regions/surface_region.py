@@ -13,9 +13,9 @@ from pfsc_drake.geometry.regions.pieces import ON_NO_PIECE, NearestFoot, Pieces,
 from pfsc_drake.geometry.regions.region import Distance, FormulaRegion, Symbol, direction
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
 from pfsc_drake.geometry.surfaces.extended import SurfaceTable
-from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface, partial_index
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
-from pfsc_drake.geometry.surfaces.surface import Surface, partial_index
+from pfsc_drake.geometry.surfaces.surface_projection import LONGEST_STEP
 
 # Of the normal on a piece, rad, as far as these numbers of pieces in a direction allow.
 _TURNING = 0.12

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
-from pfsc_drake.geometry.curves.fourier import FourierCurve
+from pfsc_drake.geometry.curves.fourier_curve import FourierCurve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 
 Values = Callable[[float], tuple[int, Sequence[float]]]

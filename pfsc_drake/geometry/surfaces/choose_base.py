@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, cKDTree
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.surfaces.base import Base, CylinderBase, PlaneBase, axis_of_normals
-from pfsc_drake.geometry.surfaces.surface import Interval
+from pfsc_drake.geometry.surfaces.fit_bases import Base, CylinderBase, PlaneBase, axis_of_normals
+from pfsc_drake.geometry.surfaces.parametric_surface import Interval
 
 # Neighbours that a normal is taken from; more while they lie in no plane for noise.
 _FEWEST, _MOST = 16, 256

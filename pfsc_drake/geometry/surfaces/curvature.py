@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 
 @dataclass(frozen=True)

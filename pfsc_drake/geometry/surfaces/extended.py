@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 from pfsc_drake.geometry.curves.polynomial import piece_function
 from pfsc_drake.geometry.curves.run_out import RunOut, straightening_length
 from pfsc_drake.geometry.surfaces.basis import Basis, TrigonometricBasis
-from pfsc_drake.geometry.surfaces.product import ProductSurface, checked_product
-from pfsc_drake.geometry.surfaces.surface import (
+from pfsc_drake.geometry.surfaces.parametric_surface import (
     Sampler,
     Surface,
     check_partial_order,
     partial_orders,
 )
+from pfsc_drake.geometry.surfaces.product import ProductSurface, checked_product
 
 # Of the domain: how far the surface goes on, and the longest way on which it gets straight.
 _REACH, _LONGEST = 0.25, 0.2

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pfsc_drake.checks import FARTHEST, SHORTEST
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
 from pfsc_drake.geometry.curves.spline import UniformKnots, check_smoothness
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals, residuals, smoothest_within

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 # Longest panel of the integral, relative to the lengths of the domain, and how many a long way has.
 _PANEL, _PANELS = 1.0 / 64.0, 64

@@ -8,7 +8,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
-from pfsc_drake.geometry.surfaces.surface import Surface, partial_index
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface, partial_index
 
 _STEPS = 12
 # Of a parameter relative to its domain.

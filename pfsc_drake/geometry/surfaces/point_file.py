@@ -5,11 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pfsc_drake.checks import FARTHEST
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.geometry.files.mesh_files import read_obj_vertices, read_ply_vertices, read_stl
-from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
-from pfsc_drake.geometry.files.unit import Unit, metres
+from pfsc_drake.geometry.files.number_table import Unit, check_columns, metres, read_numbers
 
 _AXES = ["x", "y", "z"]
 _MESHES = {

@@ -1,18 +1,22 @@
 """Surfaces that are sums of products of functions of one parameter each, as splines are."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import UniformKnots, interpolate_at
-from pfsc_drake.geometry.surfaces.basis import Basis, PowerBasis
-from pfsc_drake.geometry.surfaces.surface import (
+from pfsc_drake.geometry.surfaces.basis import Basis, PowerBasis, curve_on_basis
+from pfsc_drake.geometry.surfaces.parametric_surface import (
     Sampler,
     Surface,
     check_partial_order,
     partial_orders,
 )
+from pfsc_drake.geometry.surfaces.regularity import check_regular
 
 # Samples that are evaluated at once.
 _CHUNK = 20_000
@@ -199,3 +203,52 @@ def _assemble(
         PowerBasis(curve.breakpoints, degree, closed=curve.closed) for curve in (first, second)
     )
     return ProductSurface(basis_1, basis_2, table, smoothness=degree - 1)
+
+
+def translated_surface(profile: Curve, rail: Curve) -> ProductSurface:
+    """Surface that a profile leaves when it is moved along a rail without turning.
+
+    sigma = profile(theta_1) + rail(theta_2).
+
+    Args:
+        profile: Curve in R^3, m.
+        rail: Curve in R^3, m.
+
+    Raises:
+        InputError: A curve of another dimension, or a surface that is not regular.
+    """
+    for name, curve in (("profile", profile), ("rail", rail)):
+        if curve.dimension != 3:
+            raise InputError(f"{name}: dimension {curve.dimension}; 3 is required")
+    first, moved = curve_on_basis(profile)
+    second, moving = curve_on_basis(rail)
+    coefficients = np.zeros((len(moved), len(moving), first.size, second.size, 3))
+    coefficients[:, :, :, 0] += moved[:, None]
+    coefficients[:, :, 0] += moving
+    smoothness = min(profile.smoothness, rail.smoothness)
+    surface = ProductSurface(first, second, coefficients, smoothness=smoothness)
+    check_regular(surface)
+    return surface
+
+
+def extruded_surface(profile: Curve, direction: ArrayLike, length: float) -> ProductSurface:
+    """Surface that a profile leaves when it is moved along a line; theta_2 is the way, m.
+
+    Args:
+        profile: Curve in R^3, m.
+        direction: Direction of the motion, of any length, [3].
+        length: Length of the motion, m, positive.
+
+    Raises:
+        InputError: No direction or length, or one along the profile.
+    """
+    d = np.asarray(direction, dtype=float)
+    norm = float(np.linalg.norm(d))
+    if d.shape != (3,) or not 0.0 < norm < math.inf or not 0.0 < length < math.inf:
+        raise InputError(
+            f"extrusion: direction {d.tolist()}, length {length}; three finite numbers, not all"
+            " zero, and a positive number of metres are required"
+        )
+    return translated_surface(
+        profile, PiecewisePolynomialCurve.line(np.zeros(3), d * (length / norm))
+    )

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pfsc_drake.checks import FARTHEST, SHORTEST
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 _SAMPLES_PER_CELL = 4
 _FEWEST_SAMPLES, _MOST_SAMPLES = 32, 256

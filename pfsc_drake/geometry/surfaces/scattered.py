@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pfsc_drake.checks import FARTHEST, SHORTEST
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
 from pfsc_drake.geometry.curves.spline import UniformKnots, check_smoothness
-from pfsc_drake.geometry.surfaces.base import Base
 from pfsc_drake.geometry.surfaces.choose_base import (
     BaseChoice,
     Neighbourhoods,
@@ -20,6 +19,8 @@ from pfsc_drake.geometry.surfaces.choose_base import (
     neighbourhoods,
     stand,
 )
+from pfsc_drake.geometry.surfaces.fit_bases import Base
+from pfsc_drake.geometry.surfaces.parametric_surface import Interval
 from pfsc_drake.geometry.surfaces.penalized_surface import (
     Residuals,
     check_scatter,
@@ -28,7 +29,6 @@ from pfsc_drake.geometry.surfaces.penalized_surface import (
 )
 from pfsc_drake.geometry.surfaces.product import ProductSurface, uniform_spline_surface
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
-from pfsc_drake.geometry.surfaces.surface import Interval
 
 FEWEST_POINTS, MOST_POINTS = 50, 100_000
 # How far a place may be from the nearest point, over the distance at which points stand.

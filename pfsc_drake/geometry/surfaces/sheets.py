@@ -5,8 +5,8 @@ from scipy.spatial import cKDTree
 
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
-from pfsc_drake.geometry.surfaces.surface import Surface
 
 # Samples of one direction that are looked at, and steps between two that are neighbours.
 _MOST_SAMPLES = 96

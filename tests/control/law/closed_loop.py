@@ -25,10 +25,10 @@ class ClosedLoop:
         self.path = path
         self._project = path.evaluator(self.r)
         # the whole comparison lies on one ramp, where the reference is a polynomial
-        start = path.arc_length.at(theta) - 0.005
+        start = path.arc_length(theta) - 0.005
         ramp = rest_to_rest([start, start + 1.0], velocity=0.5, acceleration=1.6)
         assert ramp.breakpoints[1] > STEP * STEPS
-        self._eta_p = ramp.flat_sampler(self.r)
+        self._eta_p = lambda t: ramp.derivatives(t, self.r)[:, 0]
         self._theta = theta
 
     def prepare(self, robot, law):

@@ -11,8 +11,10 @@ from scipy.spatial.transform import Rotation
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.geometry import zyx_to_matrix
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from tests.control.law.closed_loop import (
     FEW_STEPS,
     ClosedLoop,

@@ -11,7 +11,7 @@ from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.following.law_warnings import _transversal_gains
 from pfsc_drake.geometry import PathPointLayout
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from tests.control.manifolds.surfaces import SITUATIONS, frame, surface
 
 DOWN = np.diag([1.0, -1.0, -1.0])

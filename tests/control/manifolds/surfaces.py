@@ -8,9 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.geometry import FourierCurve, zyx_to_matrix
 from pfsc_drake.geometry.path_on_surface import path_on_surface
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid, torus
-from pfsc_drake.geometry.surfaces.surface import partial_orders
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.shapes.torus import torus
+from pfsc_drake.geometry.surfaces.parametric_surface import partial_orders
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 
 # about horizontal, within reach of six axes
 TILT = zyx_to_matrix([0.3, -0.2, 0.15])

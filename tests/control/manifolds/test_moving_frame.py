@@ -15,8 +15,8 @@ from pfsc_drake.control.manifolds.moving_frame import (
 )
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.shapes import paraboloid
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from pfsc_drake.jets import Jet
 from tests.control.manifolds.surfaces import frame as surface_frame
 from tests.control.manifolds.surfaces import project

@@ -16,7 +16,7 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
     rotation_to_axis,
 )
-from pfsc_drake.geometry.curves.orientation import interpolate_orientation
+from pfsc_drake.geometry.curves.orientation_curve import interpolate_orientation
 from tests.control.manifolds.surfaces import euler_difference, path_on_cylinder
 
 OFFSET = np.array([0.02, -0.03, 0.025])

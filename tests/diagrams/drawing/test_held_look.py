@@ -20,7 +20,7 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.robot import PoseParameters
 from diagrams.tasks.drawing import PathDrawing
-from diagrams.tasks.path import make_path
+from diagrams.tasks.task_geometry import make_path
 from pfsc_drake.geometry import PathPointLayout, zyx_to_matrix
 
 MODEL, PERIOD = "comau_racer_1_4_elastic_3r", 0.04

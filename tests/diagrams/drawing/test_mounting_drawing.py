@@ -16,7 +16,7 @@ from diagrams.drawing.mounting_look import (
 )
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import Mounting
-from pfsc_drake.geometry.workpieces import bore_wedges
+from pfsc_drake.geometry.workpiece_bodies import bore_wedges
 from pfsc_drake.physics.mounting_hand import MountingPhase
 
 X_WM, X_WF = RigidTransform([0.7, -0.4, 0.5]), RigidTransform([0.8, 0.3, 0.6])

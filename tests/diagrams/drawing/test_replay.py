@@ -18,7 +18,7 @@ from diagrams.drawing.replay import (
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.scenario import Line, PathParameters, RobotParameters
 from diagrams.tasks.drawing import PathDrawing
-from diagrams.tasks.path import make_path
+from diagrams.tasks.task_geometry import make_path
 from pfsc_drake.geometry import PathPointLayout
 
 MODEL = "comau_racer_1_4_elastic_3r"

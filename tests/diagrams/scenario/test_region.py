@@ -2,18 +2,18 @@
 
 import pytest
 
-from diagrams.scenario.fixtures import (
-    Box,
-    RegionParameters,
-    Shift,
-    Swinging,
-    Turn,
-    Visiting,
-    encloses,
-)
-from diagrams.scenario.surface import Extruded, Fitted, Revolved
-from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
+from diagrams.scenario.region_motion import Shift, Swinging, Turn, Visiting
+from diagrams.scenario.virtual_fixtures import RegionParameters
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.shapes.cone import Cone
+from pfsc_drake.geometry.shapes.cylinder import Cylinder
+from pfsc_drake.geometry.shapes.fitted import Fitted
+from pfsc_drake.geometry.shapes.paraboloid import Paraboloid
+from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.polyhedron import Box
+from pfsc_drake.geometry.shapes.profiles import Extruded, Revolved
+from pfsc_drake.geometry.shapes.sphere import Sphere
+from pfsc_drake.geometry.shapes.torus import Torus
 from pfsc_drake.yaml.reading import TAG_KEY
 from pfsc_drake.yaml.typed import load_typed
 
@@ -68,7 +68,7 @@ def test_everything_that_can_be_said():
     ],
 )
 def test_what_has_an_inside(shape, has_inside):
-    assert encloses(shape) is has_inside
+    assert shape.encloses is has_inside
     wrong = "above" if has_inside else "inside"
     with pytest.raises(InputError, match=f"admissible = {wrong}; .* !{type(shape).__name__}"):
         RegionParameters(shape, wrong)

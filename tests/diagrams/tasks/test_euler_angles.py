@@ -4,16 +4,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagrams.scenario_task import make_task
 
 from diagrams.scenario import SurfaceParameters
 from diagrams.scenario.motion import StartParameters
-from diagrams.scenario.surface import SurfaceOrientationParameters
-from diagrams.scenario.surface_shapes import Plane
+from diagrams.scenario_task import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.geometry.paths.path_warnings import euler_warnings
+from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
 
 PITCH = [-20.0, 30.0, 84.0, 10.0]
 

@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.scenario.fixtures import GuideParameters
-from diagrams.scenario.path import Line, Waypoints
+from diagrams.scenario.virtual_fixtures import GuideParameters
 from diagrams.scenario_task import make_task
 from diagrams.tasks.task_drawing import drawing_of
 from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import make_guidance
+from pfsc_drake.geometry.shapes.path_shapes import Line
+from pfsc_drake.geometry.shapes.through_waypoints import Waypoints
 from tests.control.conftest import Robot
 from tests.scenarios import shipped_scenario
 

@@ -15,13 +15,12 @@ from diagrams.scenario import (
     PathParameters,
     Waypoints,
 )
-from diagrams.scenario.surface import SurfaceOrientationParameters
-from diagrams.tasks.path import make_path, require_orientation
-from diagrams.tasks.surface import followed_angles
+from diagrams.tasks.task_geometry import followed_angles, make_path, require_orientation
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import shape_report
 from pfsc_drake.geometry.paths.path_warnings import path_warnings
+from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
 
 # an arc of a helix, radius 0.3 m, with the tool tilted more and more
 ANGLE = np.linspace(0.0, 2.0, 9)

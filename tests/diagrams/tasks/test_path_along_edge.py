@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Intersection, PathParameters
-from diagrams.scenario.surface import Extruded
-from diagrams.scenario.surface_shapes import Plane, Sphere, Torus
-from diagrams.tasks.path import make_path
+from diagrams.tasks.task_geometry import make_path
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
+from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.profiles import Extruded
+from pfsc_drake.geometry.shapes.sphere import Sphere
+from pfsc_drake.geometry.shapes.torus import Torus
 
 
 def make(shape, law="rigid", folder=None):

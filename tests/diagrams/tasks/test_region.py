@@ -5,12 +5,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.scenario.fixtures import Box, RegionParameters, Shift, Swinging, Turn, Visiting
-from diagrams.scenario.surface import Extruded, Fitted, Revolved
-from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
-from diagrams.tasks.fixtures import make_region
-from diagrams.tasks.surface import make_surface
+from diagrams.scenario.region_motion import Shift, Swinging, Turn, Visiting
+from diagrams.scenario.virtual_fixtures import RegionParameters
+from diagrams.tasks.regions_and_guides import make_region
+from diagrams.tasks.task_geometry import make_surface
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.shapes.cone import Cone
+from pfsc_drake.geometry.shapes.cylinder import Cylinder
+from pfsc_drake.geometry.shapes.fitted import Fitted
+from pfsc_drake.geometry.shapes.paraboloid import Paraboloid
+from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.polyhedron import Box
+from pfsc_drake.geometry.shapes.profiles import Extruded, Revolved
+from pfsc_drake.geometry.shapes.sphere import Sphere
+from pfsc_drake.geometry.shapes.torus import Torus
 
 PLACED = {"origin": [0.5, -0.2, 1.0], "axis": [2.0, 0.0, 0.3], "start": [0.3, 1.0, 0.0]}
 BESIDE = 3e-3

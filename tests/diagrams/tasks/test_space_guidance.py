@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagrams.scenario_task import make_task
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario.fixtures import RegionParameters, Shift, Swinging
-from diagrams.scenario.surface_shapes import Plane
+from diagrams.scenario.region_motion import Shift, Swinging
+from diagrams.scenario.virtual_fixtures import RegionParameters
+from diagrams.scenario_task import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import near_expression, scheduled_regions
+from pfsc_drake.geometry.shapes.plane import Plane
 from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"

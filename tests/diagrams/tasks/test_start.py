@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagrams.scenario_task import make_task
 from scipy.spatial.transform import Rotation
 
 from diagrams.robots.arm import MultibodyArm
@@ -13,6 +12,7 @@ from diagrams.robots.arm_model import ArmModel
 from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
+from diagrams.scenario_task import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
@@ -88,7 +88,7 @@ def test_tool_is_beside_the_lemniscate(load_scenario, start, name):
     assert slope @ (y_t - sigma) == pytest.approx(0.0, abs=1e-8)
     assert e_perp @ (y_t - sigma) == pytest.approx(0.01, abs=1e-8)
     assert e_cross @ (y_t - sigma) == pytest.approx(-0.02, abs=1e-8)
-    assert path.arc_length.at(theta) == pytest.approx(settings.reference.points[0], abs=1e-9)
+    assert path.arc_length(theta) == pytest.approx(settings.reference.points[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (3.0, -2.0, 1.0)])

@@ -8,17 +8,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import SurfaceParameters
-from diagrams.scenario.surface import Extruded, Fitted, Revolved, SurfaceOrientationParameters
-from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
-from diagrams.tasks.surface import (
-    given_quaternion,
-    make_surface,
-    make_surface_manifold,
-    surface_from_shape,
-)
+from diagrams.tasks.task_geometry import make_surface, make_surface_manifold
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix
+from pfsc_drake.geometry.shapes.cone import Cone
+from pfsc_drake.geometry.shapes.cylinder import Cylinder
+from pfsc_drake.geometry.shapes.fitted import Fitted
+from pfsc_drake.geometry.shapes.paraboloid import Paraboloid
+from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.profiles import Extruded, Revolved
+from pfsc_drake.geometry.shapes.shape import ShapeInputs
+from pfsc_drake.geometry.shapes.sphere import Sphere
+from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
+from pfsc_drake.geometry.shapes.torus import Torus
 from tests.experiments import scanned_panel as panel
 
 # x of the surface's axes leans to y of the world, z points along x
@@ -227,11 +230,11 @@ def test_orientations(convention, axes):
     angles = [20.0, 130.0, -40.0]
     expected = Rotation.from_euler(axes, angles, degrees=True).as_matrix()
     said = SurfaceOrientationParameters("given", convention, angles)
-    np.testing.assert_allclose(quaternion_to_matrix(given_quaternion(said)), expected, atol=1e-14)
+    np.testing.assert_allclose(quaternion_to_matrix(said.quaternion), expected, atol=1e-14)
     manifold = make_surface_manifold(2, SurfaceParameters(Plane(), said))
     assert manifold.is_oriented
     said = SurfaceOrientationParameters("normal", convention, angles)
-    assert given_quaternion(said) is None
+    assert said.quaternion is None
     assert make_surface_manifold(2, SurfaceParameters(Plane(), said)).is_oriented
 
 
@@ -262,7 +265,7 @@ def test_a_hole_that_is_bridged_is_said(tmp_path):
         text = "\n".join(",".join(map(repr, row)) for row in rows.tolist())
         (tmp_path / f"{name}.csv").write_text(f"x,y,z\n{text}\n")
         shape = Fitted(file=f"{name}.csv", largest_hole=0.05, seen_from=[0.1, 0.1, 1.0])
-        made[name] = surface_from_shape(shape, 3, tmp_path).notes
+        made[name] = shape.surface(ShapeInputs(tmp_path, 3)).notes
     assert made["whole"] == ()
     (note,) = made["holed"]
     assert re.search(r"holed\.csv: no point within 2[3456].* mm of \[0\.(19|2).*, 0\.(09|1)", note)
@@ -275,7 +278,7 @@ def test_the_side_of_the_normal_is_said_where_nobody_chose_it(tmp_path):
     R = Rotation.from_euler("xyz", [2.6, 0.3, 0.4]).as_matrix()
     text = "\n".join(",".join(map(repr, row)) for row in (flat @ R.T).tolist())
     (tmp_path / "scan.csv").write_text(f"x,y,z\n{text}\n")
-    (note,) = surface_from_shape(Fitted(file="scan.csv"), 3, tmp_path).notes
+    (note,) = Fitted(file="scan.csv").surface(ShapeInputs(tmp_path, 3)).notes
     said = re.search(r"scan\.csv: the normal .* to \[(.*)\] in its middle, as no seen_from", note)
     normal = np.array([float(value) for value in said[1].split(",")])
     np.testing.assert_allclose(normal, -R[:, 2], atol=2e-3)

@@ -8,11 +8,14 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import SurfaceParameters
 from diagrams.scenario.motion import ReferenceParameters, SecondReference, StartParameters
-from diagrams.scenario.surface import Extruded, SurfaceOrientationParameters
-from diagrams.scenario.surface_shapes import Cylinder, Paraboloid, Plane
 from diagrams.scenario_task import check_joints, make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
+from pfsc_drake.geometry.shapes.cylinder import Cylinder
+from pfsc_drake.geometry.shapes.paraboloid import Paraboloid
+from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.profiles import Extruded
+from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
 
 DISH = Paraboloid(origin=[0.8, 0.0, 1.0])
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.robot import ServoParameters
+from diagrams.scenario.virtual_fixtures import FixtureParameters
 from experiments.results.guidance import (
     deepest_violation,
     guidance_metrics,

@@ -13,7 +13,7 @@ from pfsc_drake.control.fixtures.near_regions import ScheduledRegions
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR, SLOTS
 from pfsc_drake.control.fixtures.record import SLOT
-from pfsc_drake.geometry.regions.shapes import SphereRegion
+from pfsc_drake.geometry.shapes.sphere import SphereRegion
 from reporting.registry import METRICS
 from tests.control.fixtures.point_robot import (
     DAMPING,

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from diagrams.scenario import Scenario, Target
-from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.virtual_fixtures import FixtureParameters
 from experiments.cli import main
 from experiments.results.promises import broken_promises, leave_unjudged, set_promises
 from reporting.metrics import Metrics

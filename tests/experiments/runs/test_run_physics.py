@@ -13,7 +13,7 @@ from scipy.optimize import newton
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Scenario
-from diagrams.tasks.path import make_path
+from diagrams.tasks.task_geometry import make_path
 from pfsc_drake.geometry import FourierCurve
 from pfsc_drake.geometry import Path as GeometricPath
 from pfsc_drake.robot.models.files import models_directory, resolve_model
@@ -129,7 +129,7 @@ def test_signals_of_the_tool(three_axes, arm, law):
     theta = result["theta"][rows, 0]
     xi = off_the_path(result["y_t"][rows], theta)
     np.testing.assert_allclose(result["xi"][rows], xi, atol=1e-9)
-    eta = [LEMNISCATE.arc_length.at(x) for x in theta]
+    eta = [LEMNISCATE.arc_length(x) for x in theta]
     np.testing.assert_allclose(result["eta"][rows, 0], eta, atol=1e-9)
 
 
@@ -247,7 +247,7 @@ def test_a_closed_path_counts_laps(three_axes, points, laps):
     assert result["eta"][-1, 0] == pytest.approx(end, abs=1e-5)
     theta = result["theta"][:, 0]
     assert np.abs(np.diff(theta)).max() < 0.05  # no jump at the seam
-    assert LEMNISCATE.arc_length.at(theta[-1]) == pytest.approx(end, abs=1e-5)
+    assert LEMNISCATE.arc_length(theta[-1]) == pytest.approx(end, abs=1e-5)
     on_first_lap = LEMNISCATE.pose(end - laps * length)[0]
     np.testing.assert_allclose(result["y_t"][-1], on_first_lap, atol=1e-5)
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Scenario, Waypoints
-from diagrams.tasks.path import make_path
+from diagrams.tasks.task_geometry import make_path
 from experiments.cli import main
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario

@@ -43,20 +43,6 @@ def test_open_curve_refuses_parameters_outside() -> None:
         line.derivatives(math.nan, 1)
 
 
-def test_sampler_is_the_scalar_form_of_derivatives(open_spline: PiecewisePolynomialCurve) -> None:
-    for curve in (open_spline, FourierCurve.bent_lemniscate()):
-        begin, end = curve.domain
-        for order in range(7):
-            sample = curve.sampler(order)
-            for theta in np.linspace(begin, end, 23):
-                expected = curve.derivatives(theta, order)
-                assert sample(float(theta)).shape == (order + 1, 3)
-                scale = np.abs(expected).max(axis=1, keepdims=True) + 1.0
-                np.testing.assert_allclose(
-                    sample(float(theta)) / scale, expected / scale, atol=1e-12
-                )
-
-
 def test_vectorized_shapes(lemniscate: FourierCurve) -> None:
     assert lemniscate.derivatives(np.zeros((2, 5)), 3).shape == (2, 5, 4, 3)
     assert lemniscate.derivatives(0.3, 0).shape == (1, 3)

@@ -14,7 +14,6 @@ def test_derivatives_agree_with_numpy_polynomials() -> None:
     for degree in (3, 7, 9):
         coefficients = rng.normal(size=(1, degree + 1, 2))
         curve = PiecewisePolynomialCurve([2.0, 3.5], coefficients)
-        sample = curve.sampler(6)
         for axis in range(2):
             polynomial = np.polynomial.Polynomial(coefficients[0, :, axis])
             for theta in (2.0, 2.7, 3.5):
@@ -22,7 +21,6 @@ def test_derivatives_agree_with_numpy_polynomials() -> None:
                 np.testing.assert_allclose(
                     curve.derivatives(theta, 6)[:, axis], expected, 1e-12, 1e-12
                 )
-                np.testing.assert_allclose(sample(theta)[:, axis], expected, 1e-12, 1e-12)
 
 
 def test_segments_are_chosen_by_parameter() -> None:

@@ -83,7 +83,7 @@ def test_arrays_agree_with_single_values(curve: Curve) -> None:
     begin, end = curve.domain
     theta = np.linspace(begin - 1.3 * curve.period, end + 2.4 * curve.period, 97)
     theta = np.append(theta, [begin, end]).reshape(3, 33)
-    expected = [[s.at(value) for value in row] for row in theta.tolist()]
+    expected = [[s(value) for value in row] for row in theta.tolist()]
     np.testing.assert_allclose(s(theta), expected, rtol=1e-14, atol=1e-14)
 
 

@@ -53,7 +53,7 @@ def test_rows_agree_with_the_parts(
     assert table.breakpoints[-1] == pytest.approx(end, rel=1e-15)
     theta = np.random.default_rng(0).uniform(begin, end, 3000)
     found = _rows(table, theta)
-    eta = np.array([path.arc_length.at(value) for value in theta.tolist()])
+    eta = np.array([path.arc_length(value) for value in theta.tolist()])
     np.testing.assert_allclose(found[:, 1], eta, rtol=0.0, atol=1e-13 * eta.max())
     # The powers that make up the bumps cancel: the curve's own tangent is rough by 1e-12.
     atol = 2e-12 if name == "bumps" else 3e-13

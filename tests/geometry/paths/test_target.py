@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, Projector
-from pfsc_drake.geometry.paths.path import PathTarget
+from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve
+from pfsc_drake.geometry.paths.geometric_path import PathTarget
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
+from tests.geometry.paths.newton_projector import Projector
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.moving import ShiftedRegion, TurningRegion
-from pfsc_drake.geometry.regions.shapes import ConeRegion, HalfSpace, TorusRegion
+from pfsc_drake.geometry.shapes.cone import ConeRegion
+from pfsc_drake.geometry.shapes.plane import HalfSpace
+from pfsc_drake.geometry.shapes.torus import TorusRegion
 from tests.geometry.regions.brute_force import gradient
 
 ORIGIN, AXIS = np.array([0.3, -0.2, 0.7]), np.array([0.3, 0.5, -1.0])

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pfsc_drake.geometry import interpolate, surface_through_grid, torus
-from pfsc_drake.geometry.regions import profile, surface_region
+from pfsc_drake.geometry.regions import plane_curve, surface_region
 from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces, nearest_foot
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
 
@@ -60,9 +60,9 @@ def test_pieces_of_a_profile_are_within_their_bounds():
     radius = 0.2 + 0.07 * np.random.default_rng(2).normal(size=13)
     flat = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
     curve = interpolate(flat, smoothness=2, closed=True)
-    edges = profile._edges(curve)
+    edges = plane_curve._edges(curve)
     points = curve.derivatives(_within(edges, 20), 0)[:, None, :, 0]
-    _assert_bounded(profile._pieces(curve, edges), points)
+    _assert_bounded(plane_curve._pieces(curve, edges), points)
 
 
 class _PlaceFoot(NamedTuple):

@@ -18,8 +18,8 @@ from pfsc_drake.geometry import (
     torus,
     zyx_to_matrix,
 )
-from pfsc_drake.geometry.regions.shapes import TorusRegion
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
+from pfsc_drake.geometry.shapes.torus import TorusRegion
 from tests.geometry.regions.brute_force import BruteForce, gradient
 
 ORIGIN = np.array([0.3, -0.2, 0.7])

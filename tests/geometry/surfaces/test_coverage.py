@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.geometry.surfaces.choose_base import _largest_rectangle, cover, stand
-from pfsc_drake.geometry.surfaces.surface import Interval
+from pfsc_drake.geometry.surfaces.parametric_surface import Interval
 
 SIDES = Interval(0.0, 1.0), Interval(2.0, 2.5)
 

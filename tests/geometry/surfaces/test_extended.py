@@ -7,19 +7,17 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from pfsc_drake.geometry.curves.spline import interpolate
-from pfsc_drake.geometry.nearest import ProjectionStatus
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.nearest_samples import ProjectionStatus
+from pfsc_drake.geometry.shapes.cone import cone
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.plane import plane
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.shapes.sphere import sphere
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
-from pfsc_drake.geometry.surfaces.generated import extruded_surface, translated_surface
-from pfsc_drake.geometry.surfaces.shapes import (
-    Turned,
-    cone,
-    cylinder,
-    paraboloid,
-    plane,
-    sphere,
-)
-from pfsc_drake.geometry.surfaces.surface import partial_orders
+from pfsc_drake.geometry.surfaces.parametric_surface import partial_orders
+from pfsc_drake.geometry.surfaces.product import extruded_surface, translated_surface
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 
 ORDER = 5
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid
-from pfsc_drake.geometry.workpieces import surface_mesh
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.workpiece_bodies import surface_mesh
 
 SPACING = 5e-3
 

@@ -5,12 +5,16 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
+from pfsc_drake.geometry.surfaces.parametric_surface import (
+    partial_count,
+    partial_index,
+    partial_orders,
+)
 from pfsc_drake.geometry.surfaces.product import (
     UniformKnots,
     interpolated_surface,
     uniform_spline_surface,
 )
-from pfsc_drake.geometry.surfaces.surface import partial_count, partial_index, partial_orders
 
 RNG = np.random.default_rng(5)
 

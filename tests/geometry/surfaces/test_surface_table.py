@@ -10,7 +10,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import FourierCurve, Turned, cylinder, extruded_surface, paraboloid, torus
 from pfsc_drake.geometry.curves.spline import interpolate
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
-from pfsc_drake.geometry.surfaces.generated import translated_surface
+from pfsc_drake.geometry.surfaces.product import translated_surface
 
 
 def _wave(axis, closed=False):

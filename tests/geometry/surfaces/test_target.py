@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
 from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
-from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from pfsc_drake.control.law.reference import straight_lines
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid
 from pfsc_drake.geometry.surfaces.length import way_on_surface
-from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
 
 
 def test_on_a_cylinder_angles_and_heights_are_lengths():

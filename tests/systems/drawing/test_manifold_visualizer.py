@@ -8,8 +8,9 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.tasks.drawing import SurfaceDrawing
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
-from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder
+from pfsc_drake.geometry.shapes.cylinder import cylinder
+from pfsc_drake.geometry.shapes.revolution import Turned
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 
 RADIUS, ORIGIN = 0.2, np.array([0.5, 0.0, 1.0])
 OUTSIDE = ORIGIN + np.array([0.0, 0.25, 0.1])

@@ -1,0 +1,134 @@
+"""Virtual fixtures of a scenario: regions that a tool led by hand may not enter."""
+
+import dataclasses as dc
+
+from diagrams.scenario.manifolds import GuideShape
+from diagrams.scenario.region_motion import RegionMotion
+from pfsc_drake.checks import require, require_between, require_one_of
+from pfsc_drake.control.fixtures.guides import MOST_GUIDES, REACH, STIFFNESS
+from pfsc_drake.following.options.follower import FixtureOptions
+from pfsc_drake.geometry.shapes.path_shapes import Line
+from pfsc_drake.geometry.shapes.plane import Plane
+from pfsc_drake.geometry.shapes.surface_list import RegionShape
+from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
+
+_STIFFNESS = (1.0, 1e6)  # N/m
+
+
+@dc.dataclass
+class RegionParameters:
+    """A surface that the tool must not cross, and the side on which it may be.
+
+    Planes, cylinders, cones and paraboloids have no ends, whatever part of them the shape tells;
+    nor have extruded profiles and the open ones of surfaces of revolution, which go on straight.
+    A fitted surface ends at its border, and beside it is no region.
+
+    Attributes:
+        shape: ``!Plane``, ``!Box``, ``!Paraboloid``, ``!Cylinder``, ``!Cone``, ``!Sphere``,
+            ``!Torus``, or from a file ``!Fitted``, ``!Revolved``, ``!Extruded``; without a part of
+            a turn, ``angles_deg``.
+        admissible: ``inside`` or ``outside`` of what encloses something; ``above``, on the side of
+            the normal, or ``below`` of a plane, a fitted surface and open profiles; empty for
+            ``outside``, or ``above``.
+        motion: ``!Shift`` or ``!Turn``; null for a region at rest.
+        stiffness: Stiffness of a soft region, that pushes back by so much [N/m]; null for a hard
+            one.
+    """
+
+    shape: RegionShape = dc.field(default_factory=Plane)
+    admissible: str = ""
+    motion: RegionMotion | None = None
+    stiffness: float | None = None
+
+    def __post_init__(self) -> None:
+        self.shape.check_side(self.admissible)
+        if self.stiffness is not None:
+            require_between("stiffness", self.stiffness, *_STIFFNESS, "N/m, or null")
+
+    @property
+    def inside(self) -> bool:
+        """Whether what is enclosed is admissible, or what is below."""
+        return self.admissible in ("inside", "below")
+
+
+@dc.dataclass
+class GuideParameters:
+    """A path that attracts the tool, next to it like a spring and from its reach on not at all.
+
+    See :class:`~pfsc_drake.control.fixtures.guides.Guide`.
+
+    Attributes:
+        shape: ``!Line``, ``!Circle``, ``!Waypoints``, ``!Intersection`` or ``!BentLemniscate``.
+        stiffness: Stiffness next to the path [N/m].
+        reach: Distance from which on it does not attract [m].
+    """
+
+    shape: GuideShape = dc.field(default_factory=Line)
+    stiffness: float = 2000.0
+    reach: float = 0.06
+
+    def __post_init__(self) -> None:
+        require_between("stiffness", self.stiffness, *STIFFNESS, "N/m")
+        require_between("reach", self.reach, *REACH, "m")
+
+
+_START = ("refuse", "move_out")
+
+
+@dc.dataclass
+class FixtureParameters(FixtureOptions):
+    """What limits a tool that is led through space, ``controller.manifold: space``.
+
+    Mass and damping of the free motion are those of ``compliance.tangential``. Further attributes
+    are those of :class:`FixtureOptions`.
+
+    Attributes:
+        regions: Where the tool may not go.
+        guides: Paths that attract it.
+        orientation: That the tool keeps.
+        start_inside: Start inside of a region that the tool starts in: ``refuse``, or ``move_out``
+            slowly.
+        servo_lag: ``tau`` [s] of the velocity servos as it is believed; negative for the inverse
+            of ``servo.bandwidth``.
+        bound: How deep the tool may be in a hard region [m]; a run in which it was deeper says so
+            and ends with status 3.
+    """
+
+    regions: list[RegionParameters] = dc.field(default_factory=list)
+    guides: list[GuideParameters] = dc.field(default_factory=list)
+    orientation: SurfaceOrientationParameters = dc.field(
+        default_factory=SurfaceOrientationParameters
+    )
+    start_inside: str = "refuse"
+    servo_lag: float = -1.0
+    bound: float = 0.5e-3
+
+    @property
+    def names(self) -> list[str]:
+        """What the regions are called: kind of shape and number, from 1 on."""
+        kinds = (type(region.shape).__name__.lower() for region in self.regions)
+        return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
+
+    @property
+    def guide_names(self) -> list[str]:
+        """What the guides are called, likewise."""
+        kinds = (type(guide.shape).__name__.lower() for guide in self.guides)
+        return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
+
+    def lag_behind(self, bandwidth: float) -> float:
+        """Return ``tau`` [s] of the servos as it is believed.
+
+        Args:
+            bandwidth: Bandwidth of the servos as the scenario has it [rad/s].
+        """
+        return self.servo_lag if self.servo_lag >= 0.0 else 1.0 / bandwidth
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        most = f"{MOST_GUIDES} or fewer"
+        require(len(self.guides) <= MOST_GUIDES, "guides", f"{len(self.guides)} given", most)
+        require_one_of("start_inside", self.start_inside, _START)
+        kind = self.orientation.kind
+        require(kind != "normal", "orientation.kind", kind, "none, given")
+        require(self.servo_lag < 0.1, "servo_lag", self.servo_lag, "below 0.1 s")
+        require_between("bound", self.bound, 1e-6, 0.1, "m")

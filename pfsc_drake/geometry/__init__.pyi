@@ -1,0 +1,76 @@
+from pfsc_drake.geometry.curves.curve import Curve as Curve
+from pfsc_drake.geometry.curves.fourier_curve import FourierCurve as FourierCurve
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve as OrientationCurve
+from pfsc_drake.geometry.curves.orientation_curve import (
+    interpolate_orientation as interpolate_orientation,
+)
+from pfsc_drake.geometry.curves.polynomial import (
+    PiecewisePolynomialCurve as PiecewisePolynomialCurve,
+)
+from pfsc_drake.geometry.curves.smoothing import noise_level as noise_level
+from pfsc_drake.geometry.curves.spline import interpolate as interpolate
+from pfsc_drake.geometry.intersections.edge import Edge as Edge
+from pfsc_drake.geometry.intersections.edge import find_edge as find_edge
+from pfsc_drake.geometry.intersections.edge import find_edges as find_edges
+from pfsc_drake.geometry.intersections.meeting import find_corners as find_corners
+from pfsc_drake.geometry.manifold_point import PathPointLayout as PathPointLayout
+from pfsc_drake.geometry.manifold_point import SurfacePointLayout as SurfacePointLayout
+from pfsc_drake.geometry.nearest_samples import ProjectionStatus as ProjectionStatus
+from pfsc_drake.geometry.paths.arc_length import ArcLength as ArcLength
+from pfsc_drake.geometry.paths.frame import ParallelTransportFrame as ParallelTransportFrame
+from pfsc_drake.geometry.paths.geometric_path import Path as Path
+from pfsc_drake.geometry.paths.geometric_path import PathWaypoints as PathWaypoints
+from pfsc_drake.geometry.paths.path_evaluator import PathEvaluator as PathEvaluator
+from pfsc_drake.geometry.paths.shape_report import ShapeReport as ShapeReport
+from pfsc_drake.geometry.paths.shape_report import shape_report as shape_report
+from pfsc_drake.geometry.paths.waypoint_picking import Picking as Picking
+from pfsc_drake.geometry.paths.waypoint_picking import pick_waypoints as pick_waypoints
+from pfsc_drake.geometry.paths.waypoints import Tolerance as Tolerance
+from pfsc_drake.geometry.paths.waypoints import WaypointTable as WaypointTable
+from pfsc_drake.geometry.paths.waypoints import path_from_waypoints as path_from_waypoints
+from pfsc_drake.geometry.paths.waypoints import read_waypoints as read_waypoints
+from pfsc_drake.geometry.paths.waypoints import waypoints_text as waypoints_text
+from pfsc_drake.geometry.rotation import angle_between as angle_between
+from pfsc_drake.geometry.rotation import check_rotation_matrix as check_rotation_matrix
+from pfsc_drake.geometry.rotation import euler_margin as euler_margin
+from pfsc_drake.geometry.rotation import matrix_to_quaternion as matrix_to_quaternion
+from pfsc_drake.geometry.rotation import matrix_to_zyx as matrix_to_zyx
+from pfsc_drake.geometry.rotation import matrix_to_zyz as matrix_to_zyz
+from pfsc_drake.geometry.rotation import quaternion_to_matrix as quaternion_to_matrix
+from pfsc_drake.geometry.rotation import rotation_to_axis as rotation_to_axis
+from pfsc_drake.geometry.rotation import turn_about as turn_about
+from pfsc_drake.geometry.rotation import zyx_to_matrix as zyx_to_matrix
+from pfsc_drake.geometry.rotation import zyx_to_quaternion as zyx_to_quaternion
+from pfsc_drake.geometry.rotation import zyz_to_matrix as zyz_to_matrix
+from pfsc_drake.geometry.rotation import zyz_to_quaternion as zyz_to_quaternion
+from pfsc_drake.geometry.shapes.cone import cone as cone
+from pfsc_drake.geometry.shapes.cylinder import cylinder as cylinder
+from pfsc_drake.geometry.shapes.paraboloid import paraboloid as paraboloid
+from pfsc_drake.geometry.shapes.plane import plane as plane
+from pfsc_drake.geometry.shapes.revolution import Turned as Turned
+from pfsc_drake.geometry.shapes.revolution import surface_of_revolution as surface_of_revolution
+from pfsc_drake.geometry.shapes.sphere import sphere as sphere
+from pfsc_drake.geometry.shapes.torus import torus as torus
+from pfsc_drake.geometry.surfaces.curvature import FundamentalForms as FundamentalForms
+from pfsc_drake.geometry.surfaces.curvature import fundamental_forms as fundamental_forms
+from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid as smooth_surface_near_grid
+from pfsc_drake.geometry.surfaces.grid import surface_through_grid as surface_through_grid
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface as Surface
+from pfsc_drake.geometry.surfaces.parametric_surface import partial_count as partial_count
+from pfsc_drake.geometry.surfaces.parametric_surface import partial_index as partial_index
+from pfsc_drake.geometry.surfaces.parametric_surface import partial_orders as partial_orders
+from pfsc_drake.geometry.surfaces.parametric_surface import rotation_from_axes as rotation_from_axes
+from pfsc_drake.geometry.surfaces.point_file import read_surface_points as read_surface_points
+from pfsc_drake.geometry.surfaces.product import ProductSurface as ProductSurface
+from pfsc_drake.geometry.surfaces.product import extruded_surface as extruded_surface
+from pfsc_drake.geometry.surfaces.product import translated_surface as translated_surface
+from pfsc_drake.geometry.surfaces.regularity import SurfaceReport as SurfaceReport
+from pfsc_drake.geometry.surfaces.regularity import surface_report as surface_report
+from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions as ScatteredFitOptions
+from pfsc_drake.geometry.surfaces.scattered import SurfaceFit as SurfaceFit
+from pfsc_drake.geometry.surfaces.scattered import fit_scattered as fit_scattered
+from pfsc_drake.geometry.surfaces.sheets import check_single_sheet as check_single_sheet
+from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator as SurfaceEvaluator
+from pfsc_drake.geometry.surfaces.surface_projection import GlobalProjector as GlobalProjector
+from pfsc_drake.geometry.surfaces.surface_projection import SurfaceProjection as SurfaceProjection
+from pfsc_drake.geometry.surfaces.surface_projection import SurfaceProjector as SurfaceProjector

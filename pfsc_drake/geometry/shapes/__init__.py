@@ -1,0 +1,1 @@
+"""Shapes of paths, surfaces and regions."""

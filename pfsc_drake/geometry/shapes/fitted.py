@@ -1,0 +1,216 @@
+"""Surfaces fitted to points, as a workpiece is scanned."""
+
+import dataclasses as dc
+from typing import Literal, cast
+
+import numpy as np
+
+from pfsc_drake.checks import (
+    FARTHEST,
+    FILE,
+    require,
+    require_direction,
+    require_one_of,
+    require_place,
+)
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.number_table import UNITS, Unit
+from pfsc_drake.geometry.regions.region import Region
+from pfsc_drake.geometry.regions.surface_region import SurfaceRegion, normal_points_outwards
+from pfsc_drake.geometry.shapes.shape import (
+    MadeSurface,
+    PlacedSurface,
+    ShapeInputs,
+    require_smoothness,
+)
+from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
+from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
+from pfsc_drake.geometry.surfaces.point_file import read_surface_file
+from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered
+from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
+
+_BASES = ("auto", "plane", "cylinder")
+_SHORTEST_TOLERANCE = 1e-7  # m
+# times the distance of points, from which on a place without any is a hole
+_HOLE = 2.0
+# how many times further apart neighbours are where a row ends unseen
+_JUMP = 3.0
+
+
+@dc.dataclass
+class Fitted(PlacedSurface):
+    """A surface fitted to points, as a workpiece is scanned; placed as its file's axes are.
+
+    Attributes:
+        file: CSV file with columns ``x, y, z``, or vertices of an STL, OBJ or PLY file; relative
+            to the scenario's folder.
+        unit: Unit of its numbers: ``m``, ``cm``, ``mm``, ``inch``.
+        grid: ``[rows, columns]`` of points that are given row by row, theta_1 leading from row
+            to row; empty for scattered points.
+        closed: Whether a grid closes from its last row, or column, to the first.
+        tolerance: The smoothest surface that misses no point by more than this [m]; zero for the
+            surface that predicts points best that it has not seen.
+        interpolate: Whether the surface goes through all points, of a grid without noise.
+        smoothness: Class C^k; 0 chooses what the law needs.
+        base: Over which surface scattered points are heights: ``auto``, ``plane``, ``cylinder``.
+        base_axis: Axis of that cylinder; empty if it is to be found.
+        base_point: A point on that axis [m].
+        seen_from: A point on the side that the normal points to, world axes [m]; empty for
+            upwards on a plane, outward on a cylinder.
+        along: Direction that theta_1 leans to on a plane, world axes; empty for the longer side.
+        largest_hole: Largest distance of a place of the surface from the nearest scattered point
+            [m]; zero for four times the distance of points.
+        trim: Whether to take the largest part that has no larger hole, instead of refusing.
+    """
+
+    file: str = dc.field(default="", metadata=FILE)
+    unit: str = "m"
+    grid: list[int] = dc.field(default_factory=list)
+    closed: list[bool] = dc.field(default_factory=lambda: [False, False])
+    tolerance: float = 0.0
+    interpolate: bool = False
+    smoothness: int = 0
+    base: str = "auto"
+    base_axis: list[float] = dc.field(default_factory=list)
+    base_point: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    seen_from: list[float] = dc.field(default_factory=list)
+    along: list[float] = dc.field(default_factory=list)
+    largest_hole: float = 0.0
+    trim: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for key, values in {"unit": UNITS, "base": _BASES}.items():
+            require_one_of(key, getattr(self, key), values)
+        require_smoothness(self.smoothness)
+        for key in ("tolerance", "largest_hole"):
+            value = getattr(self, key)
+            good = value == 0.0 or _SHORTEST_TOLERANCE <= value <= FARTHEST
+            require(good, key, value, f"0, or {_SHORTEST_TOLERANCE:g} m to {FARTHEST:g} m")
+        good = len(self.grid) in (0, 2) and min(self.grid, default=2) >= 2
+        require(good, "grid", self.grid, "empty, or [rows, columns] of two or more each")
+        require(len(self.closed) == 2, "closed", self.closed, "two of true and false")
+        self._require_of_grids()
+        for key in ("base_axis", "along"):
+            if getattr(self, key):
+                require_direction(key, getattr(self, key))
+        for key in ("base_point", "seen_from"):
+            if getattr(self, key):
+                require_place(key, getattr(self, key))
+        if self.base_axis:
+            require(self.base == "cylinder", "base", self.base, "cylinder, with base_axis")
+
+    def _require_of_grids(self) -> None:
+        """Refuse what says nothing of the points that are given."""
+        if self.grid:
+            scattered = {"base": self.base != "auto", "seen_from": bool(self.seen_from)}
+            scattered |= {
+                "along": bool(self.along),
+                "largest_hole": self.largest_hole > 0.0,
+                "trim": self.trim,
+            }
+            for key, given in scattered.items():
+                allowed = "for scattered points alone; leave out it or grid"
+                require(not given, key, getattr(self, key), allowed)
+            both = self.interpolate and self.tolerance > 0.0
+            require(not both, "tolerance", self.tolerance, "0 with interpolate: true")
+        else:
+            allowed = "of a grid alone; write grid: [rows, columns]"
+            require(not self.interpolate, "interpolate", self.interpolate, allowed)
+            require(not any(self.closed), "closed", self.closed, allowed)
+
+    @property
+    def encloses(self) -> bool:
+        """Whether it has an inside."""
+        return all(self.closed)
+
+    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+        """Return the surface, whatever its class."""
+        tell = inputs.progress or (lambda _fraction, _phase: None)
+        file = inputs.file(self.file)
+        tell(0.0, f"reading {file.name}")
+        points, notes = read_surface_file(file, cast(Unit, self.unit))
+        placed = points @ self.rotation.T + self.origin
+        tell(0.0, f"fitting a surface to {len(points)} points")
+        fitted = self._near_grid if self.grid else self._scattered
+        found = fitted(placed, self.smoothness or inputs.smoothness)
+        return dc.replace(found, notes=(*notes, *found.notes))
+
+    def region(self, inputs: ShapeInputs, *, inside: bool) -> Region:
+        """Return the region that it bounds."""
+        surface = self.surface(inputs).surface
+        check_single_sheet(surface)
+        above_is_inside = self.encloses and not normal_points_outwards(surface)
+        return SurfaceRegion(surface, above=inside == above_is_inside)
+
+    def _near_grid(self, points: np.ndarray, smoothness: int) -> MadeSurface:
+        rows, columns = self.grid
+        if rows * columns != len(points):
+            raise InputError(
+                f"grid = {self.grid}: {rows * columns} points, and {self.file} has {len(points)}; "
+                "rows times columns must be all of its points"
+            )
+        table, closed = points.reshape(rows, columns, 3), (self.closed[0], self.closed[1])
+        self._refuse_swapped(points)
+        if self.interpolate:
+            return MadeSurface(surface_through_grid(table, smoothness=smoothness, closed=closed))
+        tolerance = self.tolerance or None
+        return MadeSurface(
+            *smooth_surface_near_grid(
+                table, smoothness=smoothness, tolerance=tolerance, closed=closed
+            )
+        )
+
+    def _refuse_swapped(self, points: np.ndarray) -> None:
+        """Refuse a grid whose rows jump, where those of the swapped one do not."""
+        rows, columns = self.grid
+
+        def widest(count: int) -> float:
+            steps = np.diff(points.reshape(-1, count, 3), axis=1)
+            return float(np.linalg.norm(steps, axis=2).max())
+
+        if widest(columns) > _JUMP * widest(rows):
+            raise InputError(
+                f"grid = {self.grid}: neighbours in a row are up to {widest(columns):.3g} m apart, "
+                f"with [{columns}, {rows}] {widest(rows):.3g} m: rows and columns are swapped; "
+                "must be [rows, columns] of points that are given row by row"
+            )
+
+    def _scattered(self, points: np.ndarray, smoothness: int) -> MadeSurface:
+        base: BaseChoice = cast(Literal["auto", "plane", "cylinder"], self.base)
+        if self.base_axis:
+            base = Axis(self.base_point, self.base_axis)
+        options = ScatteredFitOptions(
+            smoothness=smoothness,
+            tolerance=self.tolerance or None,
+            base=base,
+            seen_from=self.seen_from or None,
+            along=self.along or None,
+            largest_hole=self.largest_hole or None,
+            trim=self.trim,
+        )
+        fit = fit_scattered(points, options)
+        notes: tuple[str, ...] = ()
+        if not self.seen_from:
+            normal = ", ".join(f"{value:.3g}" for value in _normal_in_the_middle(fit.surface))
+            notes = (
+                f"{self.file}: the normal of the surface points to [{normal}] in its middle, as no "
+                "seen_from says which side it is (upwards from a plane, outwards from a cylinder)",
+            )
+        if fit.hole > _HOLE * fit.spacing:
+            place = ", ".join(f"{value:.4g}" for value in fit.hole_at)
+            notes += (
+                f"{self.file}: no point within {1e3 * fit.hole:.3g} mm of [{place}] m, others are "
+                f"{1e3 * fit.spacing:.3g} mm apart: the surface bridges that hole; "
+                "largest_hole (m) refuses it",
+            )
+        return MadeSurface(fit.surface, fit.residuals, notes)
+
+
+def _normal_in_the_middle(surface: Surface) -> np.ndarray:
+    """Return the unit normal (4.3) at the middle of the domain, shape (3,)."""
+    middle = [sum(ends) / 2.0 for ends in surface.domain]
+    first, second = surface.partials(middle, 1)[1:3]
+    normal = np.cross(first, second)
+    return np.asarray(np.round(normal / np.linalg.norm(normal), 3) + 0.0)

@@ -1,0 +1,73 @@
+"""Paths along the edge in which two surfaces meet."""
+
+import dataclasses as dc
+from typing import Any
+
+from pfsc_drake.checks import FARTHEST, require, require_place
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.intersections.edge import Edge, find_edge, find_edges
+from pfsc_drake.geometry.shapes.path_shapes import CurveShape
+from pfsc_drake.geometry.shapes.shape import ShapeInputs
+from pfsc_drake.geometry.shapes.surface_list import SurfaceShape
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
+
+
+@dc.dataclass
+class Intersection(CurveShape):
+    """The edge in which two surfaces meet, along the cross product of their normals.
+
+    Attributes:
+        surfaces: Both, as ``surface.shape``; the edge ends where one of them does.
+        near: A point [m]: of several edges the nearest is meant, and a closed one begins there;
+            empty if there is only one.
+        tolerance: How far a spline may be from the edge, 1e-9 or more [m]. Lines, circles and
+            ellipses are exact.
+    """
+
+    surfaces: list[SurfaceShape] = dc.field(default_factory=list)
+    near: list[float] = dc.field(default_factory=list)
+    tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        count = len(self.surfaces)
+        require(
+            count in (0, 2), "surfaces", f"{count} given", "2, e.g. [!Plane {..}, !Sphere {..}]"
+        )
+        if self.near:
+            require_place("near", self.near)
+        good = 1e-9 <= self.tolerance <= FARTHEST
+        require(good, "tolerance", self.tolerance, f"1e-09 m to {FARTHEST:g} m")
+
+    def curve(self, inputs: ShapeInputs) -> Curve:
+        """Return the edge in which both surfaces meet."""
+        if len(self.surfaces) != 2:
+            raise InputError(
+                "path.shape.surfaces: none given; must be 2, e.g. [!Plane {..}, !Sphere {..}]"
+            )
+        first, second = (self._surface(k, inputs) for k in range(2))
+        options: dict[str, Any] = {"smoothness": inputs.smoothness, "tolerance": self.tolerance}
+        try:
+            if self.near:
+                return find_edge(first, second, near=self.near, **options).curve
+            edges = find_edges(first, second, **options)
+        except InputError as error:
+            raise InputError(f"path.shape.{error}") from None
+        if len(edges) > 1:
+            places = ", ".join(_place(edge) for edge in edges)
+            raise InputError(
+                f"path.shape.near: none given, and the surfaces have {len(edges)} edges, through "
+                f"{places}; must be a point, [x, y, z] in m, next to the one that is meant"
+            )
+        return edges[0].curve
+
+    def _surface(self, k: int, inputs: ShapeInputs) -> Surface:
+        try:
+            return self.surfaces[k].smooth_sheet(inputs).surface
+        except InputError as error:
+            raise InputError(f"path.shape.surfaces[{k}]: {error}") from None
+
+
+def _place(edge: Edge) -> str:
+    begin = edge.curve.derivatives(edge.curve.domain[0], 0)[0]
+    return f"[{', '.join(f'{value:.4g}' for value in begin)}]"

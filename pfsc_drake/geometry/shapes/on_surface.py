@@ -1,0 +1,107 @@
+"""Paths on a surface."""
+
+import dataclasses as dc
+from typing import cast
+
+import numpy as np
+
+from pfsc_drake.checks import FARTHEST, FILE, require, require_numbers, require_one_of
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve
+from pfsc_drake.geometry.files.number_table import UNITS, Unit
+from pfsc_drake.geometry.path_on_surface import (
+    curve_through,
+    normal_orientation,
+    path_on_surface,
+    project_waypoints,
+)
+from pfsc_drake.geometry.paths.geometric_path import Path
+from pfsc_drake.geometry.paths.waypoints import read_waypoints
+from pfsc_drake.geometry.shapes.shape import PlacedSurface, ShapeInputs
+from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
+from pfsc_drake.geometry.surfaces.parametric_surface import Surface
+
+
+@dc.dataclass
+class OnSurface:
+    """A path on the scenario's ``surface``, whose transversal coordinates are normal and sideways.
+
+    Its orientation is ``surface.orientation``. It is a spline through waypoints, given either by
+    the surface's parameters or by points in space.
+
+    Attributes:
+        thetas: Waypoints ``[theta_1, theta_2]``; two are joined by a straight line in the
+            parameters. Closed directions of the surface may be led round and round.
+        file: CSV file with columns ``x, y, z`` instead, relative to the scenario's folder;
+            the path is where the surface is nearest to them.
+        unit: Unit of ``x, y, z``: ``m``, ``cm``, ``mm``, ``inch``.
+        max_distance: Largest distance of these points from the surface [m].
+        closed: Whether the path is closed.
+    """
+
+    thetas: list[list[float]] = dc.field(default_factory=list)
+    file: str = dc.field(default="", metadata=FILE)
+    unit: str = "m"
+    max_distance: float = 1e-3
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        require_one_of("unit", self.unit, UNITS)
+        require(bool(self.file) or self.unit == "m", "unit", self.unit, "m without a file")
+        for i, theta in enumerate(self.thetas):
+            require_numbers(f"thetas[{i}]", theta, 2)
+        good = 0.0 < self.max_distance <= FARTHEST
+        require(good, "max_distance", self.max_distance, f"a positive number up to {FARTHEST:g} m")
+
+    def path_on(
+        self,
+        shape: PlacedSurface,
+        orientation: SurfaceOrientationParameters,
+        inputs: ShapeInputs,
+    ) -> Path:
+        """Return the path on a surface.
+
+        Args:
+            shape: The surface.
+            orientation: Orientation of the tool.
+            inputs: Folder of files, and class of splines.
+
+        Raises:
+            InputError: If surface or path cannot be made, or are not smooth enough.
+        """
+        if bool(self.thetas) == bool(self.file):
+            raise InputError(
+                f"path.shape = !OnSurface: {'both' if self.file else 'neither'} of thetas and "
+                "file; write thetas: [[theta_1, theta_2], ..] or file: NAME"
+            )
+        try:
+            made = shape.smooth_sheet(inputs)
+        except InputError as error:
+            raise InputError(f"surface.shape: {error}") from None
+        surface, notes, smoothness = made.surface, made.notes, inputs.smoothness
+        thetas = np.array(self.thetas)
+        try:
+            if self.file:
+                file = inputs.folder / self.file
+                table = read_waypoints(file, inputs.progress, cast(Unit, self.unit))
+                notes = (*notes, *table.notes)
+                thetas = project_waypoints(
+                    surface, table.positions, self.max_distance, closed=self.closed
+                )
+            curve = curve_through(surface, thetas, smoothness=smoothness, closed=self.closed)
+            along = _orientation(orientation, surface, curve, smoothness)
+            return path_on_surface(surface, curve, along, notes)
+        except InputError as error:
+            raise InputError(f"path.shape: {error}") from None
+
+
+def _orientation(
+    parameters: SurfaceOrientationParameters, surface: Surface, curve: Curve, smoothness: int
+) -> OrientationCurve | None:
+    """Return the orientation along a curve of parameters, or None if it is no task."""
+    if parameters.quaternion is not None:
+        return OrientationCurve.fixed(parameters.quaternion, curve.domain)
+    if parameters.kind == "none":
+        return None
+    return normal_orientation(surface, curve, parameters.offset, smoothness=smoothness)

@@ -1,0 +1,108 @@
+"""Shapes of paths: what each of them offers; lines, circles and the bent lemniscate."""
+
+import dataclasses as dc
+import math
+from abc import ABC, abstractmethod
+
+from pfsc_drake.checks import require_length, require_numbers, require_place
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.fourier_curve import FourierCurve
+from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
+from pfsc_drake.geometry.paths.geometric_path import Path
+from pfsc_drake.geometry.shapes.shape import ShapeInputs
+from pfsc_drake.geometry.shapes.tool_orientation import OrientationParameters
+
+
+class PathShape(ABC):
+    """A shape that is a path by itself, as a person writes it."""
+
+    @abstractmethod
+    def path(self, orientation: OrientationParameters, inputs: ShapeInputs) -> Path:
+        """Return the path, with the orientation that it has.
+
+        Args:
+            orientation: Keyframes.
+            inputs: Folder of files, and class of splines.
+
+        Raises:
+            InputError: If a file cannot be used, or no path be made.
+        """
+
+
+class CurveShape(PathShape):
+    """A path that is a curve with keyframes of orientation along it."""
+
+    @abstractmethod
+    def curve(self, inputs: ShapeInputs) -> Curve:
+        """Return the curve.
+
+        Args:
+            inputs: Folder of files, and class of splines.
+
+        Raises:
+            InputError: If no curve can be made.
+        """
+
+    def path(self, orientation: OrientationParameters, inputs: ShapeInputs) -> Path:
+        """Return the path, with the orientation that it has."""
+        curve = self.curve(inputs)
+        return Path(curve, orientation.along(curve, inputs.smoothness))
+
+
+@dc.dataclass
+class Line(CurveShape):
+    """A straight path.
+
+    Attributes:
+        start: First point [m], at most 1e4 from the origin.
+        end: Last point [m], at least 1e-4 from the first.
+    """
+
+    start: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
+    end: list[float] = dc.field(default_factory=lambda: [0.8, 0.3, 1.0])
+
+    def __post_init__(self) -> None:
+        require_place("start", self.start)
+        require_place("end", self.end)
+        require_length("distance of start and end", math.dist(self.start, self.end))
+
+    def curve(self, inputs: ShapeInputs) -> Curve:
+        """Return the curve."""
+        return PiecewisePolynomialCurve.line(self.start, self.end)
+
+
+@dc.dataclass
+class Circle(CurveShape):
+    """A circular path ``center + radius (u cos theta + v sin theta)``.
+
+    Attributes:
+        center: Center [m], at most 1e4 from the origin.
+        radius: Radius [m], 1e-4 to 1e4.
+        axis_u: Direction of ``u``, of any length.
+        axis_v: Direction in the plane of the circle, at least 0.1 deg from ``u``; ``v`` is
+            its part perpendicular to ``u``. Both lengths are made one.
+    """
+
+    center: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
+    radius: float = 0.15
+    axis_u: list[float] = dc.field(default_factory=lambda: [0.0, 1.0, 0.0])
+    axis_v: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+
+    def __post_init__(self) -> None:
+        require_length("radius", self.radius)
+        require_place("center", self.center)
+        for key in ("axis_u", "axis_v"):
+            require_numbers(key, getattr(self, key), 3)
+
+    def curve(self, inputs: ShapeInputs) -> Curve:
+        """Return the curve."""
+        return FourierCurve.circle(self.center, self.radius, self.axis_u, self.axis_v)
+
+
+@dc.dataclass
+class BentLemniscate(CurveShape):
+    """The vertically bent lemniscate (3.87)."""
+
+    def curve(self, inputs: ShapeInputs) -> Curve:
+        """Return the curve."""
+        return FourierCurve.bent_lemniscate()

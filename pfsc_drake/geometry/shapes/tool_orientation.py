@@ -1,0 +1,185 @@
+"""Orientation of the tool along a path or a surface, as a person writes it. Angles in degrees."""
+
+import dataclasses as dc
+from collections.abc import Sequence
+
+import numpy as np
+
+from pfsc_drake.checks import (
+    LARGEST_ANGLE,
+    equal,
+    require,
+    require_direction,
+    require_numbers,
+    require_one_of,
+)
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve, interpolate_orientation
+from pfsc_drake.geometry.rotation import (
+    EULER_TO_QUATERNION,
+    quaternion_to_matrix,
+)
+
+PATH_TASKS = ("full", "tool_axis", "yaw", "none")
+_KINDS = ("none", "given", "normal")
+_TASKS = ("full", "tool_axis", "yaw")
+_CONVENTIONS = ("zyx", "zyz")
+_JACOBIANS = ("geometric", "analytic")
+
+
+@dc.dataclass
+class Keyframe:
+    """Orientation of the tool at one point of the path.
+
+    Attributes:
+        theta: Path parameter, as a fraction of the path's domain (0..1).
+        angles_deg: Euler angles [deg], in the order of the convention's name; at most 3600.
+    """
+
+    theta: float = 0.0
+    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+
+
+@dc.dataclass
+class OrientationParameters:
+    """Orientation along the path.
+
+    Attributes:
+        convention: ``zyx`` (2.7) or ``zyz`` (2.6).
+        keyframes: Orientations to interpolate; one alone is kept everywhere; on a
+            closed path the first is repeated at the end.
+        task: What of it the tool follows: ``full``, all that the path has; ``tool_axis``, the
+            direction of an axis of the tool, about which it may turn as it likes; ``yaw``, the
+            turn about an axis in the world, the tool's tilt being as it is (four outputs, as an
+            SCARA has); ``none``.
+        tool_axis: The axis, in the tool frame, of any length.
+        yaw_axis: The axis of ``yaw``, in the world, of any length; by default the vertical.
+        jacobian: How the errors of orientation are told: ``geometric``, by the ZYX angles of the
+            turn from the reference to the tool; or, for comparison, ``analytic`` (2.16), by the
+            Euler angles of the tool in the world less those of the reference, of ``convention``,
+            which are singular where these are. Only for the task ``full``.
+    """
+
+    convention: str = "zyx"
+    keyframes: list[Keyframe] = dc.field(default_factory=list)
+    task: str = "full"
+    tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    jacobian: str = "geometric"
+
+    def __post_init__(self) -> None:
+        require_one_of("convention", self.convention, _CONVENTIONS)
+        require_one_of("task", self.task, PATH_TASKS)
+        _require_jacobian(self.jacobian, "task", self.task)
+        require_direction("tool_axis", self.tool_axis)
+        require_direction("yaw_axis", self.yaw_axis)
+        for i, keyframe in enumerate(self.keyframes):
+            key, angles = f"keyframes[{i}].angles_deg", keyframe.angles_deg
+            require_numbers(key, angles, 3)
+            good = max(map(abs, angles)) <= LARGEST_ANGLE
+            require(good, key, angles, f"3 numbers of at most {LARGEST_ANGLE:g} deg")
+            good = 0.0 <= keyframe.theta <= 1.0
+            require(good, f"keyframes[{i}].theta", keyframe.theta, "0 to 1, a fraction")
+
+    def along(self, position: Curve, smoothness: int) -> OrientationCurve | None:
+        """Return the interpolated keyframes, or None if there are none.
+
+        Args:
+            position: The path's curve, over whose parameter they are interpolated.
+            smoothness: k of the class C^k of the interpolation.
+
+        Raises:
+            InputError: If they do not reach from one end to the other.
+        """
+        if not self.keyframes:
+            return None
+        quaternions = _quaternions(self.convention, [k.angles_deg for k in self.keyframes])
+        if len(self.keyframes) == 1:
+            return OrientationCurve.fixed(quaternions[0], position.domain)
+        begin, end = position.domain
+        fractions = np.array([keyframe.theta for keyframe in self.keyframes])
+        if position.closed:
+            fractions = np.append(fractions, fractions[0] + 1.0)
+            quaternions = np.vstack([quaternions, quaternions[:1]])
+        span = fractions[-1] - fractions[0]
+        if fractions[0] != 0.0 or not np.isclose(span, 1.0):
+            raise InputError(
+                f"orientation keyframes: theta runs from {fractions[0]:g} to {fractions[-1]:g}; "
+                "it must run from 0 to 1 (on closed paths the first keyframe stands for 1 too)"
+            )
+        return interpolate_orientation(
+            quaternions,
+            begin + fractions * (end - begin),
+            smoothness=smoothness,
+            closed=position.closed,
+        )
+
+
+@dc.dataclass
+class SurfaceOrientationParameters:
+    """Orientation of the tool along a surface.
+
+    Attributes:
+        kind: ``none``: position only; ``given``: the same everywhere; ``normal``: that of the
+            frame of first tangent, second and normal.
+        convention: ``zyx`` (2.7) or ``zyz`` (2.6); of an ``analytic`` Jacobian too.
+        angles_deg: Euler angles [deg]: of the orientation, or of its turn away from the frame.
+        task: ``full``; ``tool_axis``, whose turn about itself is free; or ``yaw``, the turn about
+            an axis in the world alone.
+        tool_axis: Axis in the tool frame, of any length, for ``tool_axis``.
+        yaw_axis: Axis in the world, of any length, for ``yaw``; by default the vertical.
+        jacobian: ``geometric`` or ``analytic``, see ``path.orientation.jacobian``.
+    """
+
+    kind: str = "none"
+    convention: str = "zyx"
+    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    task: str = "full"
+    tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    jacobian: str = "geometric"
+
+    def __post_init__(self) -> None:
+        for key, values in {"kind": _KINDS, "convention": _CONVENTIONS, "task": _TASKS}.items():
+            require_one_of(key, getattr(self, key), values)
+        _require_jacobian(self.jacobian, "task", self.task)
+        _require_jacobian(self.jacobian, "kind", "full" if self.kind != "none" else self.kind)
+        require_numbers("angles_deg", self.angles_deg, 3)
+        good = max(map(abs, self.angles_deg)) <= LARGEST_ANGLE
+        allowed = f"3 numbers of at most {LARGEST_ANGLE:g} deg"
+        require(good, "angles_deg", self.angles_deg, allowed)
+        require_direction("tool_axis", self.tool_axis)
+        require_direction("yaw_axis", self.yaw_axis)
+
+    @property
+    def quaternion(self) -> np.ndarray | None:
+        """Quaternion of an orientation that is the same everywhere, shape (4,), or None."""
+        return self._turn if self.kind == "given" else None
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Rotation of the tool away from the surface's frame, shape (3, 3)."""
+        return quaternion_to_matrix(self._turn)
+
+    @property
+    def _turn(self) -> np.ndarray:
+        return _quaternions(self.convention, [self.angles_deg])[0]
+
+
+def _quaternions(convention: str, angles_deg: Sequence[Sequence[float]]) -> np.ndarray:
+    """Return the quaternions of Euler angles [deg], shape (n, 4)."""
+    return EULER_TO_QUATERNION[convention](np.deg2rad(angles_deg))
+
+
+def _require_jacobian(jacobian: str, key: str, value: str) -> None:
+    """Refuse an unknown Jacobian, and the analytic one where not all of an orientation matters.
+
+    Args:
+        jacobian: What the scenario says.
+        key: What says how much of the orientation matters.
+        value: Its value; ``full`` for all of it.
+    """
+    require_one_of("jacobian", jacobian, _JACOBIANS)
+    good = jacobian == "geometric" or value == "full"
+    require(good, "jacobian", jacobian, f"geometric with {key}: {value}")
