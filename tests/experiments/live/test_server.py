@@ -3,7 +3,8 @@
 import http.client
 import json
 import socket
-from contextlib import closing
+import time
+from contextlib import closing, suppress
 from urllib.parse import urlsplit
 
 import pytest
@@ -25,8 +26,10 @@ def pages():
 
 @pytest.fixture
 def server(pages):
-    with closing(PageServer(0, lambda: {"time": 1.5}, pages.hear)) as server:
-        yield server
+    server = PageServer(0, lambda: {"time": 1.5}, pages.hear)
+    yield server
+    with suppress(RuntimeError):  # it has stopped
+        server.close()
 
 
 def ask(server, method, document, body=None, **headers):
@@ -68,15 +71,23 @@ def test_every_session_has_a_token_of_its_own(server, pages):
         assert ask(server, "GET", urlsplit(other.url).path + "status")[0] == 403
 
 
-@pytest.mark.parametrize("path", ["/", "/status", "/hear", "//", "/x/status", "/%FF/", "/\xe9/"])
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        *[(path, 403) for path in ("/", "/status", "/hear", "//", "/x/status", "/%FF/")],
+        ("/\xe9/", 400),  # not HTTP
+    ],
+)
 @pytest.mark.parametrize("method", ["GET", "POST"])
-def test_without_the_token_there_is_nothing(server, pages, method, path):
-    with closing(socket.create_connection(server._server.server_address[:2], 5)) as connection:
+def test_without_the_token_there_is_nothing(server, pages, method, path, expected):
+    with closing(
+        socket.create_connection((urlsplit(server.url).hostname, urlsplit(server.url).port), 5)
+    ) as connection:
         host = urlsplit(server.url).netloc
         request = f"{method} {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
         length = f"Content-Length: {len(GOOD)}\r\n\r\n"
         connection.sendall((request + length).encode("latin-1") + GOOD)
-        assert connection.recv(100).split()[1] == b"403"
+        assert connection.recv(100).split()[1] == str(expected).encode()
     assert pages.leader is None
 
 
@@ -155,11 +166,36 @@ def test_a_message_that_is_too_long_gets_an_answer(server):
 
 @pytest.mark.parametrize(
     ("length", "expected"),
-    [("9" * 400, 413), ("9" * 5000, 413), ("8193", 413), ("-1", 411), ("x", 411), ("", 411)],
+    [("8193", 413), *((length, 400) for length in ("9" * 400, "9" * 5000, "-1", "x", ""))],
 )
 def test_sizes_that_are_none_get_an_answer(server, length, expected):
     assert post(server, GOOD, **{"Content-Length": length})[0] == expected
     assert post(server, GOOD)[0] == 204
+
+
+def test_a_message_of_unknown_size_gets_an_answer(server):
+    assert post(server, iter([GOOD]))[0] == 411
+    assert post(server, GOOD)[0] == 204
+
+
+def test_it_stops_while_pages_are_open_and_says_nothing(server, capfd):
+    place = urlsplit(server.url)
+    address, path = (place.hostname, place.port), place.path
+    with (
+        closing(socket.create_connection(address, 5)) as idle,
+        closing(socket.create_connection(address, 5)) as slow,
+    ):
+        idle.sendall(f"GET {path}status HTTP/1.1\r\nHost: {place.netloc}\r\n\r\n".encode())
+        assert idle.recv(100).split()[1] == b"200"
+        head = f"POST {path}hear HTTP/1.1\r\nHost: {place.netloc}\r\nOrigin: {origin(server)}\r\n"
+        slow.sendall(f"{head}Content-Length: 100\r\n\r\n".encode())
+        slow.sendall(b"[")
+        begin = time.monotonic()
+        server.close()
+        assert time.monotonic() - begin < 3.0
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(address, 5)
+    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("port", [-1, 70000])
