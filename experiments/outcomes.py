@@ -15,7 +15,7 @@ from reporting.terminal import FAULT, NOT_WRITTEN, WRONG_INPUT, print_error, pri
 if TYPE_CHECKING:
     from experiments.export import Export
     from experiments.finished_run import RunOutcome
-    from experiments.live.start import LiveOutcome
+    from experiments.live.session import LiveSession
     from experiments.replay import Commands, Replay
     from experiments.sweep.sweep import SweepOutcome
     from reporting.metrics import Metric
@@ -72,36 +72,36 @@ def _missed(broken: Sequence[str]) -> str:
     return f"missed: {'; '.join(broken)}"
 
 
-def print_live(console: Console, outcome: "LiveOutcome") -> None:
+def print_live(console: Console, session: "LiveSession") -> None:
     """What a live session has left."""
-    for kept in outcome.kept:
-        print_page(console, "Open the report", kept.outcome.report)
-        scenario = kept.folder / "scenario.yaml"
+    for folder, outcome in session.kept.items():
+        print_page(console, "Open the report", outcome.report)
+        scenario = escape(str(folder / "scenario.yaml"))
         console.print(
-            f"  again, to the last bit: python -m experiments run {escape(str(scenario))}",
+            f"  again, to the last bit: python -m experiments run {scenario}",
             soft_wrap=True,
             highlight=False,
         )
 
 
-def judge_live(outcome: "LiveOutcome") -> int:
+def judge_live(session: "LiveSession") -> int:
     """Says in one line what went wrong in a session, if anything did; returns the exit status."""
     status, ends = 0, []
-    if outcome.interrupted:
-        status, ends = INTERRUPTED, [f"interrupted at t = {outcome.time:.3f} s"]
-    if outcome.fault is not None:
-        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {outcome.time:.3f} s"]
-    for kept in outcome.kept:
-        if kept.outcome.broken:
+    if session.interrupted:
+        status, ends = INTERRUPTED, [f"interrupted at t = {session.end:.3f} s"]
+    if session.fault is not None:
+        status, ends = FAULT, [f"fault: {session.fault}; stopped at t = {session.end:.3f} s"]
+    for folder, outcome in session.kept.items():
+        if outcome.broken:
             status = status or FAULT
-            ends = [*ends, f"{kept.folder.name} {_missed(kept.outcome.broken)}"]
-    problems = [kept.outcome.problem for kept in outcome.kept if kept.outcome.problem is not None]
+            ends = [*ends, f"{folder.name} {_missed(outcome.broken)}"]
+    problems = [kept.problem for kept in session.kept.values() if kept.problem is not None]
     if problems:
         status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
-    elif ends and outcome.kept:
-        ends[-1] += f", everything logged so far is kept in {outcome.kept[-1].folder}"
+    elif ends and session.kept:
+        ends[-1] += f", everything logged so far is kept in {[*session.kept][-1]}"
     if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
+        print_error("; ".join(ends), after_echo=session.interrupted)
     return status
 
 

@@ -178,7 +178,7 @@ def live_command(
 
             run_watch(loaded, WatchingEnd(open_bus(lcm), dialect(driver)), port=port, tell=tell)
             return
-        outcome = run_live(
+        session = run_live(
             loaded,
             out=folder,
             port=port,
@@ -187,8 +187,8 @@ def live_command(
             recording=recording,
             tell=tell,
         )
-        print_live(console, outcome)
-        raise typer.Exit(judge_live(outcome))
+        print_live(console, session)
+        raise typer.Exit(judge_live(session))
 
 
 def compare_command(

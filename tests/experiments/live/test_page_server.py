@@ -9,8 +9,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from experiments.live.pages import Pages
-from experiments.live.server import PageServer
+from experiments.live.page_server import Pages, PageServer
 from pfsc_drake.errors import InputError
 
 PULL = "pull x [N]"
@@ -26,7 +25,7 @@ def pages():
 
 @pytest.fixture
 def server(pages):
-    server = PageServer(0, lambda: {"time": 1.5}, pages.hear)
+    server = PageServer(0, pages, lambda: {"time": 1.5})
     yield server
     with suppress(RuntimeError):  # it has stopped
         server.close()
@@ -59,13 +58,13 @@ def test_it_serves_the_page_and_what_it_shows_on_this_machine_alone(server):
     assert headers["X-Frame-Options"] == "DENY"
     assert headers["Referrer-Policy"] == "no-referrer"
     assert "default-src 'none'" in headers["Content-Security-Policy"]
-    assert json.loads(ask(server, "GET", "status")[2]) == {"time": 1.5}
+    assert json.loads(ask(server, "GET", "status")[2]) == {"time": 1.5, "lead": None}
     assert ask(server, "GET", "../etc/passwd")[0] == 404
     assert ask(server, "GET", "hear")[0] == 404
 
 
 def test_every_session_has_a_token_of_its_own(server, pages):
-    with closing(PageServer(0, dict, pages.hear)) as other:
+    with closing(PageServer(0, pages, dict)) as other:
         assert len(urlsplit(other.url).path) > 20
         assert urlsplit(other.url).path != urlsplit(server.url).path
         assert ask(server, "GET", urlsplit(other.url).path + "status")[0] == 403
@@ -201,10 +200,10 @@ def test_it_stops_while_pages_are_open_and_says_nothing(server, capfd):
 @pytest.mark.parametrize("port", [-1, 70000])
 def test_a_port_that_is_none_is_refused(port):
     with pytest.raises(InputError, match=f"--port {port}: "):
-        PageServer(port, dict, print)
+        PageServer(port, Pages(), dict)
 
 
 def test_a_port_that_is_taken_is_refused(server):
     port = urlsplit(server.url).port
     with pytest.raises(InputError, match=f"--port {port}: Address already in use"):
-        PageServer(port, dict, print)
+        PageServer(port, Pages(), dict)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from experiments.live.pages import LEAVE, TAKE, Pages
+from experiments.live.page_server import LEAVE, TAKE, Pages
 from pfsc_drake.errors import InputError
 
 PULL, KEY = "pull x [N]", "across k"
