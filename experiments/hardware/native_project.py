@@ -12,28 +12,28 @@ import pfsc_drake.codegen
 from diagrams.builder import build_station
 from diagrams.controller_part import controller_part
 from diagrams.robots.remote_arm import RemoteArm
-from experiments.hardware.check import AT_REST, AT_START
-from experiments.hardware.drive import Drive
-from experiments.hardware.drive_options import (
+from experiments.controller_replay import make, missing_tool
+from experiments.hardware.check import (
+    AT_REST,
+    AT_START,
+    BRIDGED,
     FASTER,
     LARGEST_GAP,
     LEAST_JUMP,
     LEAST_SPEED,
     LONGEST_STOP,
-    PACE,
     RESTED,
-    DriveOptions,
+    SILENCE,
 )
+from experiments.hardware.drive import PACE, Drive
 from experiments.hardware.native_record import RecordFormat
 from experiments.preparation import PreparedRun, naming
-from experiments.replay import make, missing_tool
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.codegen.c_controller import CController
 from pfsc_drake.compiled.c_source import c_source
-from pfsc_drake.drivers.layout import CommandLayout, StatusLayout, wrench_layout
+from pfsc_drake.drivers.layout import CommandLayout, StatusLayout, UdpmAddress, wrench_layout
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import FORCE_TORQUE_CHANNEL, ControlMode, Dialect, RobotMode
-from pfsc_drake.drivers.udpm import UdpmAddress
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import gravity_function
 from reporting.progress import ProgressListener
@@ -59,12 +59,10 @@ class NativeProject:
 
     Attributes:
         folder: With its files.
-        dialect: The robot's messages.
         record: How its record is written.
     """
 
     folder: Path
-    dialect: Dialect
     record: RecordFormat
 
     @property
@@ -119,7 +117,6 @@ def write_native(
     scenario: ScenarioFile,
     prepared: PreparedRun,
     drive: Drive,
-    options: DriveOptions,
     dialect: Dialect,
     folder: Path,
 ) -> NativeProject:
@@ -129,7 +126,6 @@ def write_native(
         scenario: The scenario as read.
         prepared: What was made of it.
         drive: What the loop is to do.
-        options: What it allows itself.
         dialect: The robot's messages.
         folder: Where the files go; what has not changed is left alone.
 
@@ -166,14 +162,14 @@ def write_native(
     command = CommandLayout.of(dialect, drive.mode, robot.dimension)
     # where the controller's memory has the pace of the reference
     pace = controller.program.states[PACE].start + 1 if drive.has_motion else 0
-    files[_SETUP] = _header(drive, options, dialect, status, command, record, pace)
+    files[_SETUP] = _header(drive, dialect, status, command, record, pace)
     files["drive_setup.c"] = _source(drive, station.start_posture, status, command, inputs)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         _replace(folder / name, text)
     for file in _LOOP.iterdir():
         _replace(folder / file.name, file.read_text(encoding="utf-8"))
-    return NativeProject(folder, dialect, record)
+    return NativeProject(folder, record)
 
 
 def _replace(file: Path, text: str) -> None:
@@ -183,7 +179,6 @@ def _replace(file: Path, text: str) -> None:
 
 def _header(
     drive: Drive,
-    options: DriveOptions,
     dialect: Dialect,
     status: StatusLayout,
     command: CommandLayout,
@@ -201,8 +196,8 @@ def _header(
         "DRIVE_PRIORITY": PRIORITY,
         "DRIVE_AT_REST": AT_REST,
         "DRIVE_AT_START": AT_START,
-        "DRIVE_SILENCE": options.silence,
-        "DRIVE_BRIDGED": options.bridged,
+        "DRIVE_SILENCE": SILENCE,
+        "DRIVE_BRIDGED": BRIDGED,
         "DRIVE_LARGEST_GAP": LARGEST_GAP,
         "DRIVE_LEAST_JUMP": LEAST_JUMP,
         "DRIVE_LONGEST_STOP": LONGEST_STOP,
@@ -265,7 +260,7 @@ def _source(
         "drive_start": start,
         "drive_limit": drive.limit,
         "drive_rate": drive.rate,
-        "drive_fastest": drive.fastest,
+        "drive_fastest": drive.inputs.fastest,
     }
     texts = [
         f"const unsigned char {name}[] = {{{', '.join(map(str, data))}}};"
