@@ -193,10 +193,10 @@ def _numbers(entries: dict[str, Any], key: str, known: Collection[str]) -> dict[
     return numbers
 
 
-def _number(name: str, value: object) -> float:
+def _number(name: str, value: Any) -> float:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
     # a larger integer has no float
-    finite = isinstance(value, int | float) and -_LARGEST <= value <= _LARGEST
-    if not finite or isinstance(value, bool):
+    if not (is_number and -_LARGEST <= value <= _LARGEST):
         raise InputError(f"{shortened(repr(name))}; allowed: a finite number")
     return float(value)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from diagrams.live_view import LiveView
 from experiments.finished_run import RunOutcome
 from experiments.live.controls import tuned_parameters
+from experiments.live.live_simulation import LiveSimulation, RealTimePace
 from experiments.live.page_server import Pages
 from experiments.live.panel import Command, Panel, Scene
-from experiments.live.simulation import LiveSimulation, RealTimePace
 from experiments.live.status import LiveStatus
 from experiments.live.takes import DRAWING, INPUTS, ControlRecord, Pen, TakeFolders
 from experiments.preparation import PreparedRun

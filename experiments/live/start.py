@@ -22,25 +22,25 @@ _HAND = ("stiffness", "damping", "rotational_damping", "force_limit", "torque_li
 
 def run_live(
     scenario: ScenarioFile,
-    *,
-    out: Path,
     port: int,
     duration: float | None,
+    tell: Callable[[str], None],
+    *,
+    out: Path,
     figures: bool,
     recording: bool,
-    tell: Callable[[str], None],
 ) -> LiveSession:
     """Let a person guide a scenario's robot until they end it.
 
     Args:
         scenario: The scenario as read; its written hand, if any, gives way to the person's.
-        out: Folder in which takes get folders of their own.
         port: Port of the page; 0 for any that is free.
         duration: Simulated time after which the session ends [s]; by default
             LONGEST_SESSION or what the memory allows.
+        tell: Told in words what is prepared, happens, and is written.
+        out: Folder in which takes get folders of their own.
         figures: Whether takes get figures.
         recording: Whether takes get a recording.
-        tell: Told in words what is prepared, happens, and is written.
 
     Raises:
         InputError: If the scenario is wrong or has nothing to guide, the folder cannot be used, or

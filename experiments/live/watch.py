@@ -200,7 +200,7 @@ def coordinate_function(manifold: PlaceManifold, robot: RobotModel) -> ca.Functi
 
 
 def run_watch(
-    scenario: ScenarioFile, end: WatchingEnd, *, port: int, tell: Callable[[str], None]
+    scenario: ScenarioFile, end: WatchingEnd, port: int, tell: Callable[[str], None]
 ) -> None:
     """Watch a robot that another process drives by a scenario, until the person leaves.
 

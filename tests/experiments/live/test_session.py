@@ -8,9 +8,9 @@ import pytest
 
 from diagrams.surroundings.operator import read_controls
 from experiments.cli import main
+from experiments.live.live_simulation import RealTimePace
 from experiments.live.page_server import Pages
 from experiments.live.session import LiveSession
-from experiments.live.simulation import RealTimePace
 from experiments.live.start import with_operator
 from experiments.live.status import LiveStatus
 from experiments.live.takes import TakeFolders

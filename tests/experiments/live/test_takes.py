@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagrams.surroundings.operator import idle_controls
-from experiments.live.simulation import _ticks_per_step
+from experiments.live.live_simulation import _ticks_per_step
 from experiments.live.takes import ControlRecord, TakeFolders
 from experiments.simulation import chunk_ticks
 from pfsc_drake.errors import InputError

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from experiments.results.run_log import RunLog
-from pfsc_drake.codegen.export import LOG
+from pfsc_drake.codegen.c_project import LOG
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers
 from reporting.progress import ProgressListener
