@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class DriverRules:
+class DriverChoices:
     """What a simulated driver makes of commands."""
 
     expire: Annotated[
@@ -71,7 +71,7 @@ class Way:
 def robot_command(
     *,
     bus: Bus,
-    rules: DriverRules,
+    rules: DriverChoices,
     way: Way,
     chosen: TimedScenario,
     meshcat: Annotated[

@@ -14,9 +14,9 @@ AT_START = 0.02  # rad or m
 # how long no status may come [s], and how many may be missing in a row and are made up for
 SILENCE, BRIDGED = 0.1, 10
 # after which a robot that is to stop is left alone, and how long it rests before [s]
-LONGEST_STOP, RESTED = 2.0, 0.2
+LONGEST_STOP, RESTED_FOR = 2.0, 0.2
 # a stop that makes the robot faster than this is none: a multiple of its speed, and more [rad/s]
-FASTER, LEAST_SPEED = 1.5, 0.2
+STOP_FACTOR, STOP_SPEED = 1.5, 0.2
 # beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
 TWICE, FASTEST, LEAST_JUMP = 2.0, 10.0, 2e-3
 # ticks that are missing for longer are none of a robot's: its clock was set [s]

@@ -13,11 +13,11 @@ from diagrams.tasks.space_guidance import SpaceTask
 from experiments.hardware.check import (
     AT_REST,
     BRIDGED,
-    FASTER,
     LARGEST_GAP,
-    LEAST_SPEED,
     LONGEST_STOP,
-    RESTED,
+    RESTED_FOR,
+    STOP_FACTOR,
+    STOP_SPEED,
     check_first,
 )
 from experiments.hardware.drive_inputs import DriveInputs
@@ -226,7 +226,9 @@ class Drive:
     def _begin_stop(self, why: str) -> None:
         n = self._n
         self._stopping, self._stop_time = why, self.time
-        self._stop_speed = FASTER * np.nanmax(np.abs(self.inputs.state[n : 2 * n])) + LEAST_SPEED
+        self._stop_speed = (
+            STOP_FACTOR * np.nanmax(np.abs(self.inputs.state[n : 2 * n])) + STOP_SPEED
+        )
 
     @property
     def has_ended(self) -> bool:
@@ -236,7 +238,7 @@ class Drive:
         if self._stopping is None:
             return False
         long = self.time - self._stop_time > LONGEST_STOP
-        return long or self._resting * self.period > RESTED
+        return long or self._resting * self.period > RESTED_FOR
 
     def lose(self, why: str) -> None:
         """End at once: there is no robot that would hear.

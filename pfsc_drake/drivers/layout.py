@@ -73,31 +73,22 @@ class StatusLayout:
         )
 
 
-@dataclass(frozen=True)
-class CommandLayout:
-    """A command to N joints as bytes.
+def command_layout(dialect: Dialect, mode: ControlMode, joints: int) -> tuple[bytes, int]:
+    """Find where a dialect writes what is commanded.
 
-    Attributes:
-        message: All of it, its time and what is commanded being zero.
-        values: Where that begins, as big-endian doubles one after the other.
+    Args:
+        dialect: The dialect.
+        mode: What is commanded.
+        joints: Number N of joints.
+
+    Returns:
+        A command, its time and what is commanded being zero; and where that begins, as big-endian
+        doubles one after the other.
     """
-
-    message: bytes
-    values: int
-
-    @classmethod
-    def of(cls, dialect: Dialect, mode: ControlMode, joints: int) -> "CommandLayout":
-        """Find where a dialect writes what is commanded.
-
-        Args:
-            dialect: The dialect.
-            mode: What is commanded.
-            joints: Number N of joints.
-        """
-        values = 1.0 + np.arange(joints)
-        data = dialect.encode_command(RobotCommand(0, mode, values))
-        zero = dialect.encode_command(RobotCommand(0, mode, 0.0 * values))
-        return cls(zero, data.index(_doubles(values)))
+    values = 1.0 + np.arange(joints)
+    data = dialect.encode_command(RobotCommand(0, mode, values))
+    zero = dialect.encode_command(RobotCommand(0, mode, 0.0 * values))
+    return zero, data.index(_doubles(values))
 
 
 def wrench_layout() -> tuple[int, bytes]:

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from pfsc_drake.drivers.layout import CommandLayout, StatusLayout, UdpmAddress, wrench_layout
+from pfsc_drake.drivers.layout import StatusLayout, UdpmAddress, command_layout, wrench_layout
 from pfsc_drake.drivers.messages import (
     ControlMode,
     RobotCommand,
@@ -58,10 +58,10 @@ def test_a_status(kind, joints):
 @pytest.mark.parametrize("joints", [1, 6, 7])
 def test_a_command(kind, mode, joints):
     spoken, values = dialect(kind), RANDOM.normal(size=joints)
-    layout = CommandLayout.of(spoken, mode, joints)
-    data = bytearray(layout.message)
+    message, begin = command_layout(spoken, mode, joints)
+    data = bytearray(message)
     data[8:16] = struct.pack(">q", 78)
-    data[layout.values : layout.values + 8 * joints] = doubles(values)
+    data[begin : begin + 8 * joints] = doubles(values)
     assert bytes(data) == spoken.encode_command(RobotCommand(78, mode, values))
 
 
