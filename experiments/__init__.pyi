@@ -1,24 +1,30 @@
 from diagrams.scenario import Scenario as Scenario
-from experiments.api import (
-    margins as margins,
-)
-from experiments.api import (
-    run as run,
-)
-from experiments.exported_controller import (
-    ExportedController as ExportedController,
-)
-from experiments.exported_controller import (
-    export_controller as export_controller,
-)
-from experiments.hardware.calls import (
+from experiments.calls import (
     check_robot as check_robot,
 )
-from experiments.hardware.calls import (
+from experiments.calls import (
     drive as drive,
 )
-from experiments.hardware.calls import (
+from experiments.calls import (
     first_command as first_command,
+)
+from experiments.calls import (
+    margins as margins,
+)
+from experiments.calls import (
+    run as run,
+)
+from experiments.controller_replay import (
+    Commands as Commands,
+)
+from experiments.controller_replay import (
+    Replay as Replay,
+)
+from experiments.export import (
+    ExportedController as ExportedController,
+)
+from experiments.export import (
+    export_controller as export_controller,
 )
 from experiments.hardware.driven_run import FirstCommand as FirstCommand
 from experiments.hardware.statics import StaticCheck as StaticCheck
@@ -27,11 +33,5 @@ from experiments.kept_run import (
 )
 from experiments.kept_run import (
     load as load,
-)
-from experiments.replay import (
-    Commands as Commands,
-)
-from experiments.replay import (
-    Replay as Replay,
 )
 from experiments.studies.margins.told import Margins as Margins

@@ -16,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_options import grouped
 from experiments.hardware_commands import drive_command, lead_command, robot_command
 from experiments.run_commands import (
     compare_command,
@@ -65,7 +66,7 @@ def make_app(*, completion: bool = False) -> typer.Typer:
     )
     app.callback()(_root)
     for name, command in _COMMANDS.items():
-        app.command(name)(command)
+        app.command(name)(grouped(command))
     return app
 
 

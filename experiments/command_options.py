@@ -1,13 +1,18 @@
-"""Arguments and options that several commands take, and how their text is read."""
+"""Arguments and options that several commands take, by groups, and how their text is read."""
 
+import dataclasses
+import functools
 import glob
+import inspect
 import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.scenario_file import scenario_names
+from experiments.scenario_file import ScenarioFile, expand_home, read_scenario, scenario_names
 from pfsc_drake.errors import InputError, shortened, suggestion
 from pfsc_drake.yaml.schema_check import is_number
 
@@ -49,29 +54,106 @@ Overrides = Annotated[
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
 ]
 
-Duration = Annotated[
-    str | None,
-    typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
-]
-
-Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")]
-
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors and the last line.")]
 
-Recording = Annotated[bool, typer.Option("--recording/--no-recording", help="Record the motion.")]
-
-Lcm = Annotated[
+BusUrl = Annotated[
     str,
     typer.Option(
         "--lcm", metavar="URL", help="LCM bus. Default: LCM_DEFAULT_URL, or LCM's own default"
     ),
 ]
-Driver = Annotated[
-    str, typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone).")
-]
 
 _LONGEST = 1e6  # s, of anything
 _BUSES = ("udpm", "tcpq", "memq")
+
+
+@dataclass
+class ChosenScenario:
+    """A scenario with changes."""
+
+    scenario: ScenarioName
+    overrides: Overrides = None
+
+    def read(self, studies: Sequence[str] = ()) -> ScenarioFile:
+        """Return the scenario as read, see :func:`~experiments.scenario_file.read_scenario`."""
+        return read_scenario(self.scenario, self.overrides or [], studies)
+
+
+@dataclass
+class TimedScenario(ChosenScenario):
+    """A scenario with changes and a duration."""
+
+    duration: Annotated[
+        str | None,
+        typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
+    ] = None
+
+    @property
+    def seconds(self) -> float | None:
+        """The duration [s], None for the scenario's."""
+        return None if self.duration is None else read_duration(self.duration)
+
+
+@dataclass
+class Drawn:
+    """What is drawn of a run."""
+
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True
+    recording: Annotated[
+        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
+    ] = True
+
+
+@dataclass
+class Bus:
+    """An LCM bus, and the messages of a robot on it."""
+
+    lcm: BusUrl = ""
+    driver: Annotated[
+        str,
+        typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone)."),
+    ] = "panda"
+
+
+def grouped(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command with the fields of its groups as options of its own.
+
+    Args:
+        command: A function; each parameter that is a dataclass is a group.
+    """
+    groups: dict[str, type] = {}
+    options: list[inspect.Parameter] = []
+    for parameter in inspect.signature(command).parameters.values():
+        kind = parameter.annotation
+        if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+            groups[parameter.name] = kind
+            options += inspect.signature(kind).parameters.values()
+        else:
+            options.append(parameter)
+
+    @functools.wraps(command)
+    def called(**values: Any) -> None:
+        for name, group in groups.items():
+            own = [field.name for field in dataclasses.fields(group)]
+            values[name] = group(**{option: values.pop(option) for option in own})
+        command(**values)
+
+    # arguments first, as they are shown
+    options.sort(key=lambda option: option.default is not option.empty)
+    flat = [option.replace(kind=option.KEYWORD_ONLY) for option in options]
+    called.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
+    called.__annotations__ = {option.name: option.annotation for option in flat}
+    return called
+
+
+def folder_or(out: Path | None, name: str) -> Path:
+    """Return the folder of ``--out``.
+
+    Args:
+        out: As it was written, if it was.
+        name: Name of the folder in ``out`` otherwise.
+    """
+    return Path("out") / name if out is None else expand_home(out)
 
 
 def read_duration(text: str, longest: float = _LONGEST) -> float:

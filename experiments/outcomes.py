@@ -13,12 +13,29 @@ from reporting.interruption import INTERRUPTED
 from reporting.terminal import FAULT, NOT_WRITTEN, WRONG_INPUT, print_error, print_page
 
 if TYPE_CHECKING:
-    from experiments.export import Export
+    from experiments.controller_replay import Commands, Replay
     from experiments.finished_run import RunOutcome
-    from experiments.live.start import LiveOutcome
-    from experiments.replay import Commands, Replay
+    from experiments.live.session import LiveSession
     from experiments.sweep.sweep import SweepOutcome
+    from pfsc_drake.codegen.c_controller import CController
     from reporting.metrics import Metric
+
+
+def print_line(console: Console, text: str) -> None:
+    """Print text as it is, on one line however long."""
+    console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+def number_table(*titles: str) -> Table:
+    """Return a table of numbers, without rows.
+
+    Args:
+        titles: Of its columns.
+    """
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for title in titles:
+        table.add_column(title, justify="right")
+    return table
 
 
 def print_warning(console: Console, sentence: str) -> None:
@@ -39,7 +56,7 @@ def print_run(console: Console, outcome: "RunOutcome", said: Sequence[str] = ())
         if warning not in said:
             print_warning(console, warning)
     if outcome.margins is not None:
-        console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
+        print_line(console, f"\nmargins: {outcome.margins}")
     _print_report(console, outcome.report)
 
 
@@ -72,47 +89,42 @@ def _missed(broken: Sequence[str]) -> str:
     return f"missed: {'; '.join(broken)}"
 
 
-def print_live(console: Console, outcome: "LiveOutcome") -> None:
+def print_live(console: Console, session: "LiveSession") -> None:
     """What a live session has left."""
-    for kept in outcome.kept:
-        print_page(console, "Open the report", kept.outcome.report)
-        scenario = kept.folder / "scenario.yaml"
-        console.print(
-            f"  again, to the last bit: python -m experiments run {escape(str(scenario))}",
-            soft_wrap=True,
-            highlight=False,
-        )
+    for folder, outcome in session.kept.items():
+        print_page(console, "Open the report", outcome.report)
+        scenario = folder / "scenario.yaml"
+        print_line(console, f"  again, to the last bit: python -m experiments run {scenario}")
 
 
-def judge_live(outcome: "LiveOutcome") -> int:
+def judge_live(session: "LiveSession") -> int:
     """Says in one line what went wrong in a session, if anything did; returns the exit status."""
     status, ends = 0, []
-    if outcome.interrupted:
-        status, ends = INTERRUPTED, [f"interrupted at t = {outcome.time:.3f} s"]
-    if outcome.fault is not None:
-        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {outcome.time:.3f} s"]
-    for kept in outcome.kept:
-        if kept.outcome.broken:
+    if session.interrupted:
+        status, ends = INTERRUPTED, [f"interrupted at t = {session.end:.3f} s"]
+    if session.fault is not None:
+        status, ends = FAULT, [f"fault: {session.fault}; stopped at t = {session.end:.3f} s"]
+    for folder, outcome in session.kept.items():
+        if outcome.broken:
             status = status or FAULT
-            ends = [*ends, f"{kept.folder.name} {_missed(kept.outcome.broken)}"]
-    problems = [kept.outcome.problem for kept in outcome.kept if kept.outcome.problem is not None]
+            ends = [*ends, f"{folder.name} {_missed(outcome.broken)}"]
+    problems = [kept.problem for kept in session.kept.values() if kept.problem is not None]
     if problems:
         status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
-    elif ends and outcome.kept:
-        ends[-1] += f", everything logged so far is kept in {outcome.kept[-1].folder}"
+    elif ends and session.kept:
+        ends[-1] += f", everything logged so far is kept in {[*session.kept][-1]}"
     if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
+        print_error("; ".join(ends), after_echo=session.interrupted)
     return status
 
 
 def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
     """What came out of a sweep; quietly its last line."""
-    key_metrics = {name: outcome.metrics[name] for name in outcome.key_metrics}
-    console.print(_metrics_table(key_metrics))
+    console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
-        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+        print_warning(console, warning)
     for strikes, command in outcome.commands.items():
-        console.print(f"\n{escape(strikes)}\n  {escape(command)}", soft_wrap=True, highlight=False)
+        print_line(console, f"\n{strikes}\n  {command}")
     _print_report(console, outcome.report)
 
 
@@ -135,19 +147,18 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
     return status
 
 
-def print_export(console: Console, export: "Export", out: Path) -> None:
+def print_export(
+    console: Console, controller: "CController", files: Sequence[Path], out: Path
+) -> None:
     """What has been exported, in one line."""
-    said = export.controller.interface()
+    said = controller.interface()
     sizes = f"state {said['state_bytes']} bytes, tables {said['table_bytes']} bytes"
-    text = f"{out}: {len(export.files)} files, {sizes}"
-    console.print(text, highlight=False, markup=False, soft_wrap=True)
+    print_line(console, f"{out}: {len(files)} files, {sizes}")
 
 
 def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
     """Tells what a controller in C made of its record; returns the exit status."""
-    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in ("Ticks", "differing", "largest", "median [us]", "p99 [us]", "worst [us]"):
-        table.add_column(title, justify="right")
+    table = number_table("Ticks", "differing", "largest", "median [us]", "p99 [us]", "worst [us]")
     times = [f"{time:.2f}" for time in (replay.median, replay.p99, replay.worst)]
     table.add_row(str(replay.ticks), str(replay.differing), f"{replay.largest:.3g}", *times)
     console.print(table)
@@ -159,7 +170,7 @@ def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
 
 def judge_commands(console: Console, commands: "Commands") -> int:
     """Tells what drives would have been told; returns the exit status."""
-    from pfsc_drake.codegen.c_faults import fault_sentences
+    from pfsc_drake.codegen.c_controller import fault_sentences
 
     told = commands.told
     change = np.abs(np.diff(told, axis=0)).max(axis=0, initial=0.0)
@@ -172,15 +183,13 @@ def judge_commands(console: Console, commands: "Commands") -> int:
     if commands.difference is not None:
         columns["from the log"] = commands.difference
     console.print(f"{commands.port} [{commands.unit}], {len(told)} ticks", markup=False)
-    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in ("Drive", *columns):
-        table.add_column(title, justify="right")
+    table = number_table("Drive", *columns)
     for i in range(told.shape[1]):
         table.add_row(str(i + 1), *(f"{values[i]:.5g}" for values in columns.values()))
     console.print(table)
     if commands.assumed:
-        console.print(commands.assumed, highlight=False, markup=False, soft_wrap=True)
-    console.print(f"all outputs: {commands.file}", highlight=False, markup=False, soft_wrap=True)
+        print_line(console, commands.assumed)
+    print_line(console, f"all outputs: {commands.file}")
     if commands.fault:
         why = fault_sentences()[int(commands.fault)]
         print_error(f"fault: {why}, from t = {commands.fault_time:.3f} s on")

@@ -15,14 +15,12 @@ from rich.table import Table
 from experiments.command_options import (
     IDENTIFICATION,
     TEACH_IN,
-    Driver,
-    Duration,
-    Figures,
-    Lcm,
-    Overrides,
+    Bus,
+    ChosenScenario,
+    Drawn,
     Quiet,
-    Recording,
-    ScenarioName,
+    TimedScenario,
+    folder_or,
     open_bus,
     read_duration,
 )
@@ -30,6 +28,7 @@ from experiments.outcomes import (
     judge_live,
     judge_run,
     judge_sweep,
+    print_line,
     print_live,
     print_run,
     print_sweep,
@@ -70,7 +69,7 @@ def list_command(
 
 
 def run_command(
-    scenario: ScenarioName,
+    *,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -78,10 +77,8 @@ def run_command(
             "replaced; a user's own files never are. Default: out/SCENARIO"
         ),
     ] = None,
-    overrides: Overrides = None,
-    duration: Duration = None,
-    figures: Figures = True,
-    recording: Recording = True,
+    chosen: TimedScenario,
+    drawn: Drawn,
     after_fault: Annotated[
         str,
         typer.Option(
@@ -94,16 +91,14 @@ def run_command(
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
-    from experiments.scenario_file import read_scenario
     from experiments.simulated_run import run_scenario
 
-    if scenario in (IDENTIFICATION, TEACH_IN):
-        study_command(scenario, out or Path("out") / scenario, quiet)
-    seconds = None if duration is None else read_duration(duration)
-    further = _read_after_fault(after_fault)
+    if chosen.scenario in (IDENTIFICATION, TEACH_IN):
+        study_command(chosen.scenario, out or Path("out") / chosen.scenario, quiet)
+    seconds, further = chosen.seconds, _read_after_fault(after_fault)
     with interruptible():
-        loaded = read_scenario(scenario, overrides or [], (IDENTIFICATION, TEACH_IN))
-        folder = expand_home(out) if out is not None else Path("out") / loaded.name
+        loaded = chosen.read((IDENTIFICATION, TEACH_IN))
+        folder = folder_or(out, loaded.name)
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console(quiet=quiet)
         said: list[str] = []
@@ -117,8 +112,8 @@ def run_command(
                 loaded,
                 out=folder,
                 duration=seconds,
-                figures=figures,
-                recording=recording,
+                figures=drawn.figures,
+                recording=drawn.recording,
                 progress=progress,
                 after_fault=further,
                 margins=margins,
@@ -129,7 +124,7 @@ def run_command(
 
 
 def live_command(
-    scenario: ScenarioName,
+    *,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -137,7 +132,7 @@ def live_command(
             "Default: out/SCENARIO_live"
         ),
     ] = None,
-    overrides: Overrides = None,
+    chosen: ChosenScenario,
     port: Annotated[
         int, typer.Option(help="Of the page, on this machine alone; 0 for any that is free.")
     ] = 0,
@@ -145,50 +140,45 @@ def live_command(
         bool,
         typer.Option("--watch", help="Watch a robot that `drive` drives: pause, speed, stop."),
     ] = False,
-    lcm: Lcm = "",
-    driver: Driver = "panda",
+    bus: Bus,
     duration: Annotated[
         str | None,
         typer.Option(
             metavar="SECONDS", help="Simulated time in s after which it ends. Default: 600"
         ),
     ] = None,
-    figures: Figures = True,
-    recording: Recording = True,
+    drawn: Drawn,
 ) -> None:
     """Guide the robot of a scenario yourself, in real time, on a page in your browser."""
     from experiments.live.start import run_live
-    from experiments.scenario_file import read_scenario
 
     seconds = None if duration is None else read_duration(duration)
     with interruptible():
-        loaded = read_scenario(scenario, overrides or [])
-        folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_live"
+        loaded = chosen.read()
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
 
         def tell(line: str) -> None:
-            text = f"{loaded.name}: {line}"
-            console.print(text, highlight=False, markup=False, soft_wrap=True)
+            print_line(console, f"{loaded.name}: {line}")
 
         if watch:
             from experiments.live.watch import run_watch
             from pfsc_drake.drivers.link import WatchingEnd
             from pfsc_drake.drivers.messages import dialect
 
-            run_watch(loaded, WatchingEnd(open_bus(lcm), dialect(driver)), port=port, tell=tell)
+            run_watch(loaded, WatchingEnd(open_bus(bus.lcm), dialect(bus.driver)), port, tell)
             return
-        outcome = run_live(
+        session = run_live(
             loaded,
-            out=folder,
-            port=port,
-            duration=seconds,
-            figures=figures,
-            recording=recording,
-            tell=tell,
+            port,
+            seconds,
+            tell,
+            out=folder_or(out, f"{loaded.name}_live"),
+            figures=drawn.figures,
+            recording=drawn.recording,
         )
-        print_live(console, outcome)
-        raise typer.Exit(judge_live(outcome))
+        print_live(console, session)
+        raise typer.Exit(judge_live(session))
 
 
 def compare_command(
@@ -203,8 +193,10 @@ def compare_command(
         raise typer.Exit(show_page("comparison", report))
 
 
-def sweep_command(
-    scenario: ScenarioName,
+@dataclasses.dataclass
+class Variations:
+    """What varies in a sweep."""
+
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -213,9 +205,15 @@ def sweep_command(
             "low:high, loguniform(low,high), normal(mean,sd), choice(a,b), each with *n for a "
             "list of n. Repeatable.",
         ),
-    ] = None,
-    samples: Annotated[int | None, typer.Option(help="Number of random draws.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random draws.")] = 0,
+    ] = None
+    samples: Annotated[int | None, typer.Option(help="Number of random draws.")] = None
+    seed: Annotated[int, typer.Option(min=0, help="Of the random draws.")] = 0
+
+
+@dataclasses.dataclass
+class Processes:
+    """Where the runs of a sweep are made."""
+
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -223,10 +221,16 @@ def sweep_command(
             help="Dask scheduler, e.g. tcp://10.0.0.1:8786, whose workers run in a clone of this "
             "revision. Default: all cores of this machine",
         ),
-    ] = None,
+    ] = None
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes on this machine. Default: one per core")
-    ] = None,
+    ] = None
+
+
+def sweep_command(
+    *,
+    varied: Variations,
+    processes: Processes,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -234,8 +238,7 @@ def sweep_command(
             "Default: out/SCENARIO_sweep"
         ),
     ] = None,
-    overrides: Overrides = None,
-    duration: Duration = None,
+    chosen: TimedScenario,
     metric: Annotated[
         str | None, typer.Option(help="What to draw. Default: max_path_deviation")
     ] = None,
@@ -244,21 +247,25 @@ def sweep_command(
     """Run a scenario many times, on all cores: grids, ranges, distributions over its keys."""
     from experiments.sweep.sweep import define_sweep, run_sweep
 
-    seconds = None if duration is None else read_duration(duration)
+    seconds = chosen.seconds
     with interruptible():
         sweep = define_sweep(
-            scenario,
-            vary or [],
-            overrides=overrides or [],
+            chosen.scenario,
+            varied.vary or [],
+            overrides=chosen.overrides or [],
             duration=seconds,
-            samples=samples,
-            seed=seed,
+            samples=varied.samples,
+            seed=varied.seed,
         )
-        name = sweep.scenario.name
-        folder = expand_home(out) if out is not None else Path("out") / f"{name}_sweep"
+        folder = folder_or(out, f"{sweep.scenario.name}_sweep")
         console = Console(quiet=quiet)
         outcome = run_sweep(
-            sweep, folder, console, scheduler=scheduler, workers=workers, metric=metric
+            sweep,
+            folder,
+            console,
+            scheduler=processes.scheduler,
+            workers=processes.workers,
+            metric=metric,
         )
         print_sweep(console, outcome)
         raise typer.Exit(judge_sweep(outcome, folder))

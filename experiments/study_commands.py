@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -104,29 +105,44 @@ def study_command(
         raise typer.Exit(show_page("study", report))
 
 
+@dataclass
+class TaughtPath:
+    """How a path is made of a motion, and followed."""
+
+    spacing: Annotated[float, typer.Option(help="Of the waypoints [m].")] = 0.01
+    angle: Annotated[
+        float, typer.Option(help="Turn after which a waypoint is taken before that [deg].")
+    ] = 3.0
+    tolerance: Annotated[
+        float, typer.Option(help="How far the path may be from a waypoint [m].")
+    ] = 2e-3
+    tolerance_deg: Annotated[float, typer.Option(help="The same of the orientation [deg].")] = 1.0
+    closed: Annotated[bool, typer.Option("--closed", help="Go round and round.")] = False
+    velocity: Annotated[float, typer.Option(help="Along the path [m/s].")] = 0.1
+
+
 def teach_command(
     run: Annotated[Path, typer.Argument(help="Folder of a run in which a hand led the tool.")],
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/taught"),
-    spacing: Annotated[float, typer.Option(help="Of the waypoints [m].")] = 0.01,
-    angle: Annotated[
-        float, typer.Option(help="Turn after which a waypoint is taken before that [deg].")
-    ] = 3.0,
-    tolerance: Annotated[
-        float, typer.Option(help="How far the path may be from a waypoint [m].")
-    ] = 2e-3,
-    tolerance_deg: Annotated[float, typer.Option(help="The same of the orientation [deg].")] = 1.0,
-    closed: Annotated[bool, typer.Option("--closed", help="Go round and round.")] = False,
-    velocity: Annotated[float, typer.Option(help="Along the path [m/s].")] = 0.1,
+    *,
+    path: TaughtPath,
     follow: Annotated[
         bool, typer.Option("--follow/--no-follow", help="Run along the path.")
     ] = True,
 ) -> None:
     """Turn a run in which a hand led the tool into a path, and follow it."""
-    from experiments.teaching.taught import TeachingOptions
+    from experiments.teaching.taught_path import TeachingOptions
     from experiments.teaching.teach import teach
 
     with interruptible():
-        options = TeachingOptions(spacing, angle, closed, tolerance, tolerance_deg, velocity)
+        options = TeachingOptions(
+            path.spacing,
+            path.angle,
+            path.closed,
+            path.tolerance,
+            path.tolerance_deg,
+            path.velocity,
+        )
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
         outcome = teach(
@@ -191,8 +207,8 @@ def export_command(
     ] = "1",
 ) -> None:
     """Write a scenario's controller as C99."""
+    from experiments.controller_replay import check_export, missing_tool
     from experiments.export import export_scenario
-    from experiments.replay import check_export, missing_tool
     from experiments.scenario_file import read_scenario
 
     seconds = read_duration(duration, _LONGEST_RECORD)
@@ -202,9 +218,9 @@ def export_command(
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console, lacking = Console(), missing_tool()
         with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
-            export = export_scenario(loaded, folder, seconds, progress)
+            controller, files = export_scenario(loaded, folder, seconds, progress)
             replay = check_export(folder, progress) if check and lacking is None else None
-        print_export(console, export, folder)
+        print_export(console, controller, files, folder)
         if check and replay is None:
             console.print(f"not compiled: there is no {lacking} here", highlight=False)
         raise typer.Exit(0 if replay is None else judge_replay(console, replay, folder))
@@ -221,7 +237,7 @@ def replay_command(
     ],
 ) -> None:
     """Tell what an exported controller would have commanded, before power is on; needs gcc."""
-    from experiments.replay import replay_log
+    from experiments.controller_replay import replay_log
 
     with interruptible():
         console, place = Console(), expand_home(folder)

@@ -1,4 +1,4 @@
-from pfsc_drake.codegen.export import export as export
+from pfsc_drake.codegen.c_project import export as export
 from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance as CoordinateImpedance,
 )

@@ -23,7 +23,7 @@ def main(root: Path = _ROOT) -> int:
     Returns:
         Exit status, see ``experiments.cli``; 2 without a clone.
     """
-    if not (root / "experiments" / "program.py").is_file():
+    if not (root / "experiments" / "__main__.py").is_file():
         return _fail(
             "the commands run from a clone of the project; here is the library alone, for which "
             "import pfsc_drake"
@@ -31,7 +31,7 @@ def main(root: Path = _ROOT) -> int:
     if str(root) not in sys.path:
         sys.path.insert(0, str(root))
     try:
-        program = importlib.import_module("experiments.program")
+        program = importlib.import_module("experiments.__main__")
     except ModuleNotFoundError as error:
         return _fail(f"the package {error.name} is missing; install with make setup")
     status: int = program.start(_NAME)

@@ -1,4 +1,4 @@
-"""What is checked of a robot before anything moves."""
+"""Limits of a drive, and the checks of a robot before anything moves."""
 
 import time
 from dataclasses import replace
@@ -11,6 +11,16 @@ from pfsc_drake.errors import InputError
 
 AT_REST = 0.01  # rad/s or m/s
 AT_START = 0.02  # rad or m
+# how long no status may come [s], and how many may be missing in a row and are made up for
+SILENCE, BRIDGED = 0.1, 10
+# after which a robot that is to stop is left alone, and how long it rests before [s]
+LONGEST_STOP, RESTED_FOR = 2.0, 0.2
+# a stop that makes the robot faster than this is none: a multiple of its speed, and more [rad/s]
+STOP_FACTOR, STOP_SPEED = 1.5, 0.2
+# beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
+TWICE, FASTEST, LEAST_JUMP = 2.0, 10.0, 2e-3
+# ticks that are missing for longer are none of a robot's: its clock was set [s]
+LARGEST_GAP = 1.0
 FOREIGN = "another sender commands the robot"
 _LISTENED, _FOREIGN = 0.5, 0.1  # s
 

@@ -1,6 +1,7 @@
 """A controller that drives a robot by messages: one tick for each status that comes."""
 
 import time
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -8,23 +9,18 @@ from pydrake.systems.framework import Context
 
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
-from experiments.hardware.bridge import state_between
-from experiments.hardware.check import AT_REST, check_first
-from experiments.hardware.drive_options import (
-    FASTER,
-    FASTEST,
+from experiments.hardware.check import (
+    AT_REST,
+    BRIDGED,
     LARGEST_GAP,
-    LEAST_JUMP,
-    LEAST_SPEED,
     LONGEST_STOP,
-    PACE,
-    RESTED,
-    TWICE,
-    DriveOptions,
-    command_mode,
+    RESTED_FOR,
+    STOP_FACTOR,
+    STOP_SPEED,
+    check_first,
 )
-from experiments.hardware.drive_record import DrivenTick, DriveRecord
-from experiments.hardware.told_obstacles import ToldObstacles
+from experiments.hardware.drive_inputs import DriveInputs
+from experiments.results.run_log import RunLog
 from experiments.simulation import SimulationResult
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
@@ -33,9 +29,34 @@ from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.physics.driver import torque_rates
 from pfsc_drake.robot.robot_model import gravity_function
 
+# where the reference remembers its own time and its pace
+PACE = "controller.reference_generator.pace"
+# largest rate of commanded torques, as drivers have it [Nm/s], and share of a joint's effort limit
+_TORQUE_RATE, _EFFORT_SHARE = 1000.0, 0.95
 _US = 1e6
 _FAULT = "a fault"
 _SECOND = 1000  # ticks
+
+
+@dataclass
+class DrivenTick:
+    """What is noted of one tick.
+
+    Attributes:
+        age: Time from its status to its answer [s]; NaN where there was no status.
+        missed: 1 where there was none.
+        clipped: How many joints were told less than the law wanted.
+        robot_mode: What the robot does.
+        sent: What it was told, shape (N,).
+        override: Share of the planned pace that was asked for.
+    """
+
+    age: float
+    missed: int
+    clipped: int
+    robot_mode: int
+    sent: np.ndarray
+    override: float
 
 
 class Drive:
@@ -44,7 +65,6 @@ class Drive:
     Args:
         station: A station whose robot stands elsewhere.
         end: The link.
-        options: What it allows itself.
         override: Share of its planned pace at which the reference moves at first.
 
     Attributes:
@@ -52,8 +72,8 @@ class Drive:
         mode: What the robot is commanded by.
         limit: Largest torques that are sent [Nm or N], shape (N,).
         rate: How fast they may change [Nm/s or N/s], shape (N,).
-        fastest: Speeds that no joint can have [rad/s or m/s], shape (N,).
-        record: What happened.
+        inputs: What the station receives.
+        ticks: What is noted of each tick.
         fault: Why it ended, or None.
         override: Share of its planned pace at which the reference is to move.
         fastest_pace: Largest share of the planned pace.
@@ -61,35 +81,23 @@ class Drive:
         has_motion: Whether the reference moves by itself, not because a hand leads the tool.
     """
 
-    def __init__(
-        self,
-        station: Station,
-        end: ControllerEnd,
-        options: DriveOptions,
-        override: float = 1.0,
-    ) -> None:
+    def __init__(self, station: Station, end: ControllerEnd, override: float = 1.0) -> None:
         assert isinstance(station.part, RemoteArm)
-        self._station, self._part, self._end, self._options = station, station.part, end, options
+        self._station, self._part, self._end = station, station.part, end
+        self.inputs, self.ticks = DriveInputs(station), list[DrivenTick]()
         robot = station.part.belief.robot
         self._n, self.period = robot.dimension, station.controller.period
         self._weight = gravity_function(robot)
         effort = robot.gather("effort_limit")
-        self.limit = options.effort_share * effort
-        speed = robot.gather("velocity_limit")
-        self.fastest = TWICE * np.where(np.isfinite(speed), speed, FASTEST)
-        self._lost = np.zeros(self._n, dtype=bool)
-        self.rate = torque_rates(options.torque_rate, effort)
-        self._q = station.start_posture
-        self.mode = command_mode(station)
-        self._simulator, self._obstacles = Simulator(station.diagram), ToldObstacles(station)
+        self.limit = _EFFORT_SHARE * effort
+        self.rate = torque_rates(_TORQUE_RATE, effort)
+        self._q, self.mode = station.start_posture, command_mode(station)
+        self._simulator = Simulator(station.diagram)
         self._first: RobotStatus | None = None
-        self._last_state, self._last_torque = np.zeros(4 * self._n), np.zeros(self._n)
         self._sent: np.ndarray | None = None
-        self._tick = 0
+        self._tick = self._resting = 0
         self._stopping: str | None = None
         self._stop_time, self._stop_speed = 0.0, np.inf
-        self._resting = 0
-        self.record = DriveRecord()
         self.fault: str | None = None
         self.fastest_pace, plan = LARGEST_OVERRIDE, station.task.drive_plan
         if plan is not None:
@@ -141,9 +149,12 @@ class Drive:
         if missed * self.period > LARGEST_GAP:
             self.lose(f"the robot's clock jumped by {missed * self.period:.3g} s")
             return
-        state = self._believed(self._state(status), missed + 1)
+        ticks = missed + 1 if self._tick > 0 else np.inf
+        state, jumped = self.inputs.without_jumps(self._state(status), self.period, ticks)
+        if jumped is not None:
+            self.stop(jumped)
         self._bridge(state, missed, status)
-        if missed > self._options.bridged:
+        if missed > BRIDGED:
             self.stop(f"no status of the robot for {1e3 * missed * self.period:.0f} ms")
         self._tell(state, status.torque)
         q = state[: self._n]
@@ -167,7 +178,7 @@ class Drive:
         self._advance(
             DrivenTick(age, missed, clipped, int(status.robot_mode), values, self.override)
         )
-        self._last_state, self._last_torque = state, status.torque
+        self.inputs.keep(state, status.torque)
         self._look(status, state)
 
     def heed(self, request: Request) -> None:
@@ -179,13 +190,13 @@ class Drive:
         if request.override is not None:
             self.override = min(request.override, self.fastest_pace)
             self._part.set_override(self.root, self.override)
-        self._obstacles.hear(request, self.time)
+        self.inputs.hear_obstacles(request, self.time)
         if request.stop:
             self.stop("asked to stop")
 
     def progress(self) -> dict[str, float]:
         """Return how far it is and how well it goes, numbers by name for who watches."""
-        last = self.record.ticks[-1]
+        last = self.ticks[-1]
         layout, law = self._station.law.layout, self._station.law.linearization
         names = [coordinate.name for coordinate in law.manifold.coordinates]
         row = self._station.log.now(self._station.blocks, self.root)["law"]
@@ -196,7 +207,7 @@ class Drive:
             "override": self.override,
             "stopping": float(self._stopping is not None),
             "ended": float(self.has_ended),
-            "missed": float(sum(tick.missed for tick in self.record.ticks[-_SECOND:])),
+            "missed": float(sum(tick.missed for tick in self.ticks[-_SECOND:])),
             "clipped": float(last.clipped),
             "status_age": last.age,
             **dict(zip(names, values, strict=True)),
@@ -215,7 +226,9 @@ class Drive:
     def _begin_stop(self, why: str) -> None:
         n = self._n
         self._stopping, self._stop_time = why, self.time
-        self._stop_speed = FASTER * np.nanmax(np.abs(self._last_state[n : 2 * n])) + LEAST_SPEED
+        self._stop_speed = (
+            STOP_FACTOR * np.nanmax(np.abs(self.inputs.state[n : 2 * n])) + STOP_SPEED
+        )
 
     @property
     def has_ended(self) -> bool:
@@ -225,7 +238,7 @@ class Drive:
         if self._stopping is None:
             return False
         long = self.time - self._stop_time > LONGEST_STOP
-        return long or self._resting * self.period > RESTED
+        return long or self._resting * self.period > RESTED_FOR
 
     def lose(self, why: str) -> None:
         """End at once: there is no robot that would hear.
@@ -251,35 +264,26 @@ class Drive:
             said = self.fault
         return SimulationResult(self.root, self.time / max(wall, 1e-9), said, since)
 
+    def add_to(self, log: RunLog) -> None:
+        """Add what was noted of the ticks to the log of a run.
+
+        Args:
+            log: The log.
+        """
+        noted = self.ticks[: len(log.time)]
+        noted += [noted[-1]] * (len(log.time) - len(noted))
+        modes = [mode.name.lower() for mode in RobotMode]
+        log.add("status_age", [1e6 * tick.age for tick in noted])
+        for name in ("missed", "clipped", "sent", "override"):
+            log.add(name, [getattr(tick, name) for tick in noted])
+        log.add("robot_mode", [tick.robot_mode for tick in noted], labels=modes)
+
     def _state(self, status: RobotStatus) -> np.ndarray:
         """Return ``[q_J, v_J, q_M, v_M]`` of a status, shape (4N,)."""
         return np.concatenate([status.q, status.v, status.q, status.v])
 
-    def _believed(self, state: np.ndarray, ticks: int) -> np.ndarray:
-        """Return a state without positions that have jumped farther than joints can move.
-
-        Where one encoder stands for both sides of a joint, nothing else tells whether its position
-        or its velocity is wrong.
-        """
-        n = self._n
-        with np.errstate(invalid="ignore"):
-            step = np.abs(state[:n] - self._last_state[:n])
-            jumped = (step > self.fastest * self.period * ticks + LEAST_JUMP) & ~self._lost
-        if self._tick > 0 and jumped.any():
-            joint = int(np.flatnonzero(jumped)[0])
-            self._lost |= jumped
-            self.stop(
-                f"joint {joint + 1} jumped by {np.rad2deg(step[joint]):.3g} deg from one status to "
-                "the next, faster than it can move"
-            )
-        return np.where(np.tile(np.repeat([1, 0], n), 2) * np.tile(self._lost, 4), np.nan, state)
-
     def _tell(self, state: np.ndarray, torque: np.ndarray) -> None:
-        self._part.tell(self.root, state, torque)
-        self._obstacles.tell(self.root, self.time)
-        if self._part.wrench is not None and self._end.wrench is not None:
-            context = self._part.wrench.GetMyMutableContextFromRoot(self.root)
-            self._part.wrench.get_mutable_source_value(context).SetFromVector(self._end.wrench)
+        self.inputs.tell(self.root, self.time, state, torque, self._end.wrench)
 
     def _wanted(self) -> np.ndarray:
         """Return what the robot is to be told: torques without the weight, or velocities."""
@@ -305,16 +309,13 @@ class Drive:
         a fault, and a stop would begin where the robot was then.
         """
         for k in range(1, missed + 1):
-            share = k / (missed + 1)
-            self._tell(
-                state_between(self._last_state, state, share, (missed + 1) * self.period),
-                (1.0 - share) * self._last_torque + share * status.torque,
-            )
+            share, span = k / (missed + 1), (missed + 1) * self.period
+            self._tell(*self.inputs.between(state, status.torque, share, span))
             held = np.zeros(self._n) if self._sent is None else self._sent
             self._advance(DrivenTick(np.nan, 1, 0, int(status.robot_mode), held, self.override))
 
     def _advance(self, tick: DrivenTick) -> None:
-        self.record.ticks.append(tick)
+        self.ticks.append(tick)
         # beyond the tick, so that it is logged with what was measured at it
         self._simulator.AdvanceTo((self._tick + 0.5) * self.period)
         self._tick += 1
@@ -340,3 +341,13 @@ class Drive:
             self._end.send(RobotCommand(status.utime, self.mode, np.zeros(self._n)))
         # a joint whose speed is no number does not tell that it rests
         self._resting = self._resting + 1 if speed <= AT_REST else 0
+
+
+def command_mode(station: Station) -> ControlMode:
+    """Return what a station's law commands a robot by.
+
+    Args:
+        station: The station.
+    """
+    torques = station.law.linearization.relative_degree > 1
+    return ControlMode.TORQUE if torques else ControlMode.VELOCITY

@@ -12,28 +12,17 @@ import pfsc_drake.codegen
 from diagrams.builder import build_station
 from diagrams.controller_part import controller_part
 from diagrams.robots.remote_arm import RemoteArm
-from experiments.hardware.check import AT_REST, AT_START
-from experiments.hardware.drive import Drive
-from experiments.hardware.drive_options import (
-    FASTER,
-    LARGEST_GAP,
-    LEAST_JUMP,
-    LEAST_SPEED,
-    LONGEST_STOP,
-    PACE,
-    RESTED,
-    DriveOptions,
-)
+from experiments.controller_replay import compile_files, missing_tool
+from experiments.hardware import check
+from experiments.hardware.drive import PACE, Drive
 from experiments.hardware.native_record import RecordFormat
 from experiments.preparation import PreparedRun, naming
-from experiments.replay import make, missing_tool
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.codegen.c_controller import CController
 from pfsc_drake.compiled.c_source import c_source
-from pfsc_drake.drivers.layout import CommandLayout, StatusLayout, wrench_layout
+from pfsc_drake.drivers.layout import StatusLayout, UdpmAddress, command_layout, wrench_layout
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import FORCE_TORQUE_CHANNEL, ControlMode, Dialect, RobotMode
-from pfsc_drake.drivers.udpm import UdpmAddress
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import gravity_function
 from reporting.progress import ProgressListener
@@ -43,6 +32,11 @@ _LOOP = Path(pfsc_drake.codegen.__file__).parent / "harness" / "lcm"
 _SETUP = "drive_setup.h"
 PRIORITY = 50  # of who drives, where real-time priority is allowed
 _HEAD = 8  # bytes of a packet before its channel
+# of :mod:`experiments.hardware.check`, which the loop has to know
+_LIMITS = (
+    *("AT_REST", "AT_START", "SILENCE", "BRIDGED", "LARGEST_GAP", "LEAST_JUMP"),
+    *("LONGEST_STOP", "RESTED_FOR", "STOP_FACTOR", "STOP_SPEED"),
+)
 # where drive_told has the controller's inputs
 _TOLD = {
     "joint_state": "joint_state",
@@ -59,12 +53,10 @@ class NativeProject:
 
     Attributes:
         folder: With its files.
-        dialect: The robot's messages.
         record: How its record is written.
     """
 
     folder: Path
-    dialect: Dialect
     record: RecordFormat
 
     @property
@@ -82,11 +74,7 @@ class NativeProject:
         Raises:
             InputError: If there is no compiler, or it says anything.
         """
-        options = [f"OPTIMIZATION={optimization}"] if optimization else []
-        for source in sorted(self.folder.glob("*.c")):
-            progress(0.0, f"compiling {source.name}, {source.stat().st_size / 1e6:.1f} MB")
-            make(self.folder, source.with_suffix(".o").name, options)
-        make(self.folder, PROGRAM, options)
+        compile_files(sorted(self.folder.glob("*.c")), PROGRAM, progress, optimization)
 
 
 def check_native(end: ControllerEnd, folder: Path) -> UdpmAddress:
@@ -119,7 +107,6 @@ def write_native(
     scenario: ScenarioFile,
     prepared: PreparedRun,
     drive: Drive,
-    options: DriveOptions,
     dialect: Dialect,
     folder: Path,
 ) -> NativeProject:
@@ -129,7 +116,6 @@ def write_native(
         scenario: The scenario as read.
         prepared: What was made of it.
         drive: What the loop is to do.
-        options: What it allows itself.
         dialect: The robot's messages.
         folder: Where the files go; what has not changed is left alone.
 
@@ -163,17 +149,17 @@ def write_native(
     files |= c_source({"weight": gravity_function(robot)}, "robot")
     status = StatusLayout.of(dialect, robot.dimension)
     record = RecordFormat(robot.dimension, status.size)
-    command = CommandLayout.of(dialect, drive.mode, robot.dimension)
+    command = command_layout(dialect, drive.mode, robot.dimension)
     # where the controller's memory has the pace of the reference
     pace = controller.program.states[PACE].start + 1 if drive.has_motion else 0
-    files[_SETUP] = _header(drive, options, dialect, status, command, record, pace)
-    files["drive_setup.c"] = _source(drive, station.start_posture, status, command, inputs)
+    files[_SETUP] = _header(drive, dialect, status, command, record, pace)
+    files["drive_setup.c"] = _source(drive, station.start_posture, status, command[0], inputs)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         _replace(folder / name, text)
     for file in _LOOP.iterdir():
         _replace(folder / file.name, file.read_text(encoding="utf-8"))
-    return NativeProject(folder, dialect, record)
+    return NativeProject(folder, record)
 
 
 def _replace(file: Path, text: str) -> None:
@@ -183,10 +169,9 @@ def _replace(file: Path, text: str) -> None:
 
 def _header(
     drive: Drive,
-    options: DriveOptions,
     dialect: Dialect,
     status: StatusLayout,
-    command: CommandLayout,
+    command: tuple[bytes, int],
     record: RecordFormat,
     pace: int,
 ) -> str:
@@ -199,16 +184,7 @@ def _header(
         "DRIVE_MODE": int(drive.mode),
         "DRIVE_MOVES": int(RobotMode.MOVE),
         "DRIVE_PRIORITY": PRIORITY,
-        "DRIVE_AT_REST": AT_REST,
-        "DRIVE_AT_START": AT_START,
-        "DRIVE_SILENCE": options.silence,
-        "DRIVE_BRIDGED": options.bridged,
-        "DRIVE_LARGEST_GAP": LARGEST_GAP,
-        "DRIVE_LEAST_JUMP": LEAST_JUMP,
-        "DRIVE_LONGEST_STOP": LONGEST_STOP,
-        "DRIVE_RESTED_FOR": RESTED,
-        "DRIVE_STOP_FACTOR": FASTER,
-        "DRIVE_STOP_SPEED": LEAST_SPEED,
+        **{f"DRIVE_{name}": getattr(check, name) for name in _LIMITS},
         "DRIVE_HAS_MOTION": int(drive.has_motion),
         "DRIVE_PACE": pace,
         "STATUS_CHANNEL": f'"{dialect.status_channel}"',
@@ -221,9 +197,9 @@ def _header(
         "WRENCH_CHANNEL": f'"{FORCE_TORQUE_CHANNEL}"',
         "WRENCH_SIZE": wrench_size,
         "COMMAND_CHANNEL": f'"{channel}"',
-        "COMMAND_SIZE": len(command.message),
-        "COMMAND_VALUES": command.values,
-        "COMMAND_PACKET_SIZE": _HEAD + len(channel) + 1 + len(command.message),
+        "COMMAND_SIZE": len(command[0]),
+        "COMMAND_VALUES": command[1],
+        "COMMAND_PACKET_SIZE": _HEAD + len(channel) + 1 + len(command[0]),
     }
     if status.robot_mode is not None:
         constants["STATUS_ROBOT_MODE"] = status.robot_mode
@@ -251,29 +227,23 @@ def _source(
     drive: Drive,
     start: np.ndarray,
     status: StatusLayout,
-    command: CommandLayout,
+    command: bytes,
     inputs: Sequence[str],
 ) -> str:
     """Return what the loop must know of numbers, and what leads to the controller's inputs."""
     _, wrench = wrench_layout()
-    messages: Mapping[str, bytes] = {
-        "status_fingerprint": status.fingerprint,
-        "wrench_fingerprint": wrench,
-        "command_message": command.message,
-    }
-    numbers: Mapping[str, np.ndarray] = {
-        "drive_start": start,
-        "drive_limit": drive.limit,
-        "drive_rate": drive.rate,
-        "drive_fastest": drive.fastest,
+    arrays: Mapping[str, bytes | np.ndarray] = {
+        "unsigned char status_fingerprint": status.fingerprint,
+        "unsigned char wrench_fingerprint": wrench,
+        "unsigned char command_message": command,
+        "double drive_start": start,
+        "double drive_limit": drive.limit,
+        "double drive_rate": drive.rate,
+        "double drive_fastest": drive.inputs.fastest,
     }
     texts = [
-        f"const unsigned char {name}[] = {{{', '.join(map(str, data))}}};"
-        for name, data in messages.items()
-    ]
-    texts += [
-        f"const double {name}[] = {{{', '.join(map(_literal, values))}}};"
-        for name, values in numbers.items()
+        f"const {name}[] = {{{', '.join(map(_literal, values))}}};"
+        for name, values in arrays.items()
     ]
     moved = "\n".join(
         f"    memcpy(inputs->{name}, {_member(_TOLD[name])}, sizeof inputs->{name});"
@@ -299,4 +269,6 @@ def _member(name: str) -> str:
 
 
 def _literal(value: float) -> str:
+    if isinstance(value, int):
+        return str(value)
     return repr(float(value)) if math.isfinite(value) else "INFINITY"

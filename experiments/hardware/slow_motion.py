@@ -2,17 +2,26 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from experiments.hardware.check import FOREIGN
+from diagrams.robots.remote_arm import RemoteArm
+from experiments.finished_run import steady_clock
+from experiments.hardware.check import FOREIGN, check_alone, check_ready, listen
+from experiments.hardware.drive import command_mode
+from experiments.hardware.driven_run import prepare_driven, real_time_priority
+from experiments.hardware.statics import StaticCheck, check_statics
+from experiments.scenario_file import ScenarioFile
 from pfsc_drake.checks import require_between
+from pfsc_drake.drivers.driver_rules import check_mode
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
 from pfsc_drake.physics.velocity_servo import joint_inertia
 from pfsc_drake.robot.robot_model import mass_function
 from pfsc_drake.robot.serial.chain import SerialChain
+from reporting.interruption import noticed_interruption
+from reporting.progress import ProgressListener
 
 _LEAST, _LARGEST = 0.5, 20.0  # deg
 _OF_A_JOINT, _SETTLING = 5.0, 1.0  # s
@@ -28,23 +37,6 @@ _BINS = 8
 _SLOWEST, _FASTEST = 0.5, 1.5
 
 
-@dataclass(frozen=True)
-class SlowMotion:
-    """What a robot told in slow motion.
-
-    Attributes:
-        q: Postures, one after the other, shape (M, N) [rad or m].
-        torque: Torques that it measured there, less those of its small acceleration, the mean of
-            both directions, so that friction takes no part, shape (M, N) [Nm or N]; NaN of joints
-            that rest, since friction bears what it likes of their load.
-        complaint: What was wrong, in words, or None; the robot was let go then.
-    """
-
-    q: np.ndarray
-    torque: np.ndarray
-    complaint: str | None
-
-
 class JointTour:
     """Moves one joint after the other out and back, along a cosine.
 
@@ -56,25 +48,34 @@ class JointTour:
     Args:
         robot: The robot as it is believed, N joints.
         start: Where it rests, shape (N,) [rad or m].
-        amplitude: How far each joint goes [rad], towards the middle of its range.
+        degrees: How far each joint goes [deg], towards the middle of its range.
         mode: What it is commanded by: torques or velocities.
         period: Sampling time [s].
+
+    Raises:
+        InputError: If the angle is out of range.
+
+    Attributes:
+        mode: See above.
+        dimension: N.
+        duration: Of the motion [s].
     """
 
     def __init__(
         self,
         robot: SerialChain,
         start: np.ndarray,
-        amplitude: float,
+        degrees: float,
         mode: ControlMode,
         period: float,
     ) -> None:
+        require_between("--move", degrees, _LEAST, _LARGEST, "deg")
         n = robot.dimension
-        self._start, self._mode, self._period, self._n = start, mode, period, n
+        self._start, self.mode, self._period, self.dimension = start, mode, period, n
         lower, upper = robot.gather("position_limits").T
         with np.errstate(invalid="ignore"):
             middle = np.where(np.isfinite(lower + upper), (lower + upper) / 2.0, start)
-        self._way = amplitude * np.where(middle >= start, 1.0, -1.0)
+        self._way = np.deg2rad(degrees) * np.where(middle >= start, 1.0, -1.0)
         self._inertia = joint_inertia(robot, start)
         self._mass = np.array(mass_function(robot)(start)) + np.diag(robot.D_M)
         self._most = _EFFORT * robot.gather("effort_limit")
@@ -87,9 +88,9 @@ class JointTour:
         Args:
             time: Since the beginning [s].
         """
-        q, v, a = self._start.copy(), np.zeros(self._n), np.zeros(self._n)
+        q, v, a = self._start.copy(), np.zeros(self.dimension), np.zeros(self.dimension)
         joint, phase = divmod(max(time - _SETTLING, 0.0), _OF_A_JOINT)
-        if joint < self._n:
+        if joint < self.dimension:
             i, w = int(joint), 2.0 * math.pi / _OF_A_JOINT
             q[i] += self._way[i] * (1.0 - math.cos(w * phase)) / 2.0
             v[i] = self._way[i] * w * math.sin(w * phase) / 2.0
@@ -105,7 +106,7 @@ class JointTour:
         """
         q, v, _ = self.desired(time)
         e, w = q - status.q, _BANDWIDTH
-        if self._mode is ControlMode.VELOCITY:
+        if self.mode is ControlMode.VELOCITY:
             return v + w * e
         self._sum += self._period * e
         tau = self._inertia * (3.0 * w**2 * e + 3.0 * w * (v - status.v) + w**3 * self._sum)
@@ -138,33 +139,26 @@ class JointTour:
 
 def move_slowly(
     end: ControllerEnd,
-    robot: SerialChain,
-    first: RobotStatus,
-    degrees: float,
-    mode: ControlMode,
-    period: float,
+    tour: JointTour,
     interrupted: Callable[[], bool],
     progress: Callable[[float, str], None],
-) -> SlowMotion:
+) -> tuple[np.ndarray, np.ndarray, str | None]:
     """Move each joint of a robot slowly out and back, and return what it told.
 
     Whatever goes wrong, nothing more is sent, so that the robot's driver damps it.
 
     Args:
         end: The link.
-        robot: The robot as it is believed, N joints.
-        first: A status of it at rest.
-        degrees: How far each joint goes [deg].
-        mode: What it is commanded by.
-        period: Its sampling time [s].
+        tour: The motion.
         interrupted: Whether to end.
         progress: Told how far it is.
 
-    Raises:
-        InputError: If the angle is out of range.
+    Returns:
+        Postures, one after the other, shape (M, N) [rad or m]; torques that it measured there, less
+        those of its small acceleration, the mean of both directions, so that friction takes no
+        part, shape (M, N) [Nm or N], NaN of joints that rest, since friction bears what it likes of
+        their load; and what was wrong, in words, or None.
     """
-    require_between("--move", degrees, _LEAST, _LARGEST, "deg")
-    tour = JointTour(robot, first.q, np.deg2rad(degrees), mode, period)
     heard, begin, complaint, told = [], None, None, -1.0
     while complaint is None:
         status = end.receive(_SILENCE)
@@ -186,18 +180,17 @@ def move_slowly(
         else:
             complaint = tour.lost(time, status)
         if complaint is None:
-            end.send(RobotCommand(status.utime, mode, tour.command(time, status)))
+            end.send(RobotCommand(status.utime, tour.mode, tour.command(time, status)))
             heard.append((time, replace(status, torque=status.torque - tour.inertial(time))))
             if time - told > 0.2:
                 told = time
                 progress(time, "moving one joint after the other")
     if complaint is None:
-        complaint = _velocity_complaint(heard, period)
-    q, torque = _means(heard, robot.dimension)
-    return SlowMotion(q, torque, complaint)
+        complaint = _velocity_complaint(heard)
+    return *_means(heard, tour.dimension), complaint
 
 
-def _velocity_complaint(heard: list[tuple[float, RobotStatus]], period: float) -> str | None:
+def _velocity_complaint(heard: list[tuple[float, RobotStatus]]) -> str | None:
     """Return which joint tells a velocity that its position does not have, or None."""
     t = np.array([time for time, _ in heard])
     q, v = (np.array([getattr(s, name) for _, s in heard]) for name in ("q", "v"))
@@ -231,3 +224,39 @@ def _means(heard: list[tuple[float, RobotStatus]], n: int) -> tuple[np.ndarray, 
                 torques.append(np.full(n, np.nan))
                 torques[-1][i] = np.mean([torque[way, i].mean() for way in ways])
     return np.array(postures).reshape(-1, n), np.array(torques).reshape(-1, n)
+
+
+def check_scenario(
+    scenario: ScenarioFile, end: ControllerEnd, progress: ProgressListener, degrees: float = 0.0
+) -> StaticCheck:
+    """Compare a robot's torques with those of a scenario's model, at rest and in slow motion.
+
+    Args:
+        scenario: The scenario as read.
+        end: The link to the robot.
+        progress: Told what goes on.
+        degrees: How far each joint is moved [deg]; if 0, nothing is sent.
+
+    Raises:
+        InputError: If the scenario is wrong, or the robot is another one, silent, or moves.
+    """
+    progress(0.0, "preparing")
+    station = prepare_driven(scenario, None, recording=False, progress=progress).station
+    assert isinstance(station.part, RemoteArm)
+    progress(0.0, "listening")
+    model, period = station.part.belief.robot, station.controller.period
+    assert isinstance(model, SerialChain)
+    status = listen(end, period)
+    if not degrees:
+        return check_statics(model, status.q[None], status.torque[None])
+    mode = command_mode(station)
+    check_mode(mode, end.dialect.modes, end.dialect.name)
+    check_ready(status, mode, model.dimension)
+    check_alone(end)
+    tour = JointTour(model, status.q, degrees, mode, period)
+    with steady_clock(), noticed_interruption() as interrupted, real_time_priority():
+        q, torque, complaint = move_slowly(end, tour, interrupted, progress)
+    # friction bears what it likes of a load at rest, where something moved instead
+    at_rest = status.torque * (np.nan if len(q) else 1.0)
+    found = check_statics(model, np.vstack([status.q, q]), np.vstack([at_rest, torque]))
+    return replace(found, measured=np.vstack([status.torque, torque]), complaint=complaint)

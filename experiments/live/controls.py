@@ -1,7 +1,7 @@
 """What a person can set and press, and what it means: sliders, keys and a gamepad."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from diagrams.scenario import Scenario
 from diagrams.station import Station
@@ -52,16 +52,7 @@ class Slider:
             value: Where it is now.
             rigid_top: Whether its highest value stands for what is rigid.
         """
-        return {
-            "name": self.name,
-            "group": self.group,
-            "low": self.low,
-            "high": self.high,
-            "step": self.step,
-            "keys": self.keys,
-            "rigid_top": rigid_top,
-            "value": value,
-        }
+        return asdict(self) | {"rigid_top": rigid_top, "value": value}
 
     def nearest(self, value: float) -> float:
         """Return the value that it can have next to one that is asked for."""

@@ -10,7 +10,7 @@ from pydrake.geometry import Meshcat
 from diagrams.live_view import LiveFrame, LiveView
 from diagrams.surroundings.operator import PULL, REGIONS, REQUEST, idle_controls
 from experiments.live.controls import Slider, TunedParameter
-from experiments.live.pages import Pages
+from experiments.live.page_server import Pages
 from pfsc_drake.control.compliance.tuned_impedance import requests_of
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat

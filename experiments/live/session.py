@@ -2,19 +2,16 @@
 
 import gc
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from diagrams.live_view import LiveView
 from experiments.finished_run import RunOutcome
 from experiments.live.controls import tuned_parameters
-from experiments.live.pages import Pages
+from experiments.live.live_simulation import LiveSimulation, RealTimePace
+from experiments.live.page_server import Pages
 from experiments.live.panel import Command, Panel, Scene
-from experiments.live.pen import Pen
-from experiments.live.simulation import LiveSimulation, RealTimePace
 from experiments.live.status import LiveStatus
-from experiments.live.take import ControlRecord, TakeFolders
+from experiments.live.takes import DRAWING, INPUTS, ControlRecord, Pen, TakeFolders
 from experiments.preparation import PreparedRun
 from reporting.progress import ProgressListener
 
@@ -22,41 +19,6 @@ from reporting.progress import ProgressListener
 _FRAME, _STATUS = 4, 8
 # real-time factors below and above which a change is told
 _SLOW, _AT_REAL_TIME = 0.9, 0.97
-
-
-class Teller(Protocol):
-    """Who tells the person in words what happens."""
-
-    def __call__(self, line: str) -> None:
-        """Tell a line."""
-
-
-@dataclass(frozen=True)
-class KeptTake:
-    """A take that was kept.
-
-    Attributes:
-        folder: Where.
-        outcome: What a run leaves.
-    """
-
-    folder: Path
-    outcome: RunOutcome
-
-
-@dataclass(frozen=True)
-class Output:
-    """What is to be left of a take.
-
-    Attributes:
-        folders: Where.
-        figures: Whether to draw figures.
-        recording: Whether to record the motion.
-    """
-
-    folders: TakeFolders
-    figures: bool = True
-    recording: bool = True
 
 
 class LiveSession:
@@ -68,30 +30,33 @@ class LiveSession:
 
     Args:
         prepared: A station with an operator.
-        name: Name of its scenario.
         pages: Who leads.
         status: What is told at every moment, kept up to date.
-        output: What is left of it.
+        folders: Where takes are kept.
         tell: Told in words what happens.
         pace: Makes simulated time wait; by default for the clock.
+
+    Attributes:
+        status: See above.
+        kept: Outcomes of the takes that were kept, by folder, the last of them when it ended.
+        interrupted: Whether the user stopped it.
     """
 
     def __init__(
         self,
         prepared: PreparedRun,
-        name: str,
         pages: Pages,
         status: LiveStatus,
-        output: Output,
-        tell: Teller,
+        folders: TakeFolders,
+        tell: Callable[[str], None],
         pace: RealTimePace | None = None,
     ) -> None:
         station, settings = prepared.station, prepared.settings
         assert station.operator is not None
         assert settings.operator is not None
-        self._prepared, self._name, self._output, self._tell = prepared, name, output, tell
+        self._prepared, self._folders, self._tell = prepared, folders, tell
         self._station, self._operator = station, station.operator
-        self.status, self.kept = status, list[KeptTake]()
+        self.status, self.kept, self.interrupted = status, dict[Path, RunOutcome](), False
         self._simulation, self._pace = LiveSimulation(station, settings), pace or RealTimePace()
         self._record, self._pen = ControlRecord(station.operator), Pen.of(station)
         limit = settings.operator.hand.force_limit
@@ -133,7 +98,7 @@ class LiveSession:
                 self._keep(interrupted, progress)
             finally:
                 gc.unfreeze()
-                self.status.phase = "ended"
+                self.status.phase, self.interrupted = "ended", interrupted()
 
     def _loop(self, interrupted: Callable[[], bool], progress: ProgressListener) -> None:
         self._restart()
@@ -259,19 +224,14 @@ class LiveSession:
         if self.status.recording is not None:
             attributes["recorded_from"] = f"{self.status.recording:.3f} s"
         self.status.recording = None
-        folder, outcome = self._output.folders.write(
-            self._prepared,
-            self._name,
-            self._simulation.result(),
-            self._record,
-            progress,
-            interrupted,
-            attributes=attributes,
-            figures=self._output.figures,
-            recording=self._output.recording,
-            drawing=None if self._pen is None else self._pen.text(),
+        files = {INPUTS: self._record.text()}
+        if self._pen is not None:
+            files[DRAWING] = self._pen.text()
+        result = self._simulation.result()
+        folder, outcome = self._folders.write(
+            self._prepared, result, files, attributes, progress, interrupted
         )
-        self.kept.append(KeptTake(folder, outcome))
-        self.status.kept = [str(kept.folder) for kept in self.kept]
+        self.kept[folder] = outcome
+        self.status.kept = [str(kept) for kept in self.kept]
         self.status.message = message
         self._tell(f"kept in {folder}")

@@ -1,15 +1,14 @@
 """From a scenario to a live session, and how it ended."""
 
+from collections.abc import Callable
 from contextlib import closing, suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from diagrams.scenario import Scenario, Streamed
-from experiments.live.pages import Pages
-from experiments.live.server import PageServer
-from experiments.live.session import KeptTake, LiveSession, Output, Teller
+from experiments.live.page_server import Pages, PageServer
+from experiments.live.session import LiveSession
 from experiments.live.status import LiveStatus
-from experiments.live.take import TakeFolders
+from experiments.live.takes import TakeFolders
 from experiments.preparation import prepare
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError
@@ -21,44 +20,27 @@ from reporting.interruption import noticed_interruption
 _HAND = ("stiffness", "damping", "rotational_damping", "force_limit", "torque_limit")
 
 
-@dataclass(frozen=True)
-class LiveOutcome:
-    """How a session ended.
-
-    Attributes:
-        kept: The takes that were kept, the last of them when it ended.
-        fault: Why it stood still at the end, or None if it did not.
-        interrupted: Whether the user stopped it.
-        time: Simulated time at the end [s].
-    """
-
-    kept: list[KeptTake]
-    fault: str | None
-    interrupted: bool
-    time: float
-
-
 def run_live(
     scenario: ScenarioFile,
-    *,
-    out: Path,
     port: int,
     duration: float | None,
+    tell: Callable[[str], None],
+    *,
+    out: Path,
     figures: bool,
     recording: bool,
-    tell: Teller,
-) -> LiveOutcome:
+) -> LiveSession:
     """Let a person guide a scenario's robot until they end it.
 
     Args:
         scenario: The scenario as read; its written hand, if any, gives way to the person's.
-        out: Folder in which takes get folders of their own.
         port: Port of the page; 0 for any that is free.
         duration: Simulated time after which the session ends [s]; by default
             LONGEST_SESSION or what the memory allows.
+        tell: Told in words what is prepared, happens, and is written.
+        out: Folder in which takes get folders of their own.
         figures: Whether takes get figures.
         recording: Whether takes get a recording.
-        tell: Told in words what is prepared, happens, and is written.
 
     Raises:
         InputError: If the scenario is wrong or has nothing to guide, the folder cannot be used, or
@@ -68,22 +50,22 @@ def run_live(
     progress = _ToldProgress(tell)
     progress(0.0, "preparing")
     guided = with_operator(scenario)
-    folders = TakeFolders(out, scenario.inputs())
+    folders = TakeFolders(
+        out, scenario.name, scenario.inputs(), figures=figures, recording=recording
+    )
     status, pages = LiveStatus(scenario.name), Pages()
-    server = PageServer(port, lambda: status.content() | {"lead": pages.leader}, pages.hear)
-    with closing(server):
+    with closing(PageServer(port, pages, status.content)) as server:
         prepared = prepare(guided, duration, recording=True, progress=progress, live=True)
-        output = Output(folders, figures=figures, recording=recording)
-        session = LiveSession(prepared, scenario.name, pages, status, output, tell)
+        session = LiveSession(prepared, pages, status, folders, tell)
         for warning in prepared.warnings:
             tell(f"warning: {warning}")
         tell(f"open {server.url}")
         with noticed_interruption() as interrupted:
             session.run(interrupted, progress)
-            return LiveOutcome(session.kept, session.fault, interrupted(), session.end)
+    return session
 
 
-def _audible(tell: Teller) -> Teller:
+def _audible(tell: Callable[[str], None]) -> Callable[[str], None]:
     """Return a teller whom it does not disturb that the terminal has gone."""
 
     def told(line: str) -> None:
@@ -96,7 +78,7 @@ def _audible(tell: Teller) -> Teller:
 class _ToldProgress:
     """Tells in words what is prepared and written."""
 
-    def __init__(self, tell: Teller) -> None:
+    def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell, self._phase = tell, ""
 
     def expect(self, duration: float) -> None:

@@ -13,10 +13,8 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.schema import driven
 from diagrams.station import Station
 from experiments.live.controls import Slider
-from experiments.live.pages import Pages
+from experiments.live.page_server import Pages, PageServer
 from experiments.live.panel import Scene
-from experiments.live.server import PageServer
-from experiments.live.session import Teller
 from experiments.live.status import LiveStatus
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
@@ -201,7 +199,9 @@ def coordinate_function(manifold: PlaceManifold, robot: RobotModel) -> ca.Functi
     return ca.Function("coordinates", [q, point], [ca.densify(values)])
 
 
-def run_watch(scenario: ScenarioFile, end: WatchingEnd, *, port: int, tell: Teller) -> None:
+def run_watch(
+    scenario: ScenarioFile, end: WatchingEnd, port: int, tell: Callable[[str], None]
+) -> None:
     """Watch a robot that another process drives by a scenario, until the person leaves.
 
     Args:
@@ -221,14 +221,16 @@ def run_watch(scenario: ScenarioFile, end: WatchingEnd, *, port: int, tell: Tell
         station = build_station(settings, folder, remote=True)
         drawing = draw_station(settings, folder, station)
     status, pages = LiveStatus(scenario.name), Pages()
-    server = PageServer(port, lambda: status.content() | {"lead": pages.leader}, pages.hear)
 
     def scene(first: LiveFrame) -> Scene:
         return Scene(
             lambda frame, meshcat: LiveView(station, drawing, frame, meshcat, _ARROW), first, tell
         )
 
-    with closing(server), noticed_interruption() as interrupted:
+    with (
+        closing(PageServer(port, pages, status.content)) as server,
+        noticed_interruption() as interrupted,
+    ):
         panel = WatchPanel(pages)
         watch = Watch(station, scene, end, panel, status)
         if not watch.look(_FIRST):

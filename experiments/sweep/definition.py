@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.sweep.values import Grid, Random, column_value, parse_values, split_values
+from experiments.sweep.values import Random, column_value, parse_values, split_values
 from experiments.sweep.worker import RunRow
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.reading import read_text
@@ -183,7 +183,7 @@ class Variation:
 
     name: str
     keys: tuple[str, ...]
-    values: Grid | Random
+    values: tuple[str, ...] | Random
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ def draw_samples(variations: Sequence[Variation], count: int | None, seed: int) 
     Raises:
         InputError: If ``count`` is missing, or there for nothing, or there are more than MAX_RUNS.
     """
-    grids = [v.values.values if isinstance(v.values, Grid) else None for v in variations]
+    grids = [None if isinstance(v.values, Random) else v.values for v in variations]
     randoms = [variation for variation in variations if isinstance(variation.values, Random)]
     if randoms and count is None:
         raise InputError(f"--samples: missing; {shortened(randoms[0].name)} is random")

@@ -70,15 +70,15 @@ def find_influence(parameter: list[Any], values: NDArray[Any]) -> Influence:
     if not inside.size:
         return Influence(rank)
     chosen = inside[:: -(-len(inside) // _MOST_BENDS)]
-    fits = [_Branches.fit(x - x[numbers == bend].mean(), y) for bend in chosen]
-    best = int(np.argmin([branches.rest for branches in fits]))
-    bend, found = float(chosen[best]), fits[best]
+    fits = [_branches(x - x[numbers == bend].mean(), y) for bend in chosen]
+    best = int(np.argmin([rest for rest, _, _ in fits]))
+    bend, (rest, is_steep, is_least) = float(chosen[best]), fits[best]
     means = np.array([y[numbers == value].mean() for value in grid])
-    bend_rank = float(np.sqrt(max(1.0 - found.rest, 0.0)))
-    is_bend = found.is_steep or _turns_at(means, int(np.searchsorted(grid, bend)))
+    bend_rank = float(np.sqrt(max(1.0 - rest, 0.0)))
+    is_bend = is_steep or _turns_at(means, int(np.searchsorted(grid, bend)))
     if not is_bend or bend_rank <= abs(rank):
         return Influence(rank)
-    return Influence(rank, bend, found.is_least, bend_rank)
+    return Influence(rank, bend, is_least, bend_rank)
 
 
 def _turns_at(means: NDArray[Any], k: int) -> bool:
@@ -87,28 +87,18 @@ def _turns_at(means: NDArray[Any], k: int) -> bool:
     return bool(steps[0] != 0 and np.all(steps[:k] == steps[0]) and np.all(steps[k:] == -steps[0]))
 
 
-@dataclass(frozen=True)
-class _Branches:
-    """Two lines that meet.
+def _branches(x: NDArray[Any], y: NDArray[Any]) -> tuple[float, bool, bool]:
+    """Fit two lines that meet at x = 0.
 
-    Attributes:
-        rest: Sum of squares that they leave, a share of that without them.
-        is_steep: Whether both rise, or both fall, away from where they meet, and not by chance.
-        is_least: Whether the left one rises.
+    Returns:
+        The sum of squares that they leave, a share of that without them; whether both rise, or both
+        fall, away from where they meet, and not by chance; and whether the left one rises.
     """
-
-    rest: float
-    is_steep: bool
-    is_least: bool
-
-    @classmethod
-    def fit(cls, x: NDArray[Any], y: NDArray[Any]) -> "_Branches":
-        """Fit lines that meet at x = 0."""
-        A = np.column_stack([np.ones_like(x), np.maximum(-x, 0.0), np.maximum(x, 0.0)])
-        found = np.linalg.lstsq(A, y, rcond=None)[0]
-        whole, rest = float(np.sum((y - y.mean()) ** 2)), float(np.sum((y - A @ found) ** 2))
-        variance = max(rest, _EXACT * whole) / max(len(y) - 3, 1)
-        slopes = found[1:] / np.sqrt(variance * np.diag(np.linalg.inv(A.T @ A))[1:])
-        least = float(t.isf(_CHANCE, max(len(y) - 3, 1)))
-        is_steep = bool(np.all(slopes > least) or np.all(slopes < -least))
-        return cls(rest / whole, is_steep, bool(slopes[0] > 0.0))
+    A = np.column_stack([np.ones_like(x), np.maximum(-x, 0.0), np.maximum(x, 0.0)])
+    found = np.linalg.lstsq(A, y, rcond=None)[0]
+    whole, rest = float(np.sum((y - y.mean()) ** 2)), float(np.sum((y - A @ found) ** 2))
+    variance = max(rest, _EXACT * whole) / max(len(y) - 3, 1)
+    slopes = found[1:] / np.sqrt(variance * np.diag(np.linalg.inv(A.T @ A))[1:])
+    least = float(t.isf(_CHANCE, max(len(y) - 3, 1)))
+    is_steep = bool(np.all(slopes > least) or np.all(slopes < -least))
+    return rest / whole, is_steep, bool(slopes[0] > 0.0)

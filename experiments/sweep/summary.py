@@ -5,7 +5,6 @@ import io
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,12 +29,15 @@ Columns = dict[str, list[Any]]
 _ABOUT = ("run", "status", "reason", "warnings", "simulated_time", "seconds", "host", "revision")
 
 
-@dataclass(frozen=True)
 class Spread:
     """How one metric is spread over the runs that completed.
 
-    Attributes:
+    Args:
         name: Name of the metric.
+        metrics: Its finite values, by number of the sample; one or more.
+
+    Attributes:
+        name: See above.
         unit: SI.
         runs: Number of the samples with a value.
         values: Theirs.
@@ -44,13 +46,15 @@ class Spread:
         source: Source of the target.
     """
 
-    name: str
-    unit: str
-    runs: tuple[int, ...]
-    values: np.ndarray
-    is_better_large: bool
-    target: str | None
-    source: str | None
+    def __init__(self, name: str, metrics: Mapping[int, Metric]) -> None:
+        self.name, self.runs, all_of = name, tuple(metrics), list(metrics.values())
+        self.values, self.unit = np.array([metric.value for metric in all_of]), all_of[0].unit
+        # a target that not all runs share is none of the sweep; no target of the machine either
+        targets = {(metric.target, metric.source) for metric in all_of}
+        is_shared = len(targets) == 1 and name not in MACHINE_METRICS
+        self.target, self.source = targets.pop() if is_shared else (None, None)
+        bounds = [metric.bound for metric in all_of if metric.bound is not None]
+        self.is_better_large = name in _LARGE or any(b[0].startswith(">") for b in bounds)
 
     @property
     def worst_run(self) -> int:
@@ -99,21 +103,8 @@ def measure_spreads(rows: Mapping[int, RunRow]) -> dict[str, Spread]:
         own = {i: row.metrics[name] for i, row in completed.items() if name in row.metrics}
         own = {i: metric for i, metric in own.items() if np.isfinite(metric.value)}
         if own:
-            spreads[name] = _spread(name, own)
+            spreads[name] = Spread(name, own)
     return spreads
-
-
-def _spread(name: str, metrics: Mapping[int, Metric]) -> Spread:
-    # a target that not all runs share is none of the sweep; no target of the machine either
-    targets = {(metric.target, metric.source) for metric in metrics.values()}
-    target, source = targets.pop() if len(targets) == 1 else (None, None)
-    if name in MACHINE_METRICS:
-        target, source = None, None
-    bounds = [metric.bound for metric in metrics.values() if metric.bound is not None]
-    is_better_large = any(bound[0].startswith(">") for bound in bounds) or name in _LARGE
-    values = np.array([metric.value for metric in metrics.values()])
-    unit = next(iter(metrics.values())).unit
-    return Spread(name, unit, tuple(metrics), values, is_better_large, target, source)
 
 
 def summary_metrics(rows: Mapping[int, RunRow], chosen: str | None) -> Metrics:

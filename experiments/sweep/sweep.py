@@ -16,7 +16,6 @@ from experiments.sweep.definition import (
     draw_samples,
     parse_variations,
 )
-from experiments.sweep.figures import draw_sweep
 from experiments.sweep.many import count_cores, run_many
 from experiments.sweep.summary import (
     choose_metric,
@@ -30,13 +29,14 @@ from experiments.sweep.summary import (
     to_parquet,
     units_of,
 )
+from experiments.sweep.sweep_figures import draw_sweep
 from experiments.sweep.worker import COMPLETED, REFUSED, RunRow, RunTask, program_revision
 from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import ResultsFolder, check_folder, open_results
 from reporting.interruption import noticed_interruption
-from reporting.metrics import Metrics
+from reporting.metrics import Metric
 from reporting.page import report_page, write_report
 from reporting.progress import CountDisplay
 from reporting.provenance import standard_attributes
@@ -73,8 +73,7 @@ class SweepOutcome:
         rows: What is there, by number of the sample.
         total: Number of all runs.
         commands: Command lines of runs to look at, by what strikes in them.
-        metrics: What it says as a whole.
-        key_metrics: Names of those to look at first.
+        metrics: What it says as a whole, as far as one looks at it first.
         warnings: What may not have gone as well as hoped, one sentence each.
         interrupted: Whether the user stopped it.
         stopped: Why not all runs were made; or None.
@@ -85,8 +84,7 @@ class SweepOutcome:
     rows: dict[int, RunRow]
     total: int
     commands: dict[str, str]
-    metrics: Metrics
-    key_metrics: list[str]
+    metrics: dict[str, Metric]
     warnings: list[str]
     interrupted: bool
     stopped: str | None
@@ -243,8 +241,7 @@ def _conclude(
         rows,
         len(sweep.samples),
         commands,
-        metrics,
-        key_metrics(metrics, chosen),
+        {name: metrics[name] for name in key_metrics(metrics, chosen)},
         warnings,
         interrupted,
         stopped,

@@ -44,17 +44,6 @@ Draw = Callable[[np.random.Generator], str]
 
 
 @dataclass(frozen=True)
-class Grid:
-    """Values one after the other.
-
-    Attributes:
-        values: YAML texts.
-    """
-
-    values: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Random:
     """A random distribution.
 
@@ -73,12 +62,15 @@ class Random:
         return "[" + ", ".join(self.draw(generator) for _ in range(self.length)) + "]"
 
 
-def parse_values(text: str, source: str) -> Grid | Random:
+def parse_values(text: str, source: str) -> tuple[str, ...] | Random:
     """Reads what stands behind ``--vary KEY=``.
 
     Args:
         text: Values in the words of the command line.
         source: The option as given, for messages.
+
+    Returns:
+        YAML texts of values one after the other, or a distribution.
 
     Raises:
         InputError: If the text is none of these; names the piece.
@@ -97,7 +89,7 @@ def parse_values(text: str, source: str) -> Grid | Random:
         name, pieces = call[1], split_values(call[2], source)
         if name not in _GRIDS:
             raise InputError(f"{source}: unknown {shortened(name)}(...); {ALLOWED}")
-        return Grid(_GRIDS[name](name, pieces, source))
+        return _GRIDS[name](name, pieces, source)
     values = tuple(split_values(text, source))
     if len(values) < 2:
         raise InputError(
@@ -106,7 +98,7 @@ def parse_values(text: str, source: str) -> Grid | Random:
     _check_number(len(values), source)
     for value in values:
         parse_yaml(value, f"{source}: {shortened(value)}")
-    return Grid(values)
+    return values
 
 
 def split_values(text: str, source: str) -> list[str]:

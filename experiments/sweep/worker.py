@@ -5,7 +5,7 @@ import math
 import socket
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,6 +24,7 @@ REFUSED = "refused"  # the scenario is wrong
 FAILED = "failed"  # an error of the program or of the machine
 DIED = "died"  # the process that ran it has ended
 STATUSES = (COMPLETED, FAULT, REFUSED, FAILED, DIED)
+_TEXTS, _TIMES = ("status", "reason", "host", "revision"), ("end", "seconds")
 # of a worker that has several threads: compilation and the garbage collector know but one run
 _ONE_AT_A_TIME = threading.Lock()
 
@@ -65,16 +66,10 @@ class RunRow:
 
     def to_data(self) -> dict[str, Any]:
         """Returns the row as data for JSON; NaN is null."""
-        return {
-            "status": self.status,
-            "reason": self.reason,
-            "metrics": self.metrics.to_data(),
-            "warnings": self.warnings,
-            "end": _or_null(self.end),
-            "seconds": _or_null(self.seconds),
-            "host": self.host,
-            "revision": self.revision,
-        }
+        kept = {field.name: getattr(self, field.name) for field in fields(self)}
+        del kept["memory"]
+        kept["metrics"] = self.metrics.to_data()
+        return kept | {name: None for name in _TIMES if not math.isfinite(kept[name])}
 
     @classmethod
     def from_data(cls, data: dict[str, Any]) -> "RunRow":
@@ -85,24 +80,11 @@ class RunRow:
         """
         if data["status"] not in STATUSES:
             raise ValueError(data["status"])
-        return cls(
-            data["status"],
-            str(data["reason"]),
-            Metrics.from_data(data["metrics"]),
-            [str(warning) for warning in data["warnings"]],
-            _or_nan(data["end"]),
-            _or_nan(data["seconds"]),
-            str(data["host"]),
-            str(data["revision"]),
-        )
-
-
-def _or_null(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else float(value)
+        kept: dict[str, Any] = {name: str(data[name]) for name in _TEXTS}
+        kept |= {name: math.nan if data[name] is None else float(data[name]) for name in _TIMES}
+        kept["metrics"] = Metrics.from_data(data["metrics"])
+        kept["warnings"] = [str(warning) for warning in data["warnings"]]
+        return cls(**kept)
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,9 @@ from experiments.finished_run import RunOutcome
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
 from experiments.simulated_run import run_scenario
-from experiments.teaching.comparison import (
-    FollowedShape,
-    compare_fit,
-    compare_followed,
-    comparison_metrics,
-)
-from experiments.teaching.pictures import draw_pictures
-from experiments.teaching.taught import (
+from experiments.teaching.comparison import Fit, FollowedShape
+from experiments.teaching.taught_figures import draw_pictures
+from experiments.teaching.taught_path import (
     CSV_NAME,
     YAML_NAME,
     Taught,
@@ -26,6 +21,7 @@ from experiments.teaching.taught import (
 )
 from pfsc_drake.geometry import waypoints_text
 from reporting.folder import ResultsFolder, check_folder, open_results
+from reporting.metrics import Metrics
 from reporting.page import Report, report_page, write_report
 from reporting.provenance import standard_attributes
 
@@ -170,11 +166,13 @@ def _write_page(
     outcome: RunOutcome | None,
     folder: Path,
 ) -> Report:
-    fit, followed = compare_fit(taught), None
+    fit, followed, metrics = Fit(taught), None, Metrics()
+    fit.add_to(metrics, options.velocity)
     if outcome is not None and outcome.problem is None:
-        followed = compare_followed(taught, RunLog.read(folder / "log.h5"))
-        followed = followed if followed.eta.size else None
-    metrics = comparison_metrics(taught, fit, options.velocity, followed)
+        shape = FollowedShape(taught, RunLog.read(folder / "log.h5"))
+        if shape.eta.size:
+            followed = shape
+            followed.add_to(metrics)
     results.write("metrics.json", metrics.to_json())
     pictures = draw_pictures(taught, fit, followed)
     warnings = []

@@ -1,5 +1,6 @@
 """A network of blocks as a controller in C99."""
 
+import enum
 import json
 import re
 from collections.abc import Mapping
@@ -13,10 +14,10 @@ import numpy as np
 
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
-from pfsc_drake.codegen.c_faults import CFault, fault_sentences
 from pfsc_drake.codegen.manifest import MANIFEST, refuse_foreign, write_own
 from pfsc_drake.compiled.c_source import c_source, parameters
 from pfsc_drake.compiled.operations import Untranslatable
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 
 _FUNCTIONS = "controller_functions"
@@ -132,6 +133,32 @@ int controller_step(
     return (int)fault;
 }}
 """
+
+
+class CFault(enum.IntEnum):
+    """Fault of the calls of a controller in C, beside a :class:`~pfsc_drake.control.law.Fault`."""
+
+    NOT_INITIALIZED = 101
+    START_INVALID = 102
+    FAULT_INVALID = 103
+
+    @property
+    def explanation(self) -> str:
+        """One phrase for people."""
+        return _EXPLANATIONS[self]
+
+
+_EXPLANATIONS = {
+    CFault.NOT_INITIALIZED: "controller_step was called before controller_initialize",
+    CFault.START_INVALID: "controller_initialize was given a value that is NaN, infinite or beyond "
+    "1e9",
+    CFault.FAULT_INVALID: "the controller found a fault that is not a number of one",
+}
+
+
+def fault_sentences() -> dict[int, str]:
+    """Return the sentences of all values that a controller in C returns, by value."""
+    return {int(fault): fault.explanation for kind in (Fault, CFault) for fault in kind}
 
 
 @dataclass(frozen=True)

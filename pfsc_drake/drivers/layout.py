@@ -1,7 +1,9 @@
-"""Where a driver's messages have what a controller in C reads and writes."""
+"""What a controller in C has to know of a robot's messages: their layout, and where they go."""
 
+import ipaddress
 import struct
 from dataclasses import dataclass, replace
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 
@@ -13,7 +15,10 @@ from pfsc_drake.drivers.messages import (
     RobotStatus,
     encode_wrench,
 )
+from pfsc_drake.errors import InputError
 
+# LCM's own
+_ADDRESS, _PORT = "239.255.76.67", 7667
 # every message begins with eight bytes that tell its type; then comes the time
 _TYPE = slice(0, 8)
 _COUNT = 16  # where a status has the number of its joints
@@ -68,31 +73,22 @@ class StatusLayout:
         )
 
 
-@dataclass(frozen=True)
-class CommandLayout:
-    """A command to N joints as bytes.
+def command_layout(dialect: Dialect, mode: ControlMode, joints: int) -> tuple[bytes, int]:
+    """Find where a dialect writes what is commanded.
 
-    Attributes:
-        message: All of it, its time and what is commanded being zero.
-        values: Where that begins, as big-endian doubles one after the other.
+    Args:
+        dialect: The dialect.
+        mode: What is commanded.
+        joints: Number N of joints.
+
+    Returns:
+        A command, its time and what is commanded being zero; and where that begins, as big-endian
+        doubles one after the other.
     """
-
-    message: bytes
-    values: int
-
-    @classmethod
-    def of(cls, dialect: Dialect, mode: ControlMode, joints: int) -> "CommandLayout":
-        """Find where a dialect writes what is commanded.
-
-        Args:
-            dialect: The dialect.
-            mode: What is commanded.
-            joints: Number N of joints.
-        """
-        values = 1.0 + np.arange(joints)
-        data = dialect.encode_command(RobotCommand(0, mode, values))
-        zero = dialect.encode_command(RobotCommand(0, mode, 0.0 * values))
-        return cls(zero, data.index(_doubles(values)))
+    values = 1.0 + np.arange(joints)
+    data = dialect.encode_command(RobotCommand(0, mode, values))
+    zero = dialect.encode_command(RobotCommand(0, mode, 0.0 * values))
+    return zero, data.index(_doubles(values))
 
 
 def wrench_layout() -> tuple[int, bytes]:
@@ -111,3 +107,45 @@ def _changed(dialect: Dialect, status: RobotStatus, other: RobotStatus) -> int |
     places = np.flatnonzero(one != two)
     assert len(places) <= 1
     return int(places[0]) if len(places) else None
+
+
+@dataclass(frozen=True)
+class UdpmAddress:
+    """Where the messages of a bus are sent.
+
+    Attributes:
+        address: Multicast address.
+        port: Port.
+        ttl: How many routers they may pass; 0 keeps them on this machine.
+    """
+
+    address: str
+    port: int
+    ttl: int
+
+    @classmethod
+    def of(cls, url: str) -> "UdpmAddress":
+        """Read an address as LCM writes it, ``udpm://239.255.76.67:7667?ttl=0``.
+
+        Args:
+            url: The address; what is left out of it is as LCM has it.
+
+        Raises:
+            InputError: If it is none.
+        """
+        try:
+            parts = urlsplit(url)
+            found = cls(
+                parts.hostname or _ADDRESS,
+                parts.port or _PORT,
+                int(parse_qs(parts.query).get("ttl", ["0"])[0]),
+            )
+            is_good = ipaddress.IPv4Address(found.address).is_multicast and 0 <= found.ttl <= 255
+        except ValueError:
+            is_good = False
+        if not url.startswith("udpm://") or not is_good:
+            raise InputError(
+                f"--lcm {url}: no bus over UDP multicast; allowed: udpm://ADDRESS:PORT?ttl=N, "
+                "ADDRESS from 224.0.0.0 to 239.255.255.255"
+            )
+        return found

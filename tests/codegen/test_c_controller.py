@@ -12,8 +12,7 @@ from pfsc_drake.blocks.block import Block, Port
 from pfsc_drake.blocks.cases import all_finite, latched, where
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.codegen.c_controller import CController
-from pfsc_drake.codegen.c_faults import CFault
+from pfsc_drake.codegen.c_controller import CController, CFault
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from tests.compilers import needs_gcc

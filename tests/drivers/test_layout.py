@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from pfsc_drake.drivers.layout import CommandLayout, StatusLayout, wrench_layout
+from pfsc_drake.drivers.layout import StatusLayout, UdpmAddress, command_layout, wrench_layout
 from pfsc_drake.drivers.messages import (
     ControlMode,
     RobotCommand,
@@ -15,6 +15,7 @@ from pfsc_drake.drivers.messages import (
     dialect,
     encode_wrench,
 )
+from pfsc_drake.errors import InputError
 
 RANDOM = np.random.default_rng(0)
 MODES = [
@@ -57,10 +58,10 @@ def test_a_status(kind, joints):
 @pytest.mark.parametrize("joints", [1, 6, 7])
 def test_a_command(kind, mode, joints):
     spoken, values = dialect(kind), RANDOM.normal(size=joints)
-    layout = CommandLayout.of(spoken, mode, joints)
-    data = bytearray(layout.message)
+    message, begin = command_layout(spoken, mode, joints)
+    data = bytearray(message)
     data[8:16] = struct.pack(">q", 78)
-    data[layout.values : layout.values + 8 * joints] = doubles(values)
+    data[begin : begin + 8 * joints] = doubles(values)
     assert bytes(data) == spoken.encode_command(RobotCommand(78, mode, values))
 
 
@@ -69,3 +70,28 @@ def test_a_force_sensors_reading():
     data = encode_wrench(5, wrench)
     assert (len(data), data[:8]) == (size, fingerprint)
     np.testing.assert_array_equal(decode_wrench(fingerprint + data[8:16] + doubles(wrench)), wrench)
+
+
+@pytest.mark.parametrize(
+    ("url", "address"),
+    [
+        ("udpm://", UdpmAddress("239.255.76.67", 7667, 0)),
+        ("udpm://239.255.76.67:7667?ttl=1", UdpmAddress("239.255.76.67", 7667, 1)),
+        ("udpm://239.1.2.3", UdpmAddress("239.1.2.3", 7667, 0)),
+        ("udpm://:7000?recv_buf_size=100&ttl=3", UdpmAddress("239.255.76.67", 7000, 3)),
+    ],
+)
+def test_addresses_as_lcm_writes_them(url, address):
+    assert UdpmAddress.of(url) == address
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        *("memq://", "tcpq://localhost:7700", "", "udpm", "udpm://10.0.0.1", "udpm://localhost"),
+        *("udpm://239.1.1.1:70000", "udpm://239.1.1.1?ttl=256", "udpm://?ttl=far", "udpm://[::1"),
+    ],
+)
+def test_what_is_no_address(url):
+    with pytest.raises(InputError, match="no bus over UDP multicast; allowed: udpm://ADDRESS:PORT"):
+        UdpmAddress.of(url)

@@ -7,8 +7,8 @@ import subprocess
 import numpy as np
 import pytest
 
+from experiments.controller_replay import check_export, replay_log
 from experiments.export import export_scenario
-from experiments.replay import check_export, replay_log
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
 from tests.compilers import needs_gcc
@@ -29,8 +29,10 @@ def quiet(*_):
 
 
 def exported(name, folder, changes=()):
-    export = export_scenario(read_scenario(name, list(changes)), folder, TICKS * 1e-3, quiet)
-    return export, np.fromfile(folder / "replay.bin").reshape(TICKS, -1)
+    scenario = read_scenario(name, list(changes))
+    controller, files = export_scenario(scenario, folder, TICKS * 1e-3, quiet)
+    assert {file.name for file in files} <= {file.name for file in folder.iterdir()}
+    return controller, np.fromfile(folder / "replay.bin").reshape(TICKS, -1)
 
 
 @pytest.fixture(scope="session", name="elastic")
@@ -40,8 +42,7 @@ def fixture_elastic(tmp_path_factory):
 
 
 def test_what_is_written_and_said(elastic):
-    folder, export, recorded = elastic
-    assert {file.name for file in export.files} <= {file.name for file in folder.iterdir()}
+    folder, _, recorded = elastic
     said = json.loads((folder / "interface.json").read_text(encoding="utf-8"))
     assert [(port["name"], port["size"]) for port in said["inputs"]] == [("joint_state", 24)]
     names = ["drive_torque", "manifold_state", "status", "fault", "reference"]
@@ -69,9 +70,9 @@ def test_c_repeats_a_run_to_the_last_bit(elastic):
 @needs_gcc
 @pytest.mark.parametrize("name", OTHERS)
 def test_c_repeats_runs_of_other_kinds(name, tmp_path):
-    export, recorded = exported(name, tmp_path, OTHERS[name])
+    controller, recorded = exported(name, tmp_path, OTHERS[name])
     wrench = ["measured_wrench"] if name.startswith("vf") else []
-    inputs = [port["name"] for port in export.controller.interface()["inputs"]]
+    inputs = [port["name"] for port in controller.interface()["inputs"]]
     assert inputs == ["joint_state", *wrench]
     replay = check_export(tmp_path, quiet, "-O0", steps=10)
     assert (replay.ticks, replay.differing) == (TICKS, 0)
@@ -96,8 +97,8 @@ def assert_torques_are_fed_from_a_log(folder, recorded):
 )
 def test_deviations_of_links_that_are_found_are_told_in_c(sides, state, torque, tmp_path):
     changes = [f"encoders.sides={sides}", f"controller.state={state}"]
-    export, recorded = exported(ARM, tmp_path, changes)
-    said = export.controller.interface()
+    controller, recorded = exported(ARM, tmp_path, changes)
+    said = controller.interface()
     assert [port["name"] for port in said["inputs"]] == ["joint_state", *torque]
     told = {port["name"]: port["size"] for port in said["outputs"]}
     expected = {"position_deviation": 6, "tool_deviation": 3}
@@ -126,10 +127,10 @@ def test_wrong_inputs_end_in_a_fault(elastic):
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
 def test_what_is_no_measurement_ends_in_a_fault(elastic, library, bad):
     """And the drives go on with what held the robot: it rests."""
-    _, export, recorded = elastic
+    _, controller, recorded = elastic
     inputs = np.ascontiguousarray(recorded[:, :24])
     outputs = np.zeros(recorded.shape[1] - 24)
-    state = (ctypes.c_double * (export.controller.interface()["state_bytes"] // 8))()
+    state = (ctypes.c_double * (controller.interface()["state_bytes"] // 8))()
     library.controller_initialize(state, pointer(inputs[0]))
     for k in range(20):
         before, u = outputs[:6].copy(), inputs[k].copy()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import experiments.exported_controller
+import experiments.export
 from experiments import ExportedController, export_controller, run
 from pfsc_drake import InputError
 from tests.compilers import needs_gcc
@@ -58,7 +58,7 @@ def test_durations_that_are_none(duration, tmp_path):
 
 
 def test_a_check_without_a_compiler(tmp_path, monkeypatch):
-    monkeypatch.setattr(experiments.exported_controller, "missing_tool", lambda: "gcc")
+    monkeypatch.setattr(experiments.export, "missing_tool", lambda: "gcc")
     with pytest.raises(InputError, match="check = True: there is no gcc here"):
         export_controller(SCENARIO, out=tmp_path / "out", check=True)
     assert not (tmp_path / "out").exists()

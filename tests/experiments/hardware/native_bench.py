@@ -10,18 +10,15 @@ from pydrake.lcm import DrakeLcm
 from diagrams.robot_station import build_robot_station
 from diagrams.scenario import Scenario
 from experiments.hardware.drive import Drive
-from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.driven_run import prepare_driven
 from experiments.hardware.native_project import write_native
-from experiments.hardware.native_run import NativeRun, repeat_drive
-from experiments.hardware.robot import SimulatedRobot, Transport
+from experiments.hardware.native_record import NativeRun, RepeatedDrive
+from experiments.hardware.simulated_robot import SimulatedRobot, Transport
 from experiments.scenario_file import read_scenario
 from pfsc_drake.drivers.driver_rules import DriverOptions
 from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
 from pfsc_drake.drivers.messages import dialect
 from pfsc_drake.yaml.typed import load_typed
-
-OPTIONS = DriveOptions()
 
 
 def quiet(*_):
@@ -45,13 +42,13 @@ class Bench:
 
     def make_drive(self, end):
         """Return what the C is to do."""
-        return Drive(self.prepared.station, end, OPTIONS)
+        return Drive(self.prepared.station, end)
 
     @cached_property
     def project(self):
         """The C, not compiled."""
         drive = self.make_drive(ControllerEnd(DrakeLcm("memq://"), self.dialect))
-        return write_native(self.scenario, self.prepared, drive, OPTIONS, self.dialect, self.folder)
+        return write_native(self.scenario, self.prepared, drive, self.dialect, self.folder)
 
     @cached_property
     def program(self):
@@ -104,7 +101,7 @@ class Bench:
         run = NativeRun(
             form.read(self.folder / "answered.bin"), said.stdout.strip().removeprefix("end ")
         )
-        return run, repeat_drive(run, self.make_drive, self.dialect, OPTIONS, quiet)
+        return run, RepeatedDrive(run, self.make_drive, self.dialect, quiet)
 
 
 def changed(told, begin, change, end=None):

@@ -8,8 +8,7 @@ from diagrams.builder import build_station
 from diagrams.robot_station import build_robot_station
 from diagrams.scenario.schema import driven
 from experiments.hardware.drive import Drive
-from experiments.hardware.drive_options import DriveOptions
-from experiments.hardware.robot import SimulatedRobot, Transport
+from experiments.hardware.simulated_robot import SimulatedRobot, Transport
 from experiments.results.run_signals import collect_log
 from experiments.scenario_file import find_scenario
 from pfsc_drake.drivers.driver_rules import DriverOptions
@@ -36,7 +35,7 @@ class Loop:
             Transport(**transport),
         )
         self.station = build_station(driven(settings)[0], FOLDER, remote=True)
-        self.drive = Drive(self.station, self.end, DriveOptions())
+        self.drive = Drive(self.station, self.end)
 
     def begin(self):
         self.robot.tell()
@@ -65,7 +64,7 @@ class Loop:
 
     def log(self):
         log = collect_log(self.station, self.drive.root)
-        self.drive.record.add_to(log)
+        self.drive.add_to(log)
         return log
 
     def speed(self):

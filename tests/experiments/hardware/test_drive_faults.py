@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.hardware.robot import Transport
+from experiments.hardware.simulated_robot import Transport
 from pfsc_drake.drivers.driver_rules import DriverOptions
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode
 from tests.experiments.hardware.test_drive import Loop, changed, elastic, panda

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from experiments.hardware.driven_run import drive_scenario, prepare_driven
+from experiments.hardware.driven_run import DriveOptions, drive_scenario, prepare_driven
 from experiments.scenario_file import read_scenario
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import dialect
@@ -34,12 +34,9 @@ def test_overrides_out_of_range(override, tmp_path):
         drive_scenario(
             scenario,
             end,
-            out=tmp_path / "out",
-            duration=None,
-            figures=False,
-            recording=False,
-            progress=nothing,
-            override=override,
+            tmp_path / "out",
+            DriveOptions(override=override, figures=False, recording=False),
+            nothing,
         )
 
 
@@ -63,11 +60,9 @@ def test_nobody_answers(tmp_path, monkeypatch):
         drive_scenario(
             read_scenario("pfc_panda_7r", []),
             end,
-            out=tmp_path / "out",
-            duration=None,
-            figures=False,
-            recording=False,
-            progress=nothing,
+            tmp_path / "out",
+            DriveOptions(figures=False, recording=False),
+            nothing,
         )
     assert not (tmp_path / "out").exists()
 
@@ -79,10 +74,7 @@ def test_a_controller_in_c_is_not_led_from_afar(tmp_path, monkeypatch):
         drive_scenario(
             read_scenario("teleop_path", ["teleoperation.lcm=memq://"]),
             ControllerEnd(DrakeLcm("memq://"), dialect("panda")),
-            out=tmp_path / "out",
-            duration=None,
-            figures=False,
-            recording=False,
-            progress=nothing,
-            native=True,
+            tmp_path / "out",
+            DriveOptions(native=True, figures=False, recording=False),
+            nothing,
         )

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from experiments.hardware import robot as robot_module
+from experiments.hardware import simulated_robot
 from experiments.hardware.check import check_alone, check_first
-from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.driven_run import run_drive
-from experiments.hardware.robot import run_robot
+from experiments.hardware.simulated_robot import run_robot
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
 from pfsc_drake.errors import InputError
 from tests.experiments.hardware.test_drive import Loop, changed, panda
@@ -120,7 +119,7 @@ def test_a_drive_begins_with_what_is_new_and_ends_in_time(count, answers, lost):
         tell=lambda utime, values: None,
         foreign=0,
     )
-    found = run_drive(drive, end, DriveOptions(), 0.01, lambda: False, lambda *_: None)
+    found = run_drive(drive, end, 0.01, lambda: False, lambda *_: None)
     assert drive.begun == [1]
     assert drive.answered == list(range(1, answers + 1))
     assert found == lost
@@ -145,7 +144,7 @@ def test_a_second_sender_ends_the_drive():
 
     spoken = loop.end.dialect.encode_command
     loop.end.receive, loop.end.send = tell_and_receive, answer
-    result = run_drive(loop.drive, loop.end, DriveOptions(), 1.0, lambda: False, lambda *_: None)
+    result = run_drive(loop.drive, loop.end, 1.0, lambda: False, lambda *_: None)
     assert result.fault == "another sender commands the robot"
     assert loop.end.foreign == 2
     assert 200 < len(heard) < 400  # it rests at its start
@@ -170,7 +169,7 @@ def test_after_a_long_halt_time_is_not_caught_up(monkeypatch):
         clock[0] += 0.3 if robot.tick == 10 else 1e-4
 
     monkeypatch.setattr(
-        robot_module, "time", SimpleNamespace(monotonic=lambda: clock[0], sleep=sleep)
+        simulated_robot, "time", SimpleNamespace(monotonic=lambda: clock[0], sleep=sleep)
     )
     robot = SimpleNamespace(
         period=1e-3, tick=0, tell=lambda: begun.append(clock[0]), advance=advance

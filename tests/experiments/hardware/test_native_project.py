@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from experiments.hardware.driven_run import drive_scenario
+from experiments.hardware.driven_run import DriveOptions, drive_scenario
 from experiments.hardware.native_project import check_native
 from experiments.scenario_file import read_scenario
 from pfsc_drake.drivers.link import ControllerEnd
@@ -175,12 +175,9 @@ def test_what_is_refused_before_anything_is_done(tmp_path, monkeypatch, url, too
         drive_scenario(
             read_scenario("pfc_panda_7r", []),
             ControllerEnd(DrakeLcm(url), dialect("panda")),
-            out=tmp_path / "out",
-            duration=None,
-            figures=False,
-            recording=False,
-            progress=quiet,
-            native=True,
+            tmp_path / "out",
+            DriveOptions(native=True, figures=False, recording=False),
+            quiet,
         )
     assert not (tmp_path / "out").exists()
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from experiments.hardware.native_record import Event
-from experiments.hardware.native_run import NativeRun, Operator, repeat_drive, run_native
+from experiments.hardware.native_record import Event, NativeRun, RepeatedDrive
+from experiments.hardware.native_run import Operator, run_native
 from experiments.results.run_signals import collect_log
+from pfsc_drake.drivers.layout import UdpmAddress
 from pfsc_drake.drivers.link import RequestEnd, WatchingEnd
 from pfsc_drake.drivers.messages import RobotMode, dialect
 from pfsc_drake.drivers.remote_values import Request
-from pfsc_drake.drivers.udpm import UdpmAddress
 from pfsc_drake.errors import InputError
 from tests.compilers import needs_gcc
-from tests.experiments.hardware.native_bench import OPTIONS, Bench, changed, quiet
+from tests.experiments.hardware.native_bench import Bench, changed, quiet
 
 PANDA = ["start.transition=0.3", "reference.dwell=0.3"]
 FROM_TORQUE = [
@@ -43,7 +43,7 @@ def fixture_told(panda):
 def test_all_that_comes_is_answered_alike(panda, told):
     run, repeated = panda.answer(panda.rows(told))
     assert (run.reason, len(run.rows)) == ("record", 900)
-    assert repeated.comparison.first is None
+    assert repeated.first is None
     assert repeated.result.fault is None
     assert np.ptp(run.rows["sent"], axis=0).max() > 1.0
     log = collect_log(panda.prepared.station, repeated.result.root)
@@ -58,12 +58,12 @@ def test_lost_packets_and_what_comes_twice(panda, told):
     left = [x for k, x in enumerate(told) if k == 0 or random.random() > 0.05]
     left[300:300] = left[290:295]
     run, repeated = panda.answer(panda.rows(left))
-    assert repeated.comparison.first is None
+    assert repeated.first is None
     assert repeated.result.fault is None
     assert 20 < run.rows["missed"].sum() == 899 - (len(run.rows) - 1)
     assert len(run.rows) == len(left) - 5
     assert run.rows["missed"].max() > 1
-    ticks = repeated.drive.record.ticks
+    ticks = repeated.drive.ticks
     assert len(ticks) == 900
     assert sum(tick.missed for tick in ticks if not np.isnan(tick.age)) == run.rows["missed"].sum()
 
@@ -84,7 +84,7 @@ def test_lost_packets_and_what_comes_twice(panda, told):
 def test_what_ends_it(panda, told, change, fault, reason):
     """These statuses are of a robot that goes on, faster, however it is to stop."""
     run, repeated = panda.answer(panda.rows(changed(told, 500, change)))
-    assert repeated.comparison.first is None, repeated.comparison.warnings
+    assert repeated.first is None, repeated.warnings
     assert fault in repeated.result.fault
     assert run.reason == reason
     assert np.isfinite(run.rows["sent"]).all()
@@ -95,18 +95,18 @@ def test_what_ends_it(panda, told, change, fault, reason):
 def test_the_pace_changes_alike(panda, told):
     """Also from the start; the end comes later, in the time of the motion as planned."""
     _, repeated = panda.answer(panda.rows(told, overrides={0: 0.6, 350: 0.0, 500: 1.3}))
-    assert repeated.comparison.first is None, repeated.comparison.warnings
+    assert repeated.first is None, repeated.warnings
     drive = repeated.drive
     assert drive.time == pytest.approx(0.9)
     assert 0.1 < drive.motion_time < 0.8
-    assert [drive.record.ticks[k].override for k in (0, 400, 800)] == [0.6, 0.0, 1.3]
+    assert [drive.ticks[k].override for k in (0, 400, 800)] == [0.6, 0.0, 1.3]
 
 
 @needs_gcc
 def test_a_stop_that_makes_the_robot_faster_ends_alike(panda, told):
     faster = changed(told, 700, lambda s: {"v": s.v * 3.0, "utime": s.utime})
     run, repeated = panda.answer(panda.rows(faster, {690: Event.ASKED}))
-    assert repeated.comparison.first is None, repeated.comparison.warnings
+    assert repeated.first is None, repeated.warnings
     assert run.reason == "faster"
     assert "asked to stop; the stop made the robot faster" in repeated.result.fault
     assert len(run.rows) == 701
@@ -117,7 +117,7 @@ def test_torques_that_are_asked_for_too_fast_are_clipped_alike(panda, told):
     random = np.random.default_rng(2)
     told = changed(told, 400, lambda s: {"v": s.v + 0.05 * random.normal(size=7)}, 440)
     run, repeated = panda.answer(panda.rows(told))
-    assert repeated.comparison.first is None
+    assert repeated.first is None
     assert run.rows["clipped"][400:440].any()
 
 
@@ -142,7 +142,7 @@ def test_a_stop_ends_when_the_robot_has_rested(panda, told, event, said):
         *(changed(told[500:501], 0, lambda s, k=k: stands(s, k))[0] for k in range(400)),
     ]
     run, repeated = panda.answer(panda.rows(standing, {450: event}))
-    assert repeated.comparison.first is None
+    assert repeated.first is None
     assert repeated.result.fault == said
     assert run.reason == "rested"
     assert 650 < len(run.rows) < 750
@@ -153,17 +153,13 @@ def test_who_differs_is_found_out(panda, told):
     run, _ = panda.answer(panda.rows(told[:200]))
     rows = run.rows.copy()
     rows["sent"][120, 2] = np.nextafter(rows["sent"][120, 2], np.inf)
-    repeated = repeat_drive(
-        NativeRun(rows, "record"), panda.make_drive, panda.dialect, OPTIONS, quiet
-    )
-    assert repeated.comparison.first == pytest.approx(0.12)
-    [warning] = repeated.comparison.warnings
+    repeated = RepeatedDrive(NativeRun(rows, "record"), panda.make_drive, panda.dialect, quiet)
+    assert repeated.first == pytest.approx(0.12)
+    [warning] = repeated.warnings
     assert "differ at 1 ticks, first at t = 0.120 s, by" in warning
     rows["missed"][150] = 3
-    repeated = repeat_drive(
-        NativeRun(rows, "record"), panda.make_drive, panda.dialect, OPTIONS, quiet
-    )
-    assert repeated.comparison.ticks == 2
+    repeated = RepeatedDrive(NativeRun(rows, "record"), panda.make_drive, panda.dialect, quiet)
+    assert repeated.ticks == 2
 
 
 STUB = """
@@ -214,7 +210,7 @@ def test_an_iiwas_messages_do_as_well(panda, tmp_path):
     run, repeated = iiwa.answer(iiwa.rows(told[:200] + told[203:]))
     assert step.stat().st_mtime_ns == before[0]
     assert loop.stat().st_mtime_ns > before[1]
-    assert repeated.comparison.first is None
+    assert repeated.first is None
     assert repeated.result.fault is None
     assert np.ptp(run.rows["sent"], axis=0).max() > 1.0
 
@@ -237,7 +233,7 @@ def test_other_laws_and_what_they_are_told(tmp_path, name, changes, kind):
     # what is told as before does not fit what the controller wants: laws for elastic joints notice
     kept = [x for k, x in enumerate(told) if k < 300 or k % 37 != 20]
     run, repeated = bench.answer(bench.rows(kept))
-    assert repeated.comparison.first is None, repeated.comparison.warnings
+    assert repeated.first is None, repeated.warnings
     assert run.rows["missed"].any()
     assert not run.rows["fault"][:300].any()
     assert np.ptp(run.rows["sent"], axis=0).max() > 1e-3
@@ -276,7 +272,7 @@ def test_a_loop_that_breaks_off(panda, told):
     run = FakeLoop(panda, 'cd "$(dirname "$0")"; cp kept drive.bin; kill -SEGV $$').run()
     assert run.reason is None
     assert run.said == ["the loop in C broke off with status -11"]
-    repeated = repeat_drive(run, panda.make_drive, panda.dialect, OPTIONS, quiet)
+    repeated = RepeatedDrive(run, panda.make_drive, panda.dialect, quiet)
     assert repeated.result.fault == run.said[0]
     with pytest.raises(InputError, match="--native: 7: no such network; the loop in C broke off"):
         FakeLoop(panda, "echo 7: no such network; exit 2").run()
@@ -332,11 +328,11 @@ def test_who_is_impatient_ends_the_loop_too(panda):
 def test_nobody_was_there(panda):
     nothing = NativeRun(panda.rows([]), "silence")
     with pytest.raises(InputError, match="no status of the robot for 100 ms"):
-        repeat_drive(nothing, panda.make_drive, panda.dialect, OPTIONS, quiet)
+        RepeatedDrive(nothing, panda.make_drive, panda.dialect, quiet)
 
 
 def test_a_robot_that_has_moved_meanwhile_is_refused_in_the_same_words(panda, told):
     moved = changed(told[:1], 0, lambda s: {"v": s.v + 0.1})
     run = NativeRun(panda.rows(moved), "refused")
     with pytest.raises(InputError, match=r"the robot moves: joint 1 at 0\.1 rad/s"):
-        repeat_drive(run, panda.make_drive, panda.dialect, OPTIONS, quiet)
+        RepeatedDrive(run, panda.make_drive, panda.dialect, quiet)

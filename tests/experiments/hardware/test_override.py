@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from experiments.hardware.drive import Drive
-from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.keys import DriveKeys, pressed_keys
 from pfsc_drake.drivers.driver_rules import DriverOptions
 from pfsc_drake.drivers.link import WatchingEnd
@@ -51,7 +50,7 @@ def test_the_pace_is_what_was_asked_for_and_the_path_is_not_left(changed):
 @pytest.mark.slow
 def test_an_override_from_the_start_is_the_same_motion_slower():
     loop = Loop(panda())
-    loop.drive = Drive(loop.station, loop.end, DriveOptions(), 0.5)
+    loop.drive = Drive(loop.station, loop.end, 0.5)
     slow = loop.begin().run(1.6).log()
     motion = loop.station.task.motion.derivatives(0.5 * slow.time, 1)[:, :, 0]
     np.testing.assert_allclose(slow["eta_p"].values[:, 0], motion[:, 0], atol=1e-9)

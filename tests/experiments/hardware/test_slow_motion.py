@@ -9,7 +9,7 @@ from pydrake.lcm import DrakeLcm
 from diagrams.robot_station import build_robot_station
 from diagrams.robots.arm_model import read_arm
 from experiments.hardware import slow_motion
-from experiments.hardware.robot import SimulatedRobot, Transport
+from experiments.hardware.simulated_robot import SimulatedRobot, Transport
 from experiments.hardware.slow_motion import JointTour, move_slowly
 from experiments.hardware.statics import check_statics
 from experiments.scenario_file import find_scenario
@@ -71,13 +71,11 @@ def checked(seen=lambda status: status, heard=lambda values: values, settings=No
         end.robot._weight = gravity_function(carrying(true, -load))
     first = end.receive(0.0)
     believed = carrying(true, -load)
-    moved = move_slowly(
-        end, believed, first, 3.0, ControlMode.TORQUE, PERIOD, lambda: False, lambda t, phase: None
-    )
-    q, torque = moved.q, moved.torque
+    tour = JointTour(believed, first.q, 3.0, ControlMode.TORQUE, PERIOD)
+    q, torque, complaint = move_slowly(end, tour, lambda: False, lambda t, phase: None)
     if not len(q):
         q, torque = first.q[None], first.torque[None]
-    found = replace(check_statics(believed, q, torque), complaint=moved.complaint)
+    found = replace(check_statics(believed, q, torque), complaint=complaint)
     return found, np.abs(end.robot.status().q - first.q).max()
 
 
@@ -108,7 +106,7 @@ class Obedient:
     def __init__(self, chain, seen=lambda status: status):
         self.chain, self._tick, self._seen = chain, 0, seen
         start = np.deg2rad([20.0, -30.0, 25.0, -110.0, 15.0, 80.0, 40.0])
-        self._tour = JointTour(chain, start, np.deg2rad(3.0), ControlMode.TORQUE, 0.01)
+        self._tour = JointTour(chain, start, 3.0, ControlMode.TORQUE, 0.01)
         self.weight, self._mass = gravity_function(chain), mass_function(chain)
 
     def receive(self, timeout):
@@ -124,11 +122,10 @@ class Obedient:
     def checked(self, believed):
         """Return what it told in slow motion, and what the check says of it."""
         first = self.receive(0.0)
-        moved = move_slowly(
-            self, believed, first, 3.0, ControlMode.TORQUE, 0.01, lambda: False, lambda t, phase: 0
-        )
-        assert moved.complaint is None
-        return moved, check_statics(believed, moved.q, moved.torque)
+        tour = JointTour(believed, first.q, 3.0, ControlMode.TORQUE, 0.01)
+        q, torque, complaint = move_slowly(self, tour, lambda: False, lambda t, phase: 0)
+        assert complaint is None
+        return (q, torque), check_statics(believed, q, torque)
 
 
 @pytest.fixture(scope="module", name="chain")
@@ -138,10 +135,10 @@ def fixture_chain():
 
 def test_friction_and_inertia_take_no_part(chain):
     robot = Obedient(chain)
-    moved, found = robot.checked(chain)
-    assert np.all(np.isfinite(moved.torque).sum(axis=0) >= 5)
+    (q, torque), found = robot.checked(chain)
+    assert np.all(np.isfinite(torque).sum(axis=0) >= 5)
     assert found.is_good
-    off = moved.torque - np.array([np.asarray(robot.weight(q)).ravel() for q in moved.q])
+    off = torque - np.array([np.asarray(robot.weight(posture)).ravel() for posture in q])
     assert np.nanmax(np.abs(off)) < 0.1
 
 
@@ -216,4 +213,4 @@ def test_a_robot_that_leaves_its_mode_or_tells_nonsense():
 @pytest.mark.parametrize("degrees", [0.0, 30.0, np.nan])
 def test_angles_out_of_range(degrees):
     with pytest.raises(InputError, match="--move = "):
-        move_slowly(None, None, None, degrees, ControlMode.TORQUE, 1e-3, None, None)
+        JointTour(None, None, degrees, ControlMode.TORQUE, 1e-3)

@@ -4,9 +4,8 @@ from itertools import pairwise
 
 import pytest
 
-from experiments.live.pages import Pages
+from experiments.live.page_server import Pages, PageServer
 from experiments.live.panel import Panel
-from experiments.live.server import PageServer
 from experiments.live.status import LiveStatus
 from experiments.live.watch import WatchPanel
 from tests.experiments.live.browser import NAMES, Browser, find_browser
@@ -27,7 +26,7 @@ def show(tmp_path):
 
     def shown(status, pages, size=SIZE):
         content = status.content()
-        server = PageServer(0, lambda: content | {"lead": pages.leader}, pages.hear)
+        server = PageServer(0, pages, lambda: content)
         browser = Browser(find_browser(), tmp_path / "profile")
         opened.extend([browser, server])
         browser.open("about:blank")

@@ -14,7 +14,7 @@ import pytest
 
 from diagrams.surroundings.operator import columns
 from experiments.live.controls import Slider, TunedParameter
-from experiments.live.pages import Pages
+from experiments.live.page_server import Pages
 from experiments.live.panel import Command, Panel, Scene
 
 REGIONS = ["wall"]

@@ -9,8 +9,8 @@ import pytest
 from diagrams.scenario import Scenario
 from diagrams.tasks.arrivals import END, NEW_PATH, WAY_POINT, read_drawn, told_messages
 from experiments.cli import main
-from experiments.live.pages import Pages, message_of
-from experiments.live.pen import DRAWING
+from experiments.live.page_server import Pages
+from experiments.live.takes import DRAWING
 from experiments.scenario_file import read_scenario
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
 from pfsc_drake.errors import InputError
@@ -62,7 +62,7 @@ def test_the_tool_follows_while_one_draws_and_a_take_is_repeated_to_the_last_bit
     rehearsal = Drawing(tmp_path / "takes", NAME)
     first, second = arc(0.0, 2.5, 90, 0.1), arc(0.0, -2.0, 90) + np.array([0.05, 0.03])
     seen = rehearsal.draw([(0.1, WAY_POINT, first), (0.65, NEW_PATH, second)], 4.0)
-    folder = rehearsal.session.kept[0].folder
+    folder = next(iter(rehearsal.session.kept))
     log = signals(folder)
     told = [row["plane"] for row in seen if row["plane"] is not None]
     assert told[-1]["told"] > 100
@@ -99,7 +99,7 @@ def test_messages_of_a_drawing_are_those_that_were_told(tmp_path):
 @pytest.mark.parametrize("bad", ["1", "[[1, 2]]", "[[1, 2, null]]", '[["a", 1, 0]]'])
 def test_places_that_are_none_are_refused(bad):
     with pytest.raises(InputError, match="draw"):
-        message_of(f'{{"client": "a", "draw": {bad}}}'.encode())
+        Pages().hear(f'{{"client": "a", "draw": {bad}}}'.encode())
 
 
 def test_places_are_heard_once_and_only_of_who_leads():

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from experiments.live.pages import Pages
+from experiments.live.page_server import Pages
 from experiments.live.status import LiveStatus
 from experiments.live.watch import Watch, WatchPanel, run_watch
 from experiments.scenario_file import read_scenario

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.teaching.comparison import nearest_on_line
+from experiments.teaching.comparison import NearestOnLine
 
 
 def curve(t):
@@ -16,7 +16,7 @@ def test_it_is_as_near_as_any_of_many_samples():
     points = curve(np.linspace(0.05, 1.95, 40)) + 0.01 * np.random.default_rng(3).normal(
         size=(40, 3)
     )
-    nearest = nearest_on_line(points, line)
+    nearest = NearestOnLine(points, line)
     brute = np.linalg.norm(points[:, None] - dense[None], axis=2).min(axis=1)
     assert nearest.distances == pytest.approx(brute, abs=2e-6)
     feet = nearest.at(line)
@@ -26,9 +26,9 @@ def test_it_is_as_near_as_any_of_many_samples():
 def test_samples_that_coincide_and_ends():
     line = np.array([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0]])
     points = np.array([[-1.0, 0, 0], [0.25, 2.0, 0], [3.0, 0, 0]])
-    nearest = nearest_on_line(points, line)
+    nearest = NearestOnLine(points, line)
     assert nearest.distances == pytest.approx([1.0, 2.0, 2.0])
     assert nearest.at(line)[:, 0] == pytest.approx([0.0, 0.25, 1.0])
-    assert nearest_on_line(points, line[:1]).distances == pytest.approx(
+    assert NearestOnLine(points, line[:1]).distances == pytest.approx(
         np.linalg.norm(points, axis=1)
     )

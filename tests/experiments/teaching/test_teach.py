@@ -12,11 +12,11 @@ from diagrams.tasks.task_geometry import make_path
 from experiments.cli import main
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
-from experiments.teaching.comparison import compare_fit, compare_followed, line_of
-from experiments.teaching.taught import TeachingOptions, follow_scenario, taught_path
+from experiments.teaching.comparison import Fit, FollowedShape, line_of
+from experiments.teaching.taught_path import TeachingOptions, follow_scenario, taught_path
 from experiments.teaching.teach import KIND, write_teach_in
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import read_waypoints
+from pfsc_drake.geometry import read_waypoints, shape_report
 from pfsc_drake.yaml.reading import dump_yaml, read_yaml
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import check_folder
@@ -32,11 +32,13 @@ def settings_of(tool, *changes):
 def test_waypoints_are_what_the_controller_saw(wave):
     taught = taught_path(settings_of(wave), wave.log(), OPTIONS)
     assert taught.table.positions == pytest.approx((wave.positions + wave.SHIFT)[taught.rows])
-    fit = compare_fit(taught)
+    fit = Fit(taught)
     # the tremor of 0.1 mm per axis is not followed, and all of it stays near
     assert 1e-4 < fit.distances.max() <= 1e-3
     assert fit.turns.max() <= np.deg2rad(1.0)
-    assert fit.shape.largest_curvature_rate < 0.1 * fit.shape_through.largest_curvature_rate
+    assert shape_report(taught.path).largest_curvature_rate < 0.1 * (
+        shape_report(fit.through).largest_curvature_rate
+    )
     # the curve itself: 0.02 m sin(2 pi x), x = y / 0.3 m
     begin, end = taught.path.position.domain
     points = taught.path.position.derivatives(np.linspace(begin, end, 200), 0)[:, 0] - wave.SHIFT
@@ -53,7 +55,7 @@ def test_a_robot_that_repeats_itself_has_the_same_error(wave):
     again.add("xi_measured", np.tile([3e-4, 4e-4], (len(again.time), 1)), "m")
     again.add("xi", np.tile([0.0, 2e-3], (len(again.time), 1)), "m")
     again.add("eta", again.time, "m")
-    followed = compare_followed(taught, again)
+    followed = FollowedShape(taught, again)
     assert followed.eta[0] == pytest.approx(0.5)
     assert followed.seen == pytest.approx(np.full(len(followed.eta), 5e-4))
     assert followed.true == pytest.approx(np.full(len(followed.eta), 2e-3))
@@ -77,7 +79,7 @@ def test_a_lap_is_followed_across_its_begin(lap):
         again.add(name, np.tile(lap.R[0].ravel(), (len(points), 1)), "1")
     for name in ("xi", "eta"):
         again.add(name, np.zeros((len(points), 1)), "m")
-    followed = compare_followed(taught, again)
+    followed = FollowedShape(taught, again)
     assert followed.repeated.max() < 6e-4
     assert followed.turns.max() < 1e-6
     data = follow_scenario(taught, TeachingOptions(closed=True, tolerance=5e-4))

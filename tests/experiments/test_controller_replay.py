@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
+from experiments.controller_replay import check_export, replay_log
 from experiments.export import export_scenario
-from experiments.replay import check_export, replay_log
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
 from pfsc_drake.errors import InputError

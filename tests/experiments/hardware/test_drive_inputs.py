@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.hardware.bridge import state_between
+from experiments.hardware.drive_inputs import state_between
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.8, 1.0])

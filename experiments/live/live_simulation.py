@@ -12,7 +12,7 @@ from diagrams.live_view import LiveFrame, felt_force
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.surroundings.operator import PULL
-from experiments.live.pen import Pen
+from experiments.live.takes import Pen
 from experiments.simulation import SimulationResult, chunk_ticks, configure
 from pfsc_drake.following.fault_description import FoundFault
 from pfsc_drake.physics.operator_hand import ASKED, HOLD, TARGET

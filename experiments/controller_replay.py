@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from experiments.results.run_log import RunLog
-from pfsc_drake.codegen.export import LOG
+from pfsc_drake.codegen.c_project import LOG
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers
 from reporting.progress import ProgressListener
@@ -117,23 +117,37 @@ def check_export(
 
 
 def compile_replay(folder: Path, progress: ProgressListener, optimization: str = "") -> None:
-    """Compile an exported controller and what feeds it, one file after the other.
+    """Compile an exported controller and what feeds it, see :func:`compile_files`.
 
     Args:
         folder: With the files.
         progress: Told what goes on.
         optimization: Options of the compiler instead of those of the Makefile.
+    """
+    sources = [folder / "replay.c", *sorted(folder.glob("controller*.c"))]
+    compile_files(sources, "replay", progress, optimization)
+
+
+def compile_files(
+    sources: Sequence[Path], program: str, progress: ProgressListener, optimization: str = ""
+) -> None:
+    """Compile what has changed since the last time, one file after the other.
+
+    Args:
+        sources: The files, beside their Makefile.
+        program: What it makes of them.
+        progress: Told what goes on.
+        optimization: Options of the compiler instead of those of the Makefile.
 
     Raises:
-        InputError: If the compiler says anything.
+        InputError: If there is no compiler, or it says anything.
     """
+    folder = sources[0].parent
     options = [f"OPTIMIZATION={optimization}"] if optimization else []
-    sources = [folder / "replay.c", *sorted(folder.glob("controller*.c"))]
     for source in sources:
-        size = source.stat().st_size / 1e6
-        progress(0.0, f"compiling {source.name}, {size:.1f} MB")
+        progress(0.0, f"compiling {source.name}, {source.stat().st_size / 1e6:.1f} MB")
         make(folder, source.with_suffix(".o").name, options)
-    make(folder, "replay", options)
+    make(folder, program, options)
 
 
 def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
@@ -152,15 +166,15 @@ def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
     """
     said = _interface(folder)
     is_run = log.suffix.lower() in (".h5", ".hdf5")
-    recorded = _of_run(log, said["inputs"]) if is_run else _of_csv(log, said["inputs"])
+    known, inputs, logged, assumed = (_of_run if is_run else _of_csv)(log, said["inputs"])
     drives = said["outputs"][0]
     period = said["sampling_time"]
-    ticks = int(np.floor((recorded.times[-1] - recorded.times[0]) / period + _ROUNDING)) + 1
-    times = recorded.times[0] + period * np.arange(ticks)
-    row = np.searchsorted(recorded.times, times + _ROUNDING * period, side="right") - 1
+    ticks = int(np.floor((known[-1] - known[0]) / period + _ROUNDING)) + 1
+    times = known[0] + period * np.arange(ticks)
+    row = np.searchsorted(known, times + _ROUNDING * period, side="right") - 1
     compile_replay(folder, progress)
     progress(0.0, "feeding the log")
-    outputs = _fed(folder, recorded.inputs[row], sum(port["size"] for port in said["outputs"]))
+    outputs = _fed(folder, inputs[row], sum(port["size"] for port in said["outputs"]))
     ends = np.cumsum([0, *(port["size"] for port in said["outputs"])])
     parts = {
         port["name"]: outputs[:, a:b]
@@ -168,8 +182,8 @@ def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
     }
     told, faults = parts[drives["name"]], np.flatnonzero(parts["fault"][:, 0])
     difference = None
-    if recorded.told is not None and drives["name"] == _TORQUE:
-        difference = np.abs(told - recorded.told[row]).max(axis=0)
+    if logged is not None and drives["name"] == _TORQUE:
+        difference = np.abs(told - logged[row]).max(axis=0)
     names = [n for port in said["outputs"] for n in _columns((port["name"],), port["size"])]
     file = folder / COMMANDS
     np.savetxt(
@@ -189,19 +203,13 @@ def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
         0 if first is None else int(parts["fault"][first, 0]),
         np.nan if first is None else float(times[first]),
         difference,
-        recorded.assumed,
+        assumed,
         file,
     )
 
 
-@dataclass(frozen=True)
-class _Recorded:
-    """Times [s] (n,), inputs (n, size), what drives were told (n, N), and what was assumed."""
-
-    times: np.ndarray
-    inputs: np.ndarray
-    told: np.ndarray | None = None
-    assumed: str = ""
+# times [s] (n,), inputs (n, size), what drives were told (n, N), and what was assumed
+_Recorded = tuple[np.ndarray, np.ndarray, np.ndarray | None, str]
 
 
 def _interface(folder: Path) -> dict[str, Any]:
@@ -263,7 +271,7 @@ def _of_run(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
         if values.shape[1] != port["size"]:
             raise InputError(f"{log}: not of this robot; {port['name']} has {port['size']} numbers")
     told = run["tau_d"].values if "tau_d" in run else None
-    return _Recorded(run.time, np.hstack(columns), told)
+    return run.time, np.hstack(columns), told, ""
 
 
 def _of_csv(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
@@ -290,7 +298,7 @@ def _of_csv(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
     assumed = (
         "" if has_motors or not joints else "no q_M, v_M: motors are taken to be where q, v is"
     )
-    return _Recorded(times, np.column_stack(parts), assumed=assumed)
+    return times, np.column_stack(parts), None, assumed
 
 
 def _columns(names: Sequence[str], size: int) -> list[str]:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from diagrams.surroundings.operator import idle_controls
-from experiments.live.simulation import _ticks_per_step
-from experiments.live.take import ControlRecord, TakeFolders
+from experiments.live.live_simulation import _ticks_per_step
+from experiments.live.takes import ControlRecord, TakeFolders
 from experiments.simulation import chunk_ticks
 from pfsc_drake.errors import InputError
 
@@ -44,20 +44,20 @@ def test_what_is_set_before_the_first_tick_counts_from_there():
 
 def test_takes_of_earlier_sessions_stay(tmp_path):
     (tmp_path / "out" / "take_1").mkdir(parents=True)
-    assert TakeFolders(tmp_path / "out", []).next() == tmp_path / "out" / "take_2"
+    assert TakeFolders(tmp_path / "out", "run", []).next() == tmp_path / "out" / "take_2"
 
 
 def test_a_folder_that_cannot_be_is_refused(tmp_path):
     (tmp_path / "file").write_text("mine")
     with pytest.raises(InputError, match="file is no folder"):
-        TakeFolders(tmp_path / "file" / "out", [])
+        TakeFolders(tmp_path / "file" / "out", "run", [])
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path):
     (tmp_path / "locked").mkdir(mode=0o500)
     with pytest.raises(InputError, match="cannot be written"):
-        TakeFolders(tmp_path / "locked" / "out", [])
+        TakeFolders(tmp_path / "locked" / "out", "run", [])
 
 
 @pytest.mark.parametrize("period", [1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 4e-3, 0.02])

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure as Canvas
 
 from experiments.results.run_log import FloatArray
 from experiments.teaching.comparison import Fit, FollowedShape, line_of
-from experiments.teaching.taught import Taught
+from experiments.teaching.taught_path import Taught
 from pfsc_drake.geometry import Path, matrix_to_zyx, quaternion_to_matrix
 from reporting.style import (
     BROAD,

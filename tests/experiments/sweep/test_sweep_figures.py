@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.sweep.definition import draw_samples, parse_variations
-from experiments.sweep.figures import MAX_PANELS, draw_sweep
 from experiments.sweep.summary import measure_spreads, table_columns
+from experiments.sweep.sweep_figures import MAX_PANELS, draw_sweep
 from experiments.sweep.worker import RunRow
 from reporting.style import DPI, WIDTH
 

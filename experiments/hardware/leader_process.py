@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from diagrams.scenario_task import make_task
 from pydrake.lcm import DrakeLcmInterface
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
+from diagrams.scenario_task import make_task
 from diagrams.signal_log import add_log
 from diagrams.surroundings.channel_end import ChannelEnd
 from diagrams.surroundings.leader import Leading, add_leader

@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.live.simulation import RealTimePace
+from experiments.live.live_simulation import RealTimePace
 
 
 class Wall:

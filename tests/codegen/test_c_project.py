@@ -12,7 +12,7 @@ from pydrake.systems.primitives import Adder
 from pfsc_drake import InputError, export
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.codegen.c_controller import CController
-from pfsc_drake.codegen.export import check_project, write_project
+from pfsc_drake.codegen.c_project import check_project, write_project
 from pfsc_drake.codegen.manifest import manifest_text
 from pfsc_drake.systems.block_system import BlockSystem
 from tests.codegen.test_c_controller import Damper

@@ -11,7 +11,7 @@ import pytest
 from pydrake.lcm import DrakeLcm
 
 from experiments.cli import main
-from experiments.hardware.lead import lead_scenario
+from experiments.hardware.leader_process import lead_scenario
 from experiments.scenario_file import read_scenario
 from pfsc_drake.errors import InputError
 from tests.experiments.hardware.test_two_processes import ROOT, is_allowed
