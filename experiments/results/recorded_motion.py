@@ -15,7 +15,6 @@ from diagrams.holder_station import HOLDER
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.guidance import region_times
-from experiments.results.mounting import mounting_phases
 from experiments.results.run_log import FloatArray, RunLog
 
 # of the tool's way over what it presses on, where it would be hidden [m]
@@ -66,7 +65,6 @@ def collect_motion(
         _lifted(station, log["y_t"].values[frames], points),
         _region_times(station, log, frames),
         log["plate_pose"].values[frames] if "plate_pose" in log else None,
-        mounting_phases(log),
         _holder(station, raw, log, frames),
         _obstacles(station, log, frames),
     )
