@@ -89,6 +89,10 @@ class _Search:
             name, port = station.holder.measured
             measured = station.diagram.GetSubsystemByName(name).GetOutputPort(port)
             self._inputs[f"{HOLDER}joint_state"] = measured
+            force = f"{HOLDER}wrench_hold"
+            if station.diagram.HasSubsystemNamed(force):
+                held = station.diagram.GetSubsystemByName(force).GetOutputPort("held")
+                self._inputs["reaction"] = held
         self._wiring = Wiring()
 
     def part(self) -> ControllerPart:

@@ -9,7 +9,6 @@ from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.estimation.reaction import Reaction
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
-from pfsc_drake.physics.process_reaction import ProcessReaction
 from pfsc_drake.systems.block_system import BlockSystem
 
 
@@ -79,7 +78,7 @@ def add_held_reaction(
     view = BlockSystem(ToolKinematics(part.robot), period)
     builder.AddNamedSystem("workpiece_view", view)
     builder.Connect(true_state, view.GetInputPort("joint_state"))
-    true = add("process_reaction", ProcessReaction(), view.GetOutputPort("tool_pose"))
+    true = add("process_reaction", Reaction(), view.GetOutputPort("tool_pose"))
     # both robots bear the same over a tick
     hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
     builder.Connect(true.GetOutputPort("reaction"), hold.GetInputPort("value"))
