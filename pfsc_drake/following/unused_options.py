@@ -263,9 +263,7 @@ def _refuse_unused_limits(limits: MotionLimits) -> None:
 def _fixture_rules(options: FollowerOptions, law: str, followed: Followed) -> list[Rule]:
     if followed.guided is None:
         return []
-    guidance, servo = followed.guided.options.guidance, RELATIVE_DEGREE[law] == 1
-    program = guidance.rules == "program"
-    keys = ("approach_time", "braking", "push_out", "largest_speed", "tank")
+    servo = RELATIVE_DEGREE[law] == 1
     return [
         Rule(
             "tells_law",
@@ -274,9 +272,6 @@ def _fixture_rules(options: FollowerOptions, law: str, followed: Followed) -> li
         ),
         *(Rule(key, servo, "needs the law velocity_servo") for key in ("servo_lag", "servo_delay")),
         Rule("fixtures.smoothing", not servo, "needs a law that commands torques"),
-        *(Rule(f"fixtures.guidance.{key}", program, "needs rules program") for key in keys),
-        Rule("fixtures.guidance.printed", not program, "needs rules printed"),
-        Rule("fixtures.limits", program, "needs rules program"),
         *_limit_rules("fixtures.limits", followed.guided.options.limits.on),
     ]
 

@@ -89,7 +89,6 @@ OTHERS = {
     "obstacles": ObstacleOptions([ObstacleShape("person", 0.2)]),
     "measures": "joint_state",
     "frame": np.array([0.01, 0.0, 0.0, *np.eye(3).ravel()]),
-    "fixtures.guidance.rules": "printed",
     "fixtures.looks": 2,
 }
 # blocks that are changed as a whole
