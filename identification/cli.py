@@ -1,8 +1,8 @@
 """The command line: ``excite`` a robot, ``simulate`` the experiment, ``estimate`` from files.
 
 ``consistent`` writes a model, ``report`` draws the page anew, ``elastic`` tells about elastic
-joints, ``information`` about motions; ``printed`` goes from Tab. C.3 to a model. Exit status: 0
-done; 2 the input is wrong, one line on stderr; 4 results could not be written; 130 interrupted.
+joints, ``information`` about motions. Exit status: 0 done; 2 the input is wrong, one line on
+stderr; 4 results could not be written; 130 interrupted.
 """
 
 import logging
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from identification.consistency.printed import printed_command
 from identification.elastic.command import elastic_command
 from identification.options import (
     Bounds,
@@ -260,7 +259,6 @@ def report_command(
 
 
 app.command("elastic")(elastic_command)
-app.command("printed")(printed_command)
 
 
 @app.command("information")
