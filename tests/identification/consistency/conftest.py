@@ -7,10 +7,10 @@ from identification.consistency.bounds import load_bounds
 from identification.consistency.nearest import Prediction, nearest_consistent
 from identification.consistency.program import PRIOR_WEIGHT
 from identification.excitation.fourier import FourierTrajectory
-from identification.model.analytic_base import analytic_base, load_printed_identification
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.robot.models.files import models_directory
+from tests.identification.model.closed_form_base import analytic_base, load_printed_identification
 
 # for how many measurements the motion of Tab. C.2 counts: its torques then are nearer to those of
 # Tab. C.3 by a quarter to a half, for 1 % more of chi squared

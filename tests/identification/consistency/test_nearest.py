@@ -8,10 +8,10 @@ import pytest
 from identification.consistency.nearest import Prediction, nearest_consistent, refuse_far
 from identification.consistency.pseudo_inertia import pseudo_inertia, spread
 from identification.excitation.fourier import FourierTrajectory
-from identification.model.analytic_base import load_printed_identification
 from identification.model.parameters import true_parameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
+from tests.identification.model.closed_form_base import load_printed_identification
 
 # of the model that is shipped, on the motion of Tab. C.2 [Nm]
 SHIPPED_RMS = [1.20945, 0.9617923, 1.206075, 0.6125733, 0.3546599, 0.3286333]
