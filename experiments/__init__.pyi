@@ -34,4 +34,4 @@ from experiments.replay import (
 from experiments.replay import (
     Replay as Replay,
 )
-from experiments.studies.margins.told import Margins as Margins
+from experiments.studies.margins.page import Margins as Margins

@@ -12,7 +12,7 @@ from experiments.preparation import naming
 from experiments.simulated_run import run_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
-from experiments.studies.margins.told import Margins
+from experiments.studies.margins.page import Margins
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 

@@ -1,13 +1,21 @@
 """Commands that ask more of a scenario than a run: studies, margins, C, inverse kinematics."""
 
+import importlib
 import logging
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
 
+from experiments.command_options import (
+    IDENTIFICATION,
+    TEACH_IN,
+    Overrides,
+    Quiet,
+    ScenarioName,
+    read_duration,
+)
 from experiments.outcomes import (
     judge_commands,
     judge_replay,
@@ -18,40 +26,45 @@ from pfsc_drake.errors import InputError, shortened, suggestion
 from reporting.progress import ProgressDisplay
 from reporting.terminal import FAULT, interruptible, show_page
 
-if TYPE_CHECKING:
-    from reporting.page import Report
-
-from experiments.command_options import (
-    IDENTIFICATION,
-    TEACH_IN,
-    Overrides,
-    Quiet,
-    ScenarioName,
-    read_duration,
-)
-
 _LONGEST_RECORD = 600.0  # s, of a run beside an exported controller
-# what the command says of itself, by the studies' names
 _STUDIES = {
-    "robustness": "all laws on robots that are not their models",
-    "fastest": "the fastest motion on ten paths, and how near it is to the best",
-    "crossings": "300 persons who walk across a path at random",
-    "two_arms": "what must be known of a workpiece's motion, over the speed of two arms",
-    IDENTIFICATION: "from robots to their models and back",
-    TEACH_IN: "a path taught by hand, and followed",
+    "robustness": (
+        "experiments.studies.robustness.write_robustness",
+        "all laws on robots that are not their models",
+    ),
+    "fastest": (
+        "experiments.studies.fastest.write_fastest",
+        "the fastest motion on ten paths, and how near it is to the best",
+    ),
+    "crossings": (
+        "experiments.studies.crossings.write_crossings",
+        "300 persons who walk across a path at random",
+    ),
+    "two_arms": (
+        "experiments.studies.two_arms.write_two_arms",
+        "what must be known of a workpiece's motion, over the speed of two arms",
+    ),
+    IDENTIFICATION: (
+        "experiments.studies.identify.write_identification",
+        "from robots to their models and back",
+    ),
+    TEACH_IN: (
+        "experiments.teaching.teach.write_teach_in",
+        "a path taught by hand, and followed",
+    ),
 }
 
 
 def _complete_study(incomplete: str) -> list[tuple[str, str]]:
     """Return the studies whose names go on like this, with what they are."""
-    return [(name, said) for name, said in _STUDIES.items() if name.startswith(incomplete)]
+    return [(name, text) for name, (_, text) in _STUDIES.items() if name.startswith(incomplete)]
 
 
 def study_command(
     name: Annotated[
         str,
         typer.Argument(
-            help="; ".join(f"{name}: {said}" for name, said in _STUDIES.items()) + ".",
+            help="; ".join(f"{name}: {text}" for name, (_, text) in _STUDIES.items()) + ".",
             autocompletion=_complete_study,
         ),
     ],
@@ -62,25 +75,12 @@ def study_command(
     if name not in _STUDIES:
         allowed = ", ".join(_STUDIES)
         raise InputError(f"study {shortened(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
-    from experiments.studies.crossings import write_crossings
-    from experiments.studies.fastest import write_fastest
-    from experiments.studies.identify import write_identification
-    from experiments.studies.robustness import write_robustness
-    from experiments.studies.two_arms import write_two_arms
-    from experiments.teaching.teach import write_teach_in
-
-    studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
-        "robustness": write_robustness,
-        "fastest": write_fastest,
-        "crossings": write_crossings,
-        "two_arms": write_two_arms,
-        IDENTIFICATION: write_identification,
-        TEACH_IN: write_teach_in,
-    }
+    module, _, function = _STUDIES[name][0].rpartition(".")
+    write = getattr(importlib.import_module(module), function)
     with interruptible():
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console(quiet=quiet)
-        report = studies[name](
+        report = write(
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
         )
         raise typer.Exit(show_page("study", report))
