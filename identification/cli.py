@@ -76,7 +76,7 @@ def excite_command(
 ) -> None:
     """Find a motion that shows all parameters within all limits."""
     from identification.excitation.limits import chosen_limits
-    from identification.excitation.search import search
+    from identification.excitation.search import SearchOptions, search
     from identification.steps import RECORDING, check_duration, save_excitation
 
     with interruptible():
@@ -91,9 +91,8 @@ def excite_command(
         )
         numbers = [read_integer(number, "--harmonics") for number in harmonics.split(",")]
         with fraction_display(console, "excitation") as progress:
-            found = search(
-                subject, criterion, numbers, period, starts, seed, within, cell, progress=progress
-            )
+            options = SearchOptions(criterion, numbers, period, starts, seed)
+            found = search(subject, options, within, cell, progress)
         save_excitation(subject, found, folder, periods, within)
         console.print(
             f"log det {found.information.log_determinant:.2f}, condition number "
@@ -135,7 +134,8 @@ def simulate_command(
         faults = shipped_imperfections(subject.family)
         faults = faults.realistic() if realistic else faults
         with fraction_display(console, "experiment") as progress:
-            files = simulate_runs(subject, robot, trajectory, faults, folder, runs, seed, progress)
+            seeds = range(seed, seed + runs)
+            files = simulate_runs(subject, robot, trajectory, faults, folder, seeds, progress)
         for file in files:
             console.print(str(file), soft_wrap=True, highlight=False)
 
@@ -165,10 +165,9 @@ def estimate_command(
     tool: Tool = False,
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
-    from identification.measured_files import MeasuredFiles
     from identification.pages import write_identification
     from identification.report.page import parameter_table, torque_table
-    from identification.steps import estimate_files
+    from identification.steps import MeasuredFiles, estimate_files
     from reporting.terminal import print_table
 
     with interruptible():
