@@ -57,7 +57,7 @@ myst_heading_anchors = 4
 suppress_warnings = ["myst-nb.lexer"]
 nb_execution_mode = "off" if os.environ.get("PFSC_NOTEBOOKS") == "off" else "cache"
 nb_execution_cache_path = str(ROOT / "docs" / "tutorials" / "out" / "notebooks")
-nb_execution_timeout = 300
+nb_execution_timeout = 900  # s, of a cell
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 

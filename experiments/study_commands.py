@@ -1,14 +1,22 @@
 """Commands that ask more of a scenario than a run: studies, margins, C, inverse kinematics."""
 
+import importlib
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
 
+from experiments.command_options import (
+    IDENTIFICATION,
+    TEACH_IN,
+    Overrides,
+    Quiet,
+    ScenarioName,
+    read_duration,
+)
 from experiments.outcomes import (
     judge_commands,
     judge_replay,
@@ -19,87 +27,61 @@ from pfsc_drake.errors import InputError, shortened, suggestion
 from reporting.progress import ProgressDisplay
 from reporting.terminal import FAULT, interruptible, show_page
 
-if TYPE_CHECKING:
-    from reporting.page import Report
-
-from experiments.command_options import (
-    IDENTIFICATION,
-    TEACH_IN,
-    Overrides,
-    Quiet,
-    ScenarioName,
-    read_duration,
-)
-
-# what the command says of itself, by the studies' names
 _LONGEST_RECORD = 600.0  # s, of a run beside an exported controller
 _STUDIES = {
-    "stiffness": "which law when, all laws on joints of rising stiffness",
-    "robustness": "all laws on robots that are not their models",
-    "tracking": "path following against trajectory tracking",
-    "joint_sides": "elastic joints of which both sides, torques, or motors alone are measured",
-    "fixture_rules": "printed rules of forbidden regions against the program at an acute edge",
-    "teleoperation": "couplings of leader and follower over a channel: felt, stable, passive",
-    "fastest": "the fastest motion on ten paths, and how near it is to the best",
-    "crossings": "300 persons who walk across a path at random",
-    "two_arms": "what must be known of a workpiece's motion, over the speed of two arms",
-    "peers": "path following beside impedance control and Toppra",
-    IDENTIFICATION: "from robots to their models and back",
-    TEACH_IN: "a path taught by hand, and followed",
+    "robustness": (
+        "experiments.studies.robustness.write_robustness",
+        "all laws on robots that are not their models",
+    ),
+    "fastest": (
+        "experiments.studies.fastest.write_fastest",
+        "the fastest motion on ten paths, and how near it is to the best",
+    ),
+    "crossings": (
+        "experiments.studies.crossings.write_crossings",
+        "300 persons who walk across a path at random",
+    ),
+    "two_arms": (
+        "experiments.studies.two_arms.write_two_arms",
+        "what must be known of a workpiece's motion, over the speed of two arms",
+    ),
+    IDENTIFICATION: (
+        "experiments.studies.identify.write_identification",
+        "from robots to their models and back",
+    ),
+    TEACH_IN: (
+        "experiments.teaching.teach.write_teach_in",
+        "a path taught by hand, and followed",
+    ),
 }
 
 
 def _complete_study(incomplete: str) -> list[tuple[str, str]]:
     """Return the studies whose names go on like this, with what they are."""
-    return [(name, said) for name, said in _STUDIES.items() if name.startswith(incomplete)]
+    return [(name, text) for name, (_, text) in _STUDIES.items() if name.startswith(incomplete)]
 
 
 def study_command(
     name: Annotated[
         str,
         typer.Argument(
-            help="; ".join(f"{name}: {said}" for name, said in _STUDIES.items()) + ".",
+            help="; ".join(f"{name}: {text}" for name, (_, text) in _STUDIES.items()) + ".",
             autocompletion=_complete_study,
         ),
-    ] = "stiffness",
+    ],
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
     quiet: Quiet = False,
 ) -> None:
-    """Many runs on one page, on all cores: one minute (stiffness) to ten."""
+    """Many runs on one page, on all cores, in minutes; further studies are pages of the site."""
     if name not in _STUDIES:
         allowed = ", ".join(_STUDIES)
         raise InputError(f"study {shortened(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
-    from experiments.studies.crossings import write_crossings
-    from experiments.studies.fastest import write_fastest
-    from experiments.studies.fixture_rules import write_fixture_rules
-    from experiments.studies.identify import write_identification
-    from experiments.studies.joint_sides import write_joint_sides
-    from experiments.studies.peers.study import write_peers
-    from experiments.studies.robustness import write_robustness
-    from experiments.studies.stiffness import write_study
-    from experiments.studies.teleoperation.study import write_teleoperation
-    from experiments.studies.tracking import write_tracking
-    from experiments.studies.two_arms import write_two_arms
-    from experiments.teaching.teach import write_teach_in
-
-    studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
-        "stiffness": write_study,
-        "robustness": write_robustness,
-        "tracking": write_tracking,
-        "joint_sides": write_joint_sides,
-        "fixture_rules": write_fixture_rules,
-        "teleoperation": write_teleoperation,
-        "fastest": write_fastest,
-        "crossings": write_crossings,
-        "two_arms": write_two_arms,
-        "peers": write_peers,
-        IDENTIFICATION: write_identification,
-        TEACH_IN: write_teach_in,
-    }
+    module, _, function = _STUDIES[name][0].rpartition(".")
+    write = getattr(importlib.import_module(module), function)
     with interruptible():
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console(quiet=quiet)
-        report = studies[name](
+        report = write(
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
         )
         raise typer.Exit(show_page("study", report))

@@ -15,7 +15,6 @@ from identification.consistency.writing import WrittenModel
 from identification.estimation.least_squares import Estimate
 from identification.estimation.validation import refuse_implausible
 from identification.findings import Findings
-from identification.measured_files import MeasuredFiles
 from identification.measurement.columns import Reading
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
@@ -23,6 +22,7 @@ from identification.options import check_folder
 from identification.pages import write_identification
 from identification.report.page import torque_table
 from identification.steps import (
+    MeasuredFiles,
     bounds_of,
     consistent_set,
     estimate_files,
@@ -120,7 +120,8 @@ def simulate(
     faults = shipped_imperfections(subject.family)
     faults = faults.realistic() if realistic else faults
     with _progress("experiment", quiet) as progress:
-        return simulate_runs(subject, robot, trajectory, faults, folder, runs, seed, progress)
+        seeds = range(seed, seed + runs)
+        return simulate_runs(subject, robot, trajectory, faults, folder, seeds, progress)
 
 
 def estimate(

@@ -1,8 +1,8 @@
 """The command line: ``excite`` a robot, ``simulate`` the experiment, ``estimate`` from files.
 
 ``consistent`` writes a model, ``report`` draws the page anew, ``elastic`` tells about elastic
-joints, ``information`` about motions; ``printed`` goes from Tab. C.3 to a model. Exit status: 0
-done; 2 the input is wrong, one line on stderr; 4 results could not be written; 130 interrupted.
+joints, ``information`` about motions. Exit status: 0 done; 2 the input is wrong, one line on
+stderr; 4 results could not be written; 130 interrupted.
 """
 
 import logging
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from identification.consistency.printed import printed_command
 from identification.elastic.command import elastic_command
 from identification.options import (
     Bounds,
@@ -77,7 +76,7 @@ def excite_command(
 ) -> None:
     """Find a motion that shows all parameters within all limits."""
     from identification.excitation.limits import chosen_limits
-    from identification.excitation.search import search
+    from identification.excitation.search import SearchOptions, search
     from identification.steps import RECORDING, check_duration, save_excitation
 
     with interruptible():
@@ -92,9 +91,8 @@ def excite_command(
         )
         numbers = [read_integer(number, "--harmonics") for number in harmonics.split(",")]
         with fraction_display(console, "excitation") as progress:
-            found = search(
-                subject, criterion, numbers, period, starts, seed, within, cell, progress=progress
-            )
+            options = SearchOptions(criterion, numbers, period, starts, seed)
+            found = search(subject, options, within, cell, progress)
         save_excitation(subject, found, folder, periods, within)
         console.print(
             f"log det {found.information.log_determinant:.2f}, condition number "
@@ -136,7 +134,8 @@ def simulate_command(
         faults = shipped_imperfections(subject.family)
         faults = faults.realistic() if realistic else faults
         with fraction_display(console, "experiment") as progress:
-            files = simulate_runs(subject, robot, trajectory, faults, folder, runs, seed, progress)
+            seeds = range(seed, seed + runs)
+            files = simulate_runs(subject, robot, trajectory, faults, folder, seeds, progress)
         for file in files:
             console.print(str(file), soft_wrap=True, highlight=False)
 
@@ -166,10 +165,9 @@ def estimate_command(
     tool: Tool = False,
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
-    from identification.measured_files import MeasuredFiles
     from identification.pages import write_identification
     from identification.report.page import parameter_table, torque_table
-    from identification.steps import estimate_files
+    from identification.steps import MeasuredFiles, estimate_files
     from reporting.terminal import print_table
 
     with interruptible():
@@ -260,7 +258,6 @@ def report_command(
 
 
 app.command("elastic")(elastic_command)
-app.command("printed")(printed_command)
 
 
 @app.command("information")

@@ -1,13 +1,15 @@
 """The steps of an identification on files, as the command line has them."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from identification.consistency.bounds import PhysicalBounds, load_bounds
 from identification.consistency.nearest import ConsistentParameters, estimate_consistent
 from identification.consistency.writing import WrittenModel, write_model
-from identification.estimation.repetitions import Repetitions
-from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
+from identification.estimation.residuals import choose_bandwidth
+from identification.estimation.results import FILE_NAME, load_estimate
 from identification.estimation.validation import predict, refuse_implausible
 from identification.estimation.wiring import unchecked
 from identification.excitation.fourier import FourierTrajectory
@@ -17,12 +19,12 @@ from identification.excitation.run_in import rest_to_rest
 from identification.excitation.scene import cell_of
 from identification.excitation.search import SearchResult
 from identification.findings import Findings, find_consistent, find_parameters, true_base
-from identification.measured_files import MeasuredFiles
-from identification.measurement.experiment import run_experiment
-from identification.measurement.files import write_record
+from identification.measurement.columns import Reading
+from identification.measurement.experiment import prepare_motion, run_experiment
+from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.periods import AveragedMotion
-from identification.model.base import base_parameters
+from identification.model.base import BaseParameters, base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
@@ -107,23 +109,13 @@ def shipped_excitations(subject: Subject) -> list[Path]:
     return files
 
 
-@dataclass(frozen=True)
-class _Experiment:
-    robot: str
-    tool: bool
-    trajectory: FourierTrajectory
-    imperfections: Imperfections | None
-    folder: Path
-
-
 def simulate_runs(
     subject: Subject,
     robot: str,
     trajectory: FourierTrajectory,
     imperfections: Imperfections | None,
     folder: Path,
-    runs: int,
-    seed: int,
+    seeds: range,
     progress: Progress,
 ) -> list[Path]:
     """Simulate an experiment several times, and return the files with what was measured.
@@ -136,28 +128,27 @@ def simulate_runs(
         trajectory: The excitation.
         imperfections: Imperfections of all runs; None for those shipped with the robot.
         folder: Where to write; made if it is not there.
-        runs: How many.
-        seed: Seed of the first one.
-        progress: Told the fraction done and what is done.
+        seeds: Seed of each run.
+        progress: Receives the fraction done and what is done.
     """
     make_folder(folder)
+    runs = len(seeds)
     if runs == 1:
-        return [_run(subject, trajectory, imperfections, folder, seed, progress)]
-    experiment = _Experiment(robot, subject.tool, trajectory, imperfections, folder)
+        return [_run(subject, trajectory, imperfections, folder, seeds[0], progress)]
     progress(0.0, f"simulating {runs} runs")
+    simulate = partial(_run, trajectory=trajectory, imperfections=imperfections, folder=folder)
     files = []
     with side_by_side(None, runs) as run:
-        for file in run(_simulate, experiment, range(seed, seed + runs)):
+        for file in run(_simulate, (robot, subject.tool, simulate), seeds):
             files.append(file)
             progress(len(files) / runs, f"{len(files)} of {runs} runs")
     return sorted(files, key=lambda file: int(file.stem.split("_")[1]))
 
 
-def _simulate(experiment: _Experiment, seed: int) -> Path:
-    """Simulate a run in a process of its own."""
-    subject = load_subject(experiment.robot, tool=experiment.tool)
-    trajectory, faults = experiment.trajectory, experiment.imperfections
-    return _run(subject, trajectory, faults, experiment.folder, seed, lambda _, __: None)
+def _simulate(experiment: tuple[str, bool, Callable[..., Path]], seed: int) -> Path:
+    """Simulate a run in a process of its own, which loads the robot anew."""
+    robot, tool, simulate = experiment
+    return simulate(load_subject(robot, tool=tool), seed=seed, progress=lambda _, __: None)
 
 
 def _run(
@@ -172,6 +163,67 @@ def _run(
     file = folder / f"run_{seed}.h5"
     write_record(file, measured.record, subject)
     return file
+
+
+@dataclass(frozen=True)
+class MeasuredFiles:
+    """Files with measured motions, and how they are read.
+
+    Attributes:
+        records: Runs of one excitation.
+        validation: Measurement of another motion, which is not used to estimate.
+        reading: What files say in other words or not at all.
+        period: Period of the excitation [s], if files do not state it.
+        skip: Periods at the start that are left out.
+        bandwidth_hz: Bandwidth of the motion [Hz]; by default the least with which the model
+            explains the torques of the first record as well as with any.
+    """
+
+    records: Sequence[Path]
+    validation: Path | None = None
+    reading: Reading = field(default_factory=Reading)
+    period: float | None = None
+    skip: int = 1
+    bandwidth_hz: float | None = None
+
+    @property
+    def paths(self) -> list[Path]:
+        """All files, that of the other motion last."""
+        return [*self.records, *([self.validation] if self.validation else [])]
+
+    def motions(
+        self, regressor: Regressor, base: BaseParameters, progress: Progress
+    ) -> tuple[list[AveragedMotion], AveragedMotion | None]:
+        """Return the motions that are used, and the one that is not.
+
+        Args:
+            regressor: Of the robot.
+            base: Its base parameters.
+            progress: Told the fraction done and what is done.
+
+        Raises:
+            InputError: If there is no record, or a file does not tell what is needed.
+        """
+        if not self.records:
+            raise InputError("estimate: no record; at least one is required")
+        bandwidth_hz, motions = self.bandwidth_hz, []
+        for k, path in enumerate(self.paths):
+            progress(k / len(self.paths), f"reading {path.name}")
+            record = read_record(path, regressor.subject, self.period, self.reading)
+            if bandwidth_hz is None:
+                bandwidth_hz = choose_bandwidth(
+                    regressor,
+                    base,
+                    record,
+                    self.period,
+                    self.skip,
+                    lambda _, phase: progress(0.0, phase),
+                ).bandwidth_hz
+            motions.append(
+                prepare_motion(record, regressor, base, skip=self.skip, bandwidth_hz=bandwidth_hz)
+            )
+        other = motions.pop() if self.validation is not None else None
+        return motions, other
 
 
 def estimate_files(
@@ -225,30 +277,14 @@ def stored_findings(
     Raises:
         InputError: If the file cannot be read, or is of another robot.
     """
-    stored = load_stored(subject, path)
-    first = stored.estimate
-    runs = [first] + [
-        replace(first, base_parameters=values, covariance=covariance)
-        for values, covariance in zip(
-            stored.repeated[1:], stored.repeated_covariance[1:], strict=True
-        )
-    ]
+    file = path / FILE_NAME if path.is_dir() else path
+    runs = load_estimate(file)
+    first = runs.estimates[0]
+    if first.robot != subject.name:
+        raise InputError(f"{file}: of {first.robot}; must be of {subject.name}")
     prediction = None if other is None else predict(first, Regressor(subject), other)
     truth = true_base(first, true_parameters(subject)) if simulated else None
-    return Findings(Repetitions(tuple(runs)), None, prediction, truth)
-
-
-def load_stored(subject: Subject, path: Path) -> StoredIdentification:
-    """Return the content of ``identification.h5`` of a robot.
-
-    Raises:
-        InputError: If the file cannot be read, or is of another robot.
-    """
-    file = path / FILE_NAME if path.is_dir() else path
-    stored = load_estimate(file)
-    if stored.estimate.robot != subject.name:
-        raise InputError(f"{file}: of {stored.estimate.robot}; must be of {subject.name}")
-    return stored
+    return Findings(runs, None, prediction, truth)
 
 
 def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:

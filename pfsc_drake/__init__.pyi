@@ -25,9 +25,6 @@ from pfsc_drake.control.fixtures.parameters import (
     GuidanceParameters as GuidanceParameters,
 )
 from pfsc_drake.control.fixtures.parameters import (
-    PrintedParameters as PrintedParameters,
-)
-from pfsc_drake.control.fixtures.parameters import (
     RobotLimitParameters as RobotLimitParameters,
 )
 from pfsc_drake.control.fixtures.parameters import (

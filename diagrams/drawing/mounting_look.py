@@ -1,6 +1,5 @@
 """What plates, gripper, magazine and frame look like."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +7,6 @@ from pydrake.geometry import Box, Cylinder, Meshcat, Rgba
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.drawing.tour import Stage
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import PAD, Mounting, pin_shape
 from pfsc_drake.geometry.workpiece_bodies import bore_wedges
@@ -146,54 +144,3 @@ def ring_surface(wedges: np.ndarray) -> Triangles:
     triangles = np.concatenate([pairs, pairs[:, ::-1]])
     offsets = 8 * np.arange(len(wedges))[:, np.newaxis, np.newaxis]
     return Triangles(wedges.reshape(-1, 3), (offsets + triangles).reshape(-1, 3))
-
-
-# what each phase of mounting is, and whether it is at the magazine or the frame
-_PHASES = {
-    "grip": (
-        "Grip: the cups are pressed onto a plate in the magazine until they hold.",
-        "magazine",
-    ),
-    "lead": ("Lead: the plate is led along the path to the frame.", None),
-    "align": ("Align: above the bores, until the pins are seen to be over them.", "frame"),
-    "insert": ("Insert: the pins are felt into their bores, and the bores lead.", "frame"),
-    "release": ("Release: the vacuum ends.", "frame"),
-    "leave": ("Leave: the gripper is pulled back.", "frame"),
-    "done": ("Done.", "frame"),
-}
-# as seen along the plate, how far above it, and from how far [m]
-_TURN, _ELEVATION = np.deg2rad(35.0), np.deg2rad(14.0)
-_FAR, _NEAR = 0.3, 0.1
-_CLOSE = ("insert",)
-
-
-def mounting_stages(mounting: Mounting, phases: Sequence[tuple[float, str]]) -> list[Stage]:
-    """Return the stages of a recording: what is done, and a view of where it is done.
-
-    Args:
-        mounting: Where magazine and frame stand.
-        phases: When which phase begins [s].
-    """
-    carriers = {"magazine": mounting.X_WM, "frame": mounting.X_WF}
-    stages = []
-    for time, name in phases:
-        text, where = _PHASES[name]
-        camera = target = None
-        if where is not None:
-            camera, target = _view(mounting.parameters, carriers[where], near=name in _CLOSE)
-        stages.append(Stage(time, name, text, camera, target))
-    return stages
-
-
-def _view(
-    plate: PlateParameters, X_WC: RigidTransform, *, near: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a camera stands and looks: at a carrier, or at the pin that is next to it."""
-    z = X_WC.rotation().col(2)
-    away = X_WC.translation() - (X_WC.translation() @ z) * z  # from the robot, at the origin
-    away /= np.linalg.norm(away)
-    aside = np.cos(_TURN) * away + np.sin(_TURN) * np.cross(z, away)
-    view = np.cos(_ELEVATION) * aside - np.sin(_ELEVATION) * z
-    roots = [X_WC.multiply(np.array([x, y, plate.size[2]])) for x, y in plate.pins.positions]
-    target = max(roots, key=lambda p: float(p @ aside)) if near else np.mean(roots, axis=0)
-    return target + (_NEAR if near else _FAR) * view, target

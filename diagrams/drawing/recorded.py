@@ -78,7 +78,6 @@ class RecordedMotion:
         trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
         region_clock: Region clock of regions that move [s], shape (frames,).
         plates: ``[p, R by rows]`` of K plates, shape (frames, 12 K).
-        phases: When which phase of their mounting begins [s].
         held: What a robot does that holds the workpiece; ``tool_pose``, ``manifold_point`` and
             ``trail`` are then seen from the workpiece's frame.
         obstacles: What moves across the path.
@@ -95,6 +94,5 @@ class RecordedMotion:
     trail: np.ndarray | None = None
     region_clock: np.ndarray | None = None
     plates: np.ndarray | None = None
-    phases: Sequence[tuple[float, str]] = ()
     held: RecordedHolder | None = None
     obstacles: RecordedObstacles | None = None

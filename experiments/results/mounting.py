@@ -64,22 +64,6 @@ def release_time(log: RunLog) -> float:
     return _first(log.time, ~held & np.append(False, held[:-1]))
 
 
-def mounting_phases(log: RunLog) -> list[tuple[float, str]]:
-    """Return when which phase of mounting begins [s], none without ``seat_gap``.
-
-    Phases are the operator's; without one, a plate is led, inserted and released.
-    """
-    if "seat_gap" not in log or log.time.size == 0:
-        return []
-    if "phase" in log:
-        phase, names = log["phase"].values[:, 0], log["phase"].labels
-        begins = np.flatnonzero(np.diff(phase, prepend=-1))
-        return [(float(log.time[k]), names[int(phase[k])]) for k in begins]
-    events = {"insert": time_to_frame(log), "release": release_time(log)}
-    known = [(time, name) for name, time in events.items() if math.isfinite(time)]
-    return [(float(log.time[0]), "lead"), *known]
-
-
 def mounting_metrics(log: RunLog) -> Metrics:
     """Return the metrics of mounting, none without ``seat_gap``."""
     metrics = Metrics()

@@ -14,7 +14,6 @@ from diagrams.drawing.recorded import (
 from diagrams.holder_station import HOLDER
 from diagrams.station import Station
 from experiments.results.guidance import region_times
-from experiments.results.mounting import mounting_phases
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.following.tasks.space_task import SpaceTask
 
@@ -66,7 +65,6 @@ def collect_motion(
         _lifted(station, log["y_t"].values[frames], points),
         _region_times(station, log, frames),
         log["plate_pose"].values[frames] if "plate_pose" in log else None,
-        mounting_phases(log),
         _holder(station, raw, log, frames),
         _obstacles(station, log, frames),
     )

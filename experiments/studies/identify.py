@@ -15,15 +15,15 @@ from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import JointLimits, chosen_limits
-from identification.excitation.search import search
+from identification.excitation.search import SearchOptions, search
 from identification.findings import Findings
-from identification.measured_files import MeasuredFiles
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
 from identification.report.page import PageContent, write_page
 from identification.steps import (
     EXCITATION,
     RECORDING,
+    MeasuredFiles,
     bounds_of,
     consistent_set,
     estimate_files,
@@ -165,16 +165,17 @@ def _identify(circle: CircularRun, out: Path, progress: Callable[[str], None]) -
     with open_results(out, "identification") as results:
         say = _stepwise(circle.robot, progress)
         limits = chosen_limits(subject, circle.limits)
-        found = search(subject, starts=circle.starts, seed=_SEED, limits=limits, progress=say)
+        found = search(
+            subject, SearchOptions(starts=circle.starts, seed=_SEED), limits, progress=say
+        )
         page = save_excitation(subject, found, out / "excitation", 5, limits)
         other = _other_motion(subject, circle, limits, say)
         faults = shipped_imperfections(subject.family).realistic()
         trajectory = FourierTrajectory.load(out / "excitation" / EXCITATION)
         name = circle.robot
-        records = simulate_runs(
-            subject, name, trajectory, faults, out / "runs", circle.runs, _SEED, say
-        )
-        unused = simulate_runs(subject, name, other, faults, out / "validation", 1, 100, say)[0]
+        seeds, runs, validation = range(_SEED, _SEED + circle.runs), out / "runs", range(100, 101)
+        records = simulate_runs(subject, name, trajectory, faults, runs, seeds, say)
+        (unused,) = simulate_runs(subject, name, other, faults, out / "validation", validation, say)
         findings, motion = estimate_files(
             subject, MeasuredFiles(records, unused), simulated=True, progress=say
         )
@@ -211,7 +212,9 @@ def _other_motion(
 ) -> FourierTrajectory:
     if circle.validation:
         return FourierTrajectory.load(shipped_excitation(subject.family, circle.validation))
-    found = search(subject, starts=1, seed=100, limits=limits, iterations=40, progress=progress)
+    found = search(
+        subject, SearchOptions(starts=1, seed=100, iterations=40), limits, progress=progress
+    )
     return found.trajectory
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from identification.consistency.pseudo_inertia import Layout, linear_terms
-from identification.model.analytic_base import shipped_or_own
 from identification.model.parameters import LINK_PARAMETERS, PER_LINK
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.yaml.typed import REQUIRED, load_file
 
@@ -279,3 +279,23 @@ def check_bounds(layout: Layout, bounds: PhysicalBounds) -> None:
     there = "a DELTA robot" if layout.is_delta else f"{len(layout.links)} links"
     if given != there:
         raise InputError(f"bounds of {bounds.name}: {given}; must be {there}")
+
+
+def shipped_or_own(robot: str | Path, name: str) -> Path:
+    """Return a file that is shipped with a robot, or a user's own.
+
+    Args:
+        robot: Name of a shipped robot, or a file.
+        name: Name of the shipped file.
+
+    Raises:
+        InputError: If there is no such file with the robot.
+    """
+    path = Path(robot)
+    if path.suffix:
+        return path
+    path = models_directory() / path / name
+    if not path.is_file():
+        known = sorted(file.parent.name for file in models_directory().glob(f"*/{name}"))
+        raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
+    return path

@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from identification.consistency.pseudo_inertia import Layout, pseudo_inertia
-from identification.model.analytic_base import moved
-from identification.model.parameters import link_moments, link_parameters, parameter_names
+from identification.model.parameters import (
+    link_moments,
+    link_parameters,
+    moved,
+    parameter_names,
+)
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.parameters import DeltaParameters

@@ -23,7 +23,7 @@ friction: ``joints`` (from 1), ``kinds``, ``widths`` (NaN without).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -63,21 +63,6 @@ class StoredMotion:
     t: np.ndarray | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class StoredIdentification:
-    """Content of ``identification.h5``.
-
-    Attributes:
-        estimate: The estimate.
-        repeated: Base parameters of repetitions, shape (R, n_b); R may be 0.
-        repeated_covariance: Their covariances, shape (R, n_b, n_b).
-    """
-
-    estimate: Estimate
-    repeated: np.ndarray
-    repeated_covariance: np.ndarray
-
-
 def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None = None) -> None:
     """Write ``identification.h5``.
 
@@ -99,8 +84,8 @@ def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None
     write_bytes(Path(path), content.getvalue())
 
 
-def load_estimate(path: str | Path) -> StoredIdentification:
-    """Read ``identification.h5``.
+def load_estimate(path: str | Path) -> Repetitions:
+    """Read the estimates of ``identification.h5``, of which the first alone has its system.
 
     Args:
         path: Path of a file that :func:`save_estimate` wrote.
@@ -157,7 +142,7 @@ def _set_words(attributes: h5py.AttributeManager, key: str, words: Sequence[str]
     attributes.create(key, list(words), shape=(len(words),), dtype=h5py.string_dtype())
 
 
-def _read(file: h5py.File) -> StoredIdentification:
+def _read(file: h5py.File) -> Repetitions:
     matrix = _numbers(file, "regressor", 3)
     samples, joints, size = matrix.shape
     projection = _numbers(file, "projection", 2)
@@ -199,12 +184,16 @@ def _read(file: h5py.File) -> StoredIdentification:
         system,
         factorize(*system.weighted(), base.short_names, robot),
     )
-    repeated = np.empty((0, size)), np.empty((0, size, size))
+    runs = [estimate]
     if "repetitions" in file:
-        runs = _numbers(file["repetitions"], "base_parameters", 2)
-        shape = (len(runs), size, size)
-        repeated = runs, _numbers(file["repetitions"], "covariance", 3, shape)
-    return StoredIdentification(estimate, *repeated)
+        values = _numbers(file["repetitions"], "base_parameters", 2)
+        shape = (len(values), size, size)
+        covariances = _numbers(file["repetitions"], "covariance", 3, shape)
+        runs += [
+            replace(estimate, base_parameters=value, covariance=covariance)
+            for value, covariance in zip(values[1:], covariances[1:], strict=True)
+        ]
+    return Repetitions(tuple(runs))
 
 
 def _friction(attributes: h5py.AttributeManager) -> FrictionTerms:

@@ -75,24 +75,11 @@ class SearchResult:
         }
 
 
-def search(
-    subject: Subject,
-    criterion: str = "D",
-    harmonics: Sequence[int] = (1, 3, 5),
-    period: float = 10.0,
-    starts: int = 16,
-    seed: int = 0,
-    limits: JointLimits | Mapping[str, Given] | None = None,
-    cell: Cell | str | Path | None = None,
-    *,
-    iterations: int = 120,
-    workers: int | None = None,
-    progress: Progress | None = None,
-) -> SearchResult:
-    """Return an excitation that shows the base parameters of a robot as well as possible.
+@dataclass(frozen=True)
+class SearchOptions:
+    """How an excitation is searched for.
 
-    Args:
-        subject: The robot.
+    Attributes:
         criterion: ``D`` for the largest ``log det(X^T X)`` (2.79), ``condition`` for the smallest
             condition number of X.
         harmonics: Multiples of the fundamental frequency in use.
@@ -100,19 +87,43 @@ def search(
         starts: Number of motions to start from: half of them random, the others in two rounds near
             the best ones that have been found.
         seed: Seed of the first of them.
-        limits: Limits of the joints where not those of the model, see
-            :func:`~identification.excitation.limits.chosen_limits`.
-        cell: What stands around a serial robot; None for what is shipped with it.
         iterations: Iterations of the solver per start, at most; a quarter of them whenever it goes
             on.
         workers: Number of processes; one for each core by default, 1 for no others than this.
-        progress: Told the fraction done and the best figure so far.
+    """
+
+    criterion: str = "D"
+    harmonics: Sequence[int] = (1, 3, 5)
+    period: float = 10.0
+    starts: int = 16
+    seed: int = 0
+    iterations: int = 120
+    workers: int | None = None
+
+
+def search(
+    subject: Subject,
+    options: SearchOptions | None = None,
+    limits: JointLimits | Mapping[str, Given] | None = None,
+    cell: Cell | str | Path | None = None,
+    progress: Progress | None = None,
+) -> SearchResult:
+    """Return an excitation that shows the base parameters of a robot as well as possible.
+
+    Args:
+        subject: The robot.
+        options: How it is searched for.
+        limits: Limits of the joints where not those of the model, see
+            :func:`~identification.excitation.limits.chosen_limits`.
+        cell: What stands around a serial robot; None for what is shipped with it.
+        progress: Receives the fraction done and the best figure so far.
 
     Raises:
         InputError: If a value is out of range, the harmonics do not show all parameters, or no
             motion keeps all limits.
     """
-    begin = time.perf_counter()
+    begin, options = time.perf_counter(), options or SearchOptions()
+    criterion, starts, iterations = options.criterion, options.starts, options.iterations
     if starts < 1 or iterations < 1:
         raise InputError(f"starts = {starts}, iterations = {iterations}; must be 1 or more")
     tell = progress or (lambda fraction, phase: None)
@@ -124,8 +135,8 @@ def search(
     problem = excitation_problem(
         subject,
         replace(joints, effort=_EFFORT * joints.effort),
-        period=period,
-        harmonics=tuple(harmonics),
+        period=options.period,
+        harmonics=tuple(options.harmonics),
         criterion=criterion,
         cell=cell if is_serial else None,
         scene=scene,
@@ -137,12 +148,11 @@ def search(
     check_excited(subject, problem, base)
     narrower = tightened(problem, _SHARE, {}, _MARGIN)
     found: list[LocalOptimum] = []
-    with side_by_side(workers, starts) as run:
+    with side_by_side(options.workers, starts) as run:
         for count in (starts - 2 * (starts // 4), starts // 4, starts // 4):
             near: list[np.ndarray | None] = [o.coefficients for o in found[:_BEST]] or [None]
-            tasks = [
-                _Start(seed + len(found) + i, iterations, near[i % len(near)]) for i in range(count)
-            ]
+            first = options.seed + len(found)
+            tasks = [(first + i, iterations, near[i % len(near)]) for i in range(count)]
             for optimum in run(_search_from, narrower, tasks):
                 found.append(optimum)
                 best = _said(criterion, min(found, key=_rank).value)
@@ -163,23 +173,11 @@ def search(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Start:
-    """Where a local search starts.
-
-    Attributes:
-        seed: Seed of the random motion.
-        iterations: Iterations of the solver.
-        near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or None.
-    """
-
-    seed: int
-    iterations: int
-    near: np.ndarray | None
-
-
-def _search_from(problem: ExcitationProblem, start: _Start) -> LocalOptimum:
-    return LocalSearch(problem).run(start.seed, start.iterations, start.near)
+def _search_from(
+    problem: ExcitationProblem, start: tuple[int, int, np.ndarray | None]
+) -> LocalOptimum:
+    """Search from a seed, by a number of iterations, near to coefficients or nowhere."""
+    return LocalSearch(problem).run(*start)
 
 
 def _unchecked(subject: Subject, cell: Cell, scene: RobotScene | None) -> list[str]:

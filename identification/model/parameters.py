@@ -130,3 +130,22 @@ def link_moments(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]
     inertia = np.zeros((3, 3))
     inertia[_ROWS, _COLUMNS] = inertia[_COLUMNS, _ROWS] = parameters[4:]
     return float(parameters[0]), np.array(parameters[1:4]), inertia
+
+
+def moved(parameters: np.ndarray, R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Return the ten parameters of a body about another frame, shape (10,).
+
+    Args:
+        parameters: About frame L, shape (10,).
+        R: Orientation of L in the other frame, shape (3, 3).
+        p: Origin of L in the other frame [m], shape (3,).
+    """
+    mass, moment, inertia = link_moments(parameters)
+    turned, S_p = R @ moment, _skew(p)
+    S_m = _skew(turned)
+    about = R @ inertia @ R.T - mass * S_p @ S_p - S_p @ S_m - S_m @ S_p
+    return from_moments(mass, turned + mass * p, about)
+
+
+def _skew(p: np.ndarray) -> np.ndarray:
+    return np.array([[0.0, -p[2], p[1]], [p[2], 0.0, -p[0]], [-p[1], p[0], 0.0]])

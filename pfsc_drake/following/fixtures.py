@@ -13,7 +13,6 @@ from pfsc_drake.control.fixtures.guides import GuidePaths
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.near_regions import ScheduledRegions, near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance
-from pfsc_drake.control.fixtures.printed import PrintedGuidance
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.manifolds.coordinate import Kind
@@ -144,18 +143,6 @@ def make_guidance(
         len(task.place.coordinates),
         GuidePaths([*task.guides.values()], task.admittance.period) if task.guides else None,
     )
-    if parameters.rules == "printed":
-        if not isinstance(task.lead, ServoLead):
-            raise InputError(
-                "fixtures.guidance.rules = printed: controller.law must be velocity_servo, as in "
-                "Sec. 5.2.4"
-            )
-        if tool.guides is not None:
-            raise InputError(
-                f"fixtures.guidance.rules = printed: {len(tool.guides)} guides given; must be "
-                "program, which alone knows of paths that attract"
-            )
-        return PrintedGuidance(tool, parameters.printed)
     stiffness = [fixture.stiffness for fixture in task.fixtures]
     return ProgramGuidance(tool, parameters, stiffness, _robot_limits(task, robot, start))
 

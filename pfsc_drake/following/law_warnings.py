@@ -27,8 +27,9 @@ from pfsc_drake.yaml.typed import spread
 # relative, of masses and of stiffnesses, which gains should bear
 _BORNE_ERROR = 0.05
 # m per m/s^2, from which on joints are soft for laws that take them for stiff. Of the arms of
-# `experiments study`, the errors that linear theory tells as 5, 0.36 and 0.08 are 1.1, 0.2 and
-# 0.07 mm at accelerations up to 2 m/s^2; where it tells that the loop is unstable, they are 90 mm
+# docs/studies/joint_stiffness.md, the errors that linear theory tells as 5, 0.36 and 0.08 are 1.1,
+# 0.2 and 0.07 mm at accelerations up to 2 m/s^2; where it tells that the loop is unstable, they
+# are 90 mm
 _LARGEST_SOFTNESS = 1e-3
 
 

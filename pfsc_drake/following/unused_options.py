@@ -277,9 +277,7 @@ def _refuse_unused_limits(limits: MotionLimits) -> None:
 def _fixture_rules(options: FollowerOptions, law: str, task: Task) -> list[Rule]:
     if not isinstance(task, SpaceTask):
         return []
-    guidance, servo = task.options.guidance, RELATIVE_DEGREE[law] == 1
-    program = guidance.rules == "program"
-    keys = ("approach_time", "braking", "push_out", "largest_speed", "tank")
+    servo = RELATIVE_DEGREE[law] == 1
     return [
         Rule(
             "tells_law",
@@ -288,9 +286,6 @@ def _fixture_rules(options: FollowerOptions, law: str, task: Task) -> list[Rule]
         ),
         *(Rule(key, servo, "needs the law velocity_servo") for key in ("servo_lag", "servo_delay")),
         Rule("fixtures.smoothing", not servo, "needs a law that commands torques"),
-        *(Rule(f"fixtures.guidance.{key}", program, "needs rules program") for key in keys),
-        Rule("fixtures.guidance.printed", not program, "needs rules printed"),
-        Rule("fixtures.limits", program, "needs rules program"),
         *_limit_rules("fixtures.limits", task.options.limits.on),
     ]
 

@@ -78,7 +78,7 @@ def test_packages_that_are_missing(monkeypatch, capsys):
         ("pfsc run my", ["my.yaml", "mystery/"]),
         ("pfsc run mystery/", ["mystery/other.yml"]),
         ("pfsc run nowhere/", []),
-        ("pfsc study fi", ["fixture_rules"]),
+        ("pfsc study fa", ["fastest"]),
         ("pfsc drive --qu", ["--quiet"]),
     ],
 )

@@ -100,7 +100,6 @@ OTHERS = {
     "obstacles": ObstacleOptions([ObstacleShape("person", 0.2)]),
     "measures": "joint_state",
     "frame": np.array([0.01, 0.0, 0.0, *np.eye(3).ravel()]),
-    "fixtures.guidance.rules": "printed",
     "fixtures.looks": 2,
     "operator": OperatorOptions(),
     "known_forces": ("wrench_ext",),

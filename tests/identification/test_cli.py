@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from identification.cli import main
-from identification.consistency.printed import chi_squared_of_printed
 from identification.model.parameters import true_parameters
 from identification.model.subject import load_subject
 from pfsc_drake.robot.models.files import models_directory
@@ -142,21 +141,6 @@ def test_log_det_of_the_printed_excitation(capsys):
     printed, shipped = capsys.readouterr().out.splitlines()
     assert printed.startswith("excitation.yaml: log det 599.3,") and "52 parameters" in printed
     assert shipped.startswith("excitation_optimal.yaml: log det 680.2,")
-
-
-def test_from_the_printed_table_to_a_model(tmp_path, capsys):
-    """Tab. C.3: the shipped model has chi squared 1347, the infimum is 1228."""
-    out = tmp_path / "model"
-    assert main(["printed", "--out", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert "found 1290." in said and "shipped model 1346.8" in said
-    # friction comes with the parameter file beside it
-    written = load_subject(str(out / "comau_racer_1_4.sdf"))
-    chi_squared = chi_squared_of_printed(load_subject("comau_racer_1_4"), true_parameters(written))
-    assert chi_squared == pytest.approx(1290.0, abs=0.5)
-    assert main(["printed", "--widest", "--out", str(tmp_path / "none")]) == 0
-    assert "found 1228.4" in capsys.readouterr().out
-    assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ def test_folders(tmp_path):
 
 @pytest.mark.parametrize(
     "command",
-    [["excite", ROBOT], ["simulate", ROBOT], ["estimate", ROBOT, "a.csv"], ["printed"]],
+    [["excite", ROBOT], ["simulate", ROBOT], ["estimate", ROBOT, "a.csv"]],
     ids=lambda command: command[0],
 )
 def test_a_file_in_place_of_the_folder_is_refused_before_the_work(

@@ -1,5 +1,6 @@
-"""From a scenario to its margins in a table, in pictures and on one page."""
+"""From a scenario to its margins in a table, in pictures, on one page, and for scripts."""
 
+import html
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,8 @@ from experiments.studies.margins.words import (
 )
 from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.folder import check_folder, open_results
+from reporting.metrics import Metrics
+from reporting.notebook import metrics_table
 from reporting.page import Report, report_page, write_report
 from reporting.progress import ProgressListener
 from reporting.provenance import standard_attributes
@@ -44,6 +47,50 @@ from reporting.style import (
 # 1/s; faster modes are of no interest, and would press the others together
 _FASTEST = 400.0
 _DAMPING_LINES = (0.1, 0.3, 0.7)
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What a sampled loop bears, in words, numbers and pictures.
+
+    Attributes:
+        name: Name of the scenario.
+        analysis: All that is known of the loop: its modes along the way, with each model error.
+    """
+
+    name: str
+    analysis: MarginAnalysis
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the loop is stable everywhere with a perfect model."""
+        return self.analysis.nominal.is_stable
+
+    @property
+    def is_robust(self) -> bool:
+        """Whether it is stable with all model errors that were asked for, too."""
+        return all(case.is_stable for case in self.analysis.cases)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What a person should know, the most important first."""
+        return sentences(self.analysis)
+
+    @property
+    def metrics(self) -> Metrics:
+        """The same in numbers, by name."""
+        return metrics_of(self.analysis)
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Pictures by name, each with ``png`` and ``caption``; a notebook shows them."""
+        return {figure.name: figure for figure in draw_margins(self.analysis)}
+
+    def _repr_html_(self) -> str:
+        """Return words and numbers."""
+        said = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in self.sentences)
+        title = f"<b>Margins of {html.escape(self.name)}</b>"
+        return f"{title}<ul>{said}</ul>{metrics_table(self.metrics)}"
 
 
 def draw_margins(analysis: MarginAnalysis) -> list[Figure]:

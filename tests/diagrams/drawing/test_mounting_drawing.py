@@ -1,7 +1,6 @@
 """Plates and gripper in a replay."""
 
 import numpy as np
-import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
@@ -11,13 +10,11 @@ from pydrake.systems.primitives import ConstantVectorSource
 from diagrams.drawing.mounting_look import (
     add_mounting_drawing,
     mounting_look,
-    mounting_stages,
     ring_surface,
 )
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import Mounting
 from pfsc_drake.geometry.workpiece_bodies import bore_wedges
-from pfsc_drake.physics.mounting_hand import MountingPhase
 
 X_WM, X_WF = RigidTransform([0.7, -0.4, 0.5]), RigidTransform([0.8, 0.3, 0.6])
 DOWN = RotationMatrix.MakeXRotation(np.pi)
@@ -51,33 +48,3 @@ def test_everything_is_drawn_where_it_is():
     simulator.Initialize()
     for name in ("bores", "frame", "magazine", "gripper/cup_0", "plate_1/pin_3", "plate_2/board"):
         assert meshcat.HasPath(f"/drake/mounting/{name}")
-
-
-def test_each_phase_is_seen_where_it_is_done():
-    """From the gripper's side and not through the robot; the insertion so that a pin is large."""
-    mounting = Mounting(
-        PlateParameters(),
-        RigidTransform(DOWN, [0.7, -0.4, 0.5]),
-        RigidTransform(DOWN, [0.8, 0.3, 0.6]),
-    )
-    phases = [(float(k), phase.name.lower()) for k, phase in enumerate(MountingPhase)]
-    stages = mounting_stages(mounting, phases)
-    assert [(stage.time, stage.name) for stage in stages] == phases
-    assert len({stage.text for stage in stages}) == len(stages)
-    pins = np.array(mounting.parameters.pins.positions)
-    for stage in stages:
-        if stage.name == "lead":
-            assert stage.camera is None
-            continue
-        X_WC = mounting.X_WM if stage.name == "grip" else mounting.X_WF
-        camera, target = (X_WC.inverse().multiply(p) for p in (stage.camera, stage.target))
-        # the underside of a plate that lies there
-        assert target[2] == pytest.approx(mounting.parameters.size[2])
-        assert camera[2] < target[2]
-        beside = np.linalg.norm(pins - target[:2], axis=1).min()
-        assert (beside < 1e-9) == (stage.name == "insert")
-        # Meshcat's camera sees 75 deg from top to bottom: the share of the picture that a pin has
-        height = 2.0 * np.linalg.norm(camera - target) * np.tan(np.deg2rad(37.5))
-        share = mounting.parameters.pins.length / height
-        assert share > (0.07 if stage.name == "insert" else 0.02)
-        assert np.linalg.norm(stage.camera[:2]) > np.linalg.norm(stage.target[:2])

@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 from pydrake.multibody.optimization import CalcGridPointsOptions, Toppra
 from pydrake.systems.analysis import Simulator
+from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains, ReferenceParameters
 from diagrams.scenario.motion import SecondReference
 from experiments.scenario_file import find_scenario
-from experiments.studies.peers.plan import joint_path
 from pfsc_drake.control.law.swing import Swing
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.inverse_kinematics import ToolTarget, solve_pose
 from pfsc_drake.robot.serial.chain import SerialChain
 
 ARM, DWELL, RESERVE = "pfc_elastic_3r", 0.05, 0.3
@@ -139,9 +140,12 @@ def test_as_fast_as_toppra_on_rigid_joints(fastest):
     station = build(settings, "pfc_elastic_6r")
     planned = station.reference_duration - 2.0 * DWELL
     plan, plant = station.task.drive_plan, station.part.model
-    path = joint_path(
-        station.robot, station.task.path, *settings.reference.points, station.initial_state[:6]
-    )
+    begin, end = settings.reference.points
+    places, joints = np.linspace(begin, end, 1 + round((end - begin) / 0.01)), []
+    for eta in places.tolist():
+        target = ToolTarget(*station.task.path.pose(eta))
+        joints.append(solve_pose(station.robot, target, station.initial_state[:6], f"{eta:.4g} m"))
+    path = PiecewisePolynomial.CubicWithContinuousSecondDerivatives(places, np.transpose(joints))
     grid = Toppra.CalcGridPoints(path, CalcGridPointsOptions(min_points=1000))
     toppra = Toppra(path, plant, grid)
     effort, speed = np.split(plan.limits, 2)

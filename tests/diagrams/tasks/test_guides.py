@@ -11,10 +11,8 @@ from diagrams.scenario_task import make_task
 from diagrams.tasks.task_drawing import drawing_of
 from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.fixtures import make_guidance
 from pfsc_drake.geometry.shapes.path_shapes import Line
 from pfsc_drake.geometry.shapes.through_waypoints import Waypoints
-from tests.control.conftest import Robot
 from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
@@ -67,14 +65,6 @@ def test_guides_need_a_tool_that_is_led(scenario):
     scenario.controller.manifold, scenario.fixtures.regions = "path", []
     with pytest.raises(InputError, match=r"fixtures.guides = 3 given; .* = path; only a tool led"):
         make_task(scenario, SCENARIOS)
-
-
-def test_printed_rules_know_of_no_guides(scenario):
-    scenario.fixtures.guidance.rules = "printed"
-    task = make_task(scenario, SCENARIOS)
-    robot = Robot("comau_racer_1_4").chain
-    with pytest.raises(InputError, match=r"rules = printed: 3 guides given; must be program"):
-        make_guidance(task, robot, 1, np.zeros(6))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.results.mounting import mounting_metrics, mounting_phases
+from experiments.results.mounting import mounting_metrics
 from experiments.results.run_log import RunLog
 from tests.experiments.results.registry_names import names_about
 
@@ -89,22 +89,3 @@ def test_of_a_plate_that_is_gripped_twice_the_last_time_counts(log):
     slipped = (log.time > 2.0) & (log.time < 3.0)
     log["held"].values[slipped] = 0.5
     assert mounting_metrics(log)["grip_time"].value == pytest.approx(3.0, abs=0.011)
-
-
-def test_phases_are_the_operators(log):
-    assert mounting_phases(RunLog(TIME)) == []
-    names = ["grip", "lead", "align", "insert"]
-    phase = np.select([TIME < 1.0, TIME < 4.0, TIME < 5.0, TIME < 6.0], [0, 1, 2, 3], 2)
-    log.add("phase", phase, "1", names)
-    log["phase"].labels = names
-    found = mounting_phases(log)
-    assert [name for _, name in found] == ["grip", "lead", "align", "insert", "align"]
-    assert [time for time, _ in found] == pytest.approx([0.0, 1.0, 4.0, 5.0, 6.0])
-
-
-def test_without_operator_a_plate_is_led_inserted_and_released(log):
-    found = mounting_phases(log)
-    assert [name for _, name in found] == ["lead", "insert", "release"]
-    assert [time for time, _ in found] == pytest.approx([0.0, 4.0, 7.0], abs=0.03)
-    log.signals["held"].values[:] = 1.0
-    assert [name for _, name in mounting_phases(log)] == ["lead", "insert"]

@@ -28,4 +28,13 @@ def test_what_a_wrong_model_does(tmp_path):
 def test_a_study_that_there_is_not(capsys, tmp_path):
     assert main(["study", "nothing", "--out", str(tmp_path)]) == 2
     error = capsys.readouterr().err
-    assert "study nothing: allowed: stiffness, robustness, tracking" in error
+    assert "study nothing: allowed: robustness, fastest, crossings" in error
+
+
+def test_the_folder_is_refused_before_anything_is_run(tmp_path, capsys):
+    (tmp_path / "metrics.json").write_text("mine")
+    assert main(["study", "robustness", "--out", str(tmp_path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "holds metrics.json, which no study has written" in captured.err
+    assert captured.err.count("\n") == 1

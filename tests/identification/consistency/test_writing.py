@@ -10,7 +10,6 @@ from diagrams.builder import build_station
 from diagrams.robots.model import read_robot
 from diagrams.scenario import RobotParameters, Scenario
 from experiments.scenario_file import find_scenario
-from identification.consistency.printed import nearest_to_printed
 from identification.consistency.writing import write_model
 from identification.model.base import random_motion
 from identification.model.parameters import parameter_names, true_parameters
@@ -131,9 +130,9 @@ def test_bad_input(comau, delta, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def identified(comau, tmp_path_factory):
+def identified(comau, set_of_table, tmp_path_factory):
     folder = tmp_path_factory.mktemp("identified")
-    return write_model(comau, nearest_to_printed(comau).parameters, folder)
+    return write_model(comau, set_of_table.parameters, folder)
 
 
 @pytest.mark.slow

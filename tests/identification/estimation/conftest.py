@@ -9,11 +9,11 @@ from scipy.signal import lfilter
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.measurement.periods import average
 from identification.measurement.record import Record
-from identification.model.analytic_base import load_printed_identification
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
+from tests.identification.model.closed_form_base import load_printed_identification
 
 RATE = 100.0
 

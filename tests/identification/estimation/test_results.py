@@ -1,5 +1,7 @@
 """What the file holds, read with h5py alone, and what comes back."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -17,10 +19,16 @@ def result(comau, measure):
     return estimate(comau.regressor, comau.base, measure(), terms)
 
 
+@pytest.fixture(scope="module")
+def runs(result):
+    values, covariance = 1.1 * result.base_parameters, 2.0 * result.covariance
+    return Repetitions((result, replace(result, base_parameters=values, covariance=covariance)))
+
+
 @pytest.fixture
-def path(tmp_path, result):
+def path(tmp_path, result, runs):
     path = tmp_path / "identification.h5"
-    save_estimate(path, result, Repetitions((result, result)))
+    save_estimate(path, result, runs)
     return path
 
 
@@ -47,9 +55,9 @@ def test_somebody_with_h5py(comau, result, path):
         assert file["repetitions/base_parameters"].shape == (2, 54)
 
 
-def test_comes_back(result, path):
+def test_comes_back(result, runs, path):
     stored = load_estimate(path)
-    got = stored.estimate
+    got = stored.estimates[0]
     for name in ("base_parameters", "covariance", "residuals"):
         np.testing.assert_array_equal(getattr(got, name), getattr(result, name))
     np.testing.assert_array_equal(got.system.matrix, result.system.matrix)
@@ -59,15 +67,17 @@ def test_comes_back(result, path):
     assert got.condition == pytest.approx(result.condition)
     assert [w.reason for w in got.weak_parameters()] == [w.reason for w in result.weak_parameters()]
     np.testing.assert_array_equal(got.motion.t, result.motion.t)
-    assert stored.repeated.shape == (2, 54)
+    assert stored.values.shape == (2, 54)
+    np.testing.assert_array_equal(stored.values, runs.values)
+    np.testing.assert_array_equal(stored.covariance, runs.covariance)
 
 
 def test_without_friction_terms_or_repetitions(comau, measure, tmp_path):
     result = estimate(comau.regressor, comau.base, measure())
     save_estimate(tmp_path / "plain.h5", result)
     stored = load_estimate(tmp_path / "plain.h5")
-    assert stored.estimate.friction == FrictionTerms()
-    assert stored.repeated.shape == (0, 52)
+    assert stored.values.shape == (1, 52)
+    assert stored.estimates[0].friction == FrictionTerms()
 
 
 def test_files_that_are_none(path, tmp_path, result):

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from dataclasses import replace
 
 import numpy as np
 import psutil
@@ -11,7 +12,7 @@ from identification.excitation.criterion import information
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.local_search import LocalSearch, random_start
 from identification.excitation.scene import Cell, Obstacle
-from identification.excitation.search import search
+from identification.excitation.search import SearchOptions, search
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
@@ -22,13 +23,13 @@ POST = Obstacle(
     name="post", kind="cylinder", start=np.array([0, 1, 0]), end=np.array([0, 1, 1]), radius=0.1
 )
 CELL = Cell([POST], tool_above=0.3, self_collision=False)
-QUICK = {"period": 5.0, "harmonics": (1, 2), "starts": 2, "workers": 1, "iterations": 40}
+QUICK = SearchOptions(period=5.0, harmonics=(1, 2), starts=2, workers=1, iterations=40)
 
 
 @pytest.fixture(scope="module")
 def found_and_told(arm):
     told = []
-    found = search(arm, cell=CELL, progress=lambda *args: told.append(args), **QUICK)
+    found = search(arm, QUICK, cell=CELL, progress=lambda *args: told.append(args))
     return found, told
 
 
@@ -67,14 +68,14 @@ def test_keeps_all_limits_of_the_cell(arm, found, verified):
 
 @pytest.mark.slow
 def test_condition_number(arm, found):
-    by_condition = search(arm, "condition", cell=CELL, **QUICK)
+    by_condition = search(arm, replace(QUICK, criterion="condition"), cell=CELL)
     assert by_condition.information.condition_number < found.information.condition_number
     assert by_condition.information.log_determinant < found.information.log_determinant
 
 
 @pytest.mark.slow
 def test_delta(delta):
-    found = search(delta, limits={"acceleration": 30.0}, **QUICK)
+    found = search(delta, QUICK, {"acceleration": 30.0})
     assert found.information.base_parameters == 10
     assert found.information.log_determinant > 70.0
     assert found.verification.problems == []
@@ -107,7 +108,7 @@ def test_model_file_with_a_slide_and_no_shapes(tmp_path):
     file.write_text(CRANE)
     crane = load_subject(file)
     cell = Cell([POST], tool_above=-0.2)
-    found = search(crane, cell=cell, limits={"acceleration": 10.0}, **QUICK)
+    found = search(crane, QUICK, {"acceleration": 10.0}, cell)
     assert found.warnings == ["crane: the model has no shapes; collisions are not checked"]
     assert found.verification.keeps_all
     q, _, _ = found.trajectory.motion(np.linspace(0.0, 5.0, 500))
@@ -150,7 +151,10 @@ def test_progress(found_and_told):
 )
 def test_refuses(arm, change, says):
     with pytest.raises(InputError, match=says):
-        search(arm, **{"cell": CELL} | QUICK | change)
+        around = {"limits": None, "cell": CELL}
+        options = {name: value for name, value in change.items() if name not in around}
+        around |= {name: value for name, value in change.items() if name in around}
+        search(arm, replace(QUICK, **options), **around)
 
 
 def add(common, task):

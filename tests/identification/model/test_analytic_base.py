@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.model.analytic_base import analytic_base, moved
 from identification.model.base import base_parameters
-from identification.model.parameters import link_parameters
+from identification.model.parameters import link_parameters, moved
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount
+from tests.identification.model.closed_form_base import analytic_base
 
 DOWN = np.array([0.0, 0.0, -9.81])
 

@@ -1,12 +1,11 @@
 """Hands that pull and push at random, and whether a coupling ever gives more than it had."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.studies.teleoperation.point import PERIOD, Motion, PointTeleoperation, of
 from pfsc_drake.physics.channel import ChannelParameters
+from tests.control.teleoperation.point_station import PERIOD, Motion, of
 
 # longest delay and jitter [s], most that is lost
 _DELAY, _JITTER, _LOSS = 0.5, 0.1, 0.5
@@ -116,29 +115,3 @@ def energy_of(motion: Motion, planes: list[tuple[list[float], list[float]]]) -> 
         float(np.max(depth)),
         float(np.linalg.norm(motion.handle[:, 3:], axis=1).max()),
     )
-
-
-def run_sequences(
-    station: PointTeleoperation,
-    planes: list[tuple[list[float], list[float]]],
-    count: int,
-    duration: float,
-    tell: Callable[[int], None],
-) -> list[Energy]:
-    """Return the energies of random runs.
-
-    Args:
-        station: What follows.
-        planes: What it may not cross.
-        count: Number of runs.
-        duration: Of each [s].
-        tell: Told how many are done.
-    """
-    found = []
-    for seed in range(count):
-        drawn = draw_sequence(seed, duration)
-        motion = station.run(drawn.asked, drawn.there, drawn.back, drawn.wall)
-        found.append(energy_of(motion, planes))
-        if (seed + 1) % 100 == 0:
-            tell(seed + 1)
-    return found

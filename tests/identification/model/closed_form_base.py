@@ -1,4 +1,4 @@
-"""Base parameters of a chain of revolute joints in closed form (Sec. 2.4.6, Appendix B).
+"""Base parameters of revolute joints in closed form (Sec. 2.4.6, Appendix B), and Tab. C.3.
 
 What Appendix B sums up for links between parallel and perpendicular axes, after Mayeda et al.,
 is one rule, and holds for axes at any angle: **mass on the axis of joint i belongs as well to
@@ -23,18 +23,17 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.consistency.bounds import shipped_or_own
 from identification.model.base import BaseParameters
 from identification.model.parameters import (
     LINK_PARAMETERS,
     PER_LINK,
-    from_moments,
-    link_moments,
+    moved,
     parameter_names,
     parameter_units,
 )
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount
@@ -93,25 +92,6 @@ def analytic_base(subject: Subject, friction: bool = True, coupling: bool = True
     rows += list(np.eye(len(names))[of_friction])
     indices += list(of_friction)
     return BaseParameters(np.array(indices), np.array(rows), names, units)
-
-
-def moved(parameters: np.ndarray, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Return the ten parameters of a body about another frame, shape (10,).
-
-    Args:
-        parameters: About frame L, shape (10,).
-        R: Orientation of L in the other frame, shape (3, 3).
-        p: Origin of L in the other frame [m], shape (3,).
-    """
-    mass, moment, inertia = link_moments(parameters)
-    turned, S_p = R @ moment, _skew(p)
-    S_m = _skew(turned)
-    about = R @ inertia @ R.T - mass * S_p @ S_p - S_p @ S_m - S_m @ S_p
-    return from_moments(mass, turned + mass * p, about)
-
-
-def _skew(p: np.ndarray) -> np.ndarray:
-    return np.array([[0.0, -p[2], p[1]], [p[2], 0.0, -p[0]], [-p[1], p[0], 0.0]])
 
 
 def _check(name: str, links: Sequence[ChainLink]) -> None:
@@ -176,26 +156,6 @@ def _added_inertia(
     if unmoved or (mount is not None and mount.link <= j and abs(mount.axis[2]) <= _PARALLEL):
         return {"Izz": ratio**2}
     return {}
-
-
-def shipped_or_own(robot: str | Path, name: str) -> Path:
-    """Return a file that is shipped with a robot, or a user's own.
-
-    Args:
-        robot: Name of a shipped robot, or a file.
-        name: Name of the shipped file.
-
-    Raises:
-        InputError: If there is no such file with the robot.
-    """
-    path = Path(robot)
-    if path.suffix:
-        return path
-    path = models_directory() / path / name
-    if not path.is_file():
-        known = sorted(file.parent.name for file in models_directory().glob(f"*/{name}"))
-        raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
-    return path
 
 
 AXES, SIZE = 6, 52

@@ -1,4 +1,4 @@
-"""A leader, a hand and a point that follows among planes, as one function for many runs."""
+"""A leader, an operator and a point that follows among planes, as one function for many runs."""
 
 import math
 from collections.abc import Sequence

@@ -1,1 +1,0 @@
-"""Path following beside what a user would take instead."""
