@@ -75,7 +75,7 @@ def test_a_posture_that_is_pulled_is_in_the_loop(task):
     loop = StationLoop(settings_of("pfc_panda_7r", *changes), folder())
     chosen = loop.variables_in_loop([at_rest(loop)])
     states = loop.derivative.states
-    rows = [states[name] for name in states if name.startswith("posture_reference.")]
+    rows = [states[name] for name in states if name.startswith("controller.posture_reference.")]
     own = np.isin(np.concatenate(rows), chosen)
     # the motion of seven joints, orders 0 to 2, not the goal
     assert own.sum() == (0 if task == "reference" else 21)
