@@ -26,8 +26,7 @@ class PathParameters:
     """The path.
 
     Attributes:
-        shape: Position, one of ``!BentLemniscate``, ``!Circle``, ``!Line``, ``!Waypoints``,
-            ``!OnSurface``, ``!Intersection``, ``!Streamed``.
+        shape: Position, a shape by its tag, such as ``!Circle``.
         orientation: Orientation; without keyframes the waypoint file's, or none.
     """
 
@@ -40,8 +39,7 @@ class SurfaceParameters:
     """The surface.
 
     Attributes:
-        shape: Position, one of ``!Paraboloid``, ``!Plane``, ``!Cylinder``, ``!Cone``, ``!Sphere``,
-            ``!Torus``, or from a file ``!Fitted``, ``!Revolved``, ``!Extruded``.
+        shape: Position, a shape by its tag, such as ``!Cylinder``.
         orientation: Orientation.
     """
 

@@ -24,9 +24,7 @@ class RegionParameters:
     A fitted surface ends at its border, and beside it is no region.
 
     Attributes:
-        shape: ``!Plane``, ``!Box``, ``!Paraboloid``, ``!Cylinder``, ``!Cone``, ``!Sphere``,
-            ``!Torus``, or from a file ``!Fitted``, ``!Revolved``, ``!Extruded``; without a part of
-            a turn, ``angles_deg``.
+        shape: A shape by its tag, such as ``!Cylinder``; without a part of a turn, ``angles_deg``.
         admissible: ``inside`` or ``outside`` of what encloses something; ``above``, on the side of
             the normal, or ``below`` of a plane, a fitted surface and open profiles; empty for
             ``outside``, or ``above``.
@@ -58,7 +56,7 @@ class GuideParameters:
     See :class:`~pfsc_drake.control.fixtures.guides.Guide`.
 
     Attributes:
-        shape: ``!Line``, ``!Circle``, ``!Waypoints``, ``!Intersection`` or ``!BentLemniscate``.
+        shape: A shape of a path by its tag, such as ``!Line``.
         stiffness: Stiffness next to the path [N/m].
         reach: Distance from which on it does not attract [m].
     """
