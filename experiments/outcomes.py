@@ -58,12 +58,28 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
         status, ends = FAULT, [f"fault: {outcome.fault}; {stop}"]
     if outcome.broken:
         status, ends = status or FAULT, [*ends, _missed(outcome.broken)]
-    if outcome.problem is not None:
-        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
-    elif ends:
+    problems = [] if outcome.problem is None else [outcome.problem]
+    return _judge(status, ends, problems, out, outcome.interrupted)
+
+
+def _judge(
+    status: int, ends: list[str], problems: Sequence[str], out: Path | None, interrupted: bool
+) -> int:
+    """Print one line of how it ended, if it did not end well, and return the exit status.
+
+    Args:
+        status: Exit status if all was written.
+        ends: Why it did not end well, one phrase each.
+        problems: What could not be written.
+        out: Folder that holds everything logged until then, if that is to be said.
+        interrupted: Whether the user stopped it.
+    """
+    if problems:
+        status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
+    elif ends and out is not None:
         ends[-1] += f", everything logged so far is kept in {out}"
     if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
+        print_error("; ".join(ends), after_echo=interrupted)
     return status
 
 
@@ -96,13 +112,8 @@ def judge_live(outcome: "LiveOutcome") -> int:
             status = status or FAULT
             ends = [*ends, f"{kept.folder.name} {_missed(kept.outcome.broken)}"]
     problems = [kept.outcome.problem for kept in outcome.kept if kept.outcome.problem is not None]
-    if problems:
-        status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
-    elif ends and outcome.kept:
-        ends[-1] += f", everything logged so far is kept in {outcome.kept[-1].folder}"
-    if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
-    return status
+    out = outcome.kept[-1].folder if outcome.kept else None
+    return _judge(status, ends, problems, out, outcome.interrupted)
 
 
 def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
@@ -110,7 +121,7 @@ def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
     key_metrics = {name: outcome.metrics[name] for name in outcome.key_metrics}
     console.print(_metrics_table(key_metrics))
     for warning in outcome.warnings:
-        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+        print_warning(console, warning)
     for strikes, command in outcome.commands.items():
         console.print(f"\n{escape(strikes)}\n  {escape(command)}", soft_wrap=True, highlight=False)
     _print_report(console, outcome.report)
@@ -128,11 +139,8 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
         ends = [f"{ends[0]}, which are kept in {out}; the same command goes on"]
     elif outcome.refusal is not None:
         status, ends = WRONG_INPUT, [f"error: no run could start: {outcome.refusal}"]
-    if outcome.problem is not None:
-        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
-    if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
-    return status
+    problems = [] if outcome.problem is None else [outcome.problem]
+    return _judge(status, ends, problems, None, outcome.interrupted)
 
 
 def print_export(console: Console, export: "Export", out: Path) -> None:
@@ -145,9 +153,7 @@ def print_export(console: Console, export: "Export", out: Path) -> None:
 
 def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
     """Tells what a controller in C made of its record; returns the exit status."""
-    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in ("Ticks", "differing", "largest", "median [us]", "p99 [us]", "worst [us]"):
-        table.add_column(title, justify="right")
+    table = _numbers_table("Ticks", "differing", "largest", "median [us]", "p99 [us]", "worst [us]")
     times = [f"{time:.2f}" for time in (replay.median, replay.p99, replay.worst)]
     table.add_row(str(replay.ticks), str(replay.differing), f"{replay.largest:.3g}", *times)
     console.print(table)
@@ -172,9 +178,7 @@ def judge_commands(console: Console, commands: "Commands") -> int:
     if commands.difference is not None:
         columns["from the log"] = commands.difference
     console.print(f"{commands.port} [{commands.unit}], {len(told)} ticks", markup=False)
-    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in ("Drive", *columns):
-        table.add_column(title, justify="right")
+    table = _numbers_table("Drive", *columns)
     for i in range(told.shape[1]):
         table.add_row(str(i + 1), *(f"{values[i]:.5g}" for values in columns.values()))
     console.print(table)
@@ -186,6 +190,14 @@ def judge_commands(console: Console, commands: "Commands") -> int:
         print_error(f"fault: {why}, from t = {commands.fault_time:.3f} s on")
         return FAULT
     return 0
+
+
+def _numbers_table(*titles: str) -> Table:
+    """Return a table whose columns are numbers."""
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for title in titles:
+        table.add_column(title, justify="right")
+    return table
 
 
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:

@@ -8,7 +8,8 @@ import numpy as np
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.task import Task
-from experiments.results.path import tangential_error
+from experiments.results.coordinates import tangential_error
+from experiments.results.feature import Feature
 from experiments.results.run_log import RunLog
 from reporting.metrics import Metrics
 
@@ -61,3 +62,8 @@ def _distance(task: Task, begin: float) -> float:
     times = np.linspace(max(begin, task.motion.domain[0]), task.motion.domain[1], _SAMPLES)
     places = task.motion.derivatives(times, 0)[:, 0]
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+
+FEATURE = Feature(
+    metrics=lambda log, station, settings: arrival_metrics(log, station.task, settings)
+)

@@ -26,7 +26,7 @@ from experiments.teaching.taught import (
 )
 from pfsc_drake.geometry import waypoints_text
 from reporting.folder import ResultsFolder, check_folder, open_results
-from reporting.page import Report, report_page, write_report
+from reporting.page import Page, Report
 from reporting.provenance import standard_attributes
 
 KIND, FOLLOW = "teaching", "follow"
@@ -180,7 +180,7 @@ def _write_page(
     warnings = []
     if "fault" in taught.log.attributes:
         warnings.append(f"while it was taught: {taught.log.attributes['fault']}")
-    page = report_page(
+    return Page(
         kind="Teaching",
         title=f"Taught in {taught.settings.name}",
         description=_DESCRIPTION,
@@ -195,8 +195,7 @@ def _write_page(
         },
         cards=_cards(followed),
         details=f"Scenario {YAML_NAME}",
-    )
-    return write_report(results, pictures, page)
+    ).write(results)
 
 
 def _cards(followed: FollowedShape | None) -> list[str]:

@@ -11,7 +11,7 @@ from experiments.studies.peers.picture import draw
 from experiments.studies.peers.score import Score, score
 from reporting.folder import open_results
 from reporting.metrics import NOT_A_NUMBER, Metrics
-from reporting.page import Report, Table, report_page, write_report
+from reporting.page import Page, Report, Table
 from reporting.provenance import standard_attributes
 
 DURATION = 6.3  # s
@@ -103,21 +103,19 @@ def write_peers(
                 key = f"{name}, {disturbance}: {what}"
                 metrics.add(key, value, unit, source=came.fault or None)
         results.write("metrics.json", metrics.to_json())
-        figures = [draw(found)]
         rows = [[*case, *came.cells] for case, came in found.items()]
-        page = report_page(
+        return Page(
             kind="Study",
             title=_TITLE,
             description=_DESCRIPTION,
             scenario_yaml_text="\n".join(_listing(disturbances)),
             metrics=metrics,
-            figures=figures,
+            figures=[draw(found)],
             log_attributes=standard_attributes(_TITLE),
             cards=[],
             tables=[Table("All runs", _CAPTION, _HEAD, rows)],
             details=f"What was changed in {SCENARIO}",
-        )
-        return write_report(results, figures, page)
+        ).write(results)
 
 
 def _listing(disturbances: Mapping[str, tuple[str, ...]]) -> list[str]:
