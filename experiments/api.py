@@ -9,7 +9,7 @@ from diagrams.scenario import Scenario
 from experiments.calls import only_own_words, read_given, result_folder, shown_progress
 from experiments.kept_run import Run
 from experiments.preparation import naming
-from experiments.simulated_run import run_scenario
+from experiments.simulated_run import RunOptions, run_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.told import Margins
@@ -60,11 +60,8 @@ def run(
             outcome = run_scenario(
                 loaded,
                 out=folder.path,
-                duration=duration,
-                figures=figures,
-                recording=recording,
+                options=RunOptions(duration, after_fault, figures=figures, recording=recording),
                 progress=progress,
-                after_fault=after_fault,
             )
         return folder.run_of(outcome)
 

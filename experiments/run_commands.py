@@ -95,7 +95,7 @@ def run_command(
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
     from experiments.scenario_file import read_scenario
-    from experiments.simulated_run import run_scenario
+    from experiments.simulated_run import RunOptions, run_scenario
 
     if scenario in (IDENTIFICATION, TEACH_IN):
         study_command(scenario, out or Path("out") / scenario, quiet)
@@ -116,12 +116,8 @@ def run_command(
             outcome = run_scenario(
                 loaded,
                 out=folder,
-                duration=seconds,
-                figures=figures,
-                recording=recording,
+                options=RunOptions(seconds, further, margins, figures, recording),
                 progress=progress,
-                after_fault=further,
-                margins=margins,
                 warn=warn,
             )
         print_run(console, outcome, said)

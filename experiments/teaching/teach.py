@@ -7,7 +7,7 @@ from pathlib import Path
 from experiments.finished_run import RunOutcome
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
-from experiments.simulated_run import run_scenario
+from experiments.simulated_run import RunOptions, run_scenario
 from experiments.teaching.comparison import (
     FollowedShape,
     compare_fit,
@@ -132,9 +132,7 @@ def run_and_tell(
     outcome = run_scenario(
         loaded,
         out=out,
-        duration=None,
-        figures=drawn,
-        recording=drawn,
+        options=RunOptions(figures=drawn, recording=drawn),
         progress=_Quarters(loaded.name, progress),
     )
     if outcome.interrupted:
