@@ -28,6 +28,7 @@ _LATE = 0.2  # s, at the end of a run
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
 _SPACE = 3  # tangential coordinates of a tool that is guided freely
 FLOOR = 1e-9  # m or rad; zero has no place on a logarithmic axis
+_NAMES = {False: [r"$\eta$"], True: [r"$\eta_1$", r"$\eta_2$"]}
 SAME = 1e-6  # m; references nearer to each other are drawn as one
 
 
@@ -192,48 +193,45 @@ def draw_progress(log: RunLog) -> style.Drawing | None:
         return None
     on_surface = eta.shape[1] == 2
     where = "on the surface" if on_surface else "along the path"
-    names = ["_1", "_2"] if on_surface else [""]
     reference = log["eta_p"].values if "eta_p" in log else None
     desired = None
     if reference is not None and "eta_d" in log:
         desired = log["eta_d"].values
         desired = desired if style.largest(reference - desired) > SAME else None
-    rows = 1 + (reference is not None) + (desired is not None) + ("eta_dot" in log)
-    canvas, panels = style.make_panels(rows)
-    position, *further = panels
+    shown = []
+    # of each panel below: values, label of its axis, title, colour on a path, words of the caption
+    rows: list[tuple[FloatArray, str, str, int, str]] = []
     if reference is not None:
-        for k, column in enumerate(reference.T):
-            label = r"$\eta^p$ (reference)" if k == 0 else None
-            position.plot(log.time, column, label=label, **style.BROAD)
-        error = further.pop(0)
+        shown.append("their references" if on_surface else "its reference")
         scale, unit = style.fitting_unit(eta - reference, "m")
-        for k, column in enumerate((eta - reference).T):
-            error.plot(log.time, scale * column, color=f"C{k if on_surface else 1}")
-        error.set(ylabel=f"error in {unit}", title=r"Tangential error $\eta - \eta^p$")
+        title = r"Tangential error $\eta - \eta^p$"
+        error = scale * (eta - reference)
+        rows.append((error, f"error in {unit}", title, 1, "the error between them"))
     if reference is not None and desired is not None:
-        yielding = further.pop(0)
-        for k, column in enumerate(desired.T):
-            label = r"$\eta^d$ (desired)" if k == 0 else None
-            position.plot(log.time, column, "--", color=style.INK, label=label)
-            colour = f"C{k if on_surface else 2}"
-            yielding.plot(log.time, MILLI * (reference[:, k] - column), color=colour)
-        yielding.set(ylabel="way in mm", title=r"How far the reference yields $\eta^p - \eta^d$")
-    for k, (column, name) in enumerate(zip(eta.T, names, strict=True)):
-        position.plot(log.time, column, color=f"C{k}", label=rf"$\eta{name}$")
+        title = r"How far the reference yields $\eta^p - \eta^d$"
+        words = "how far the reference yields to forces"
+        rows.append((MILLI * (reference - desired), "way in mm", title, 2, words))
+    if "eta_dot" in log:
+        title = rf"Speed {where} $\dot\eta$"
+        rows.append((log["eta_dot"].values, "speed in m/s", title, 0, "the speed"))
+    canvas, (position, *further) = style.make_panels(1 + len(rows))
+    references = {
+        r"$\eta^p$ (reference)": (reference, style.BROAD),
+        r"$\eta^d$ (desired)": (desired, {"linestyle": "--", "color": style.INK}),
+    }
+    for label, (values, line) in references.items():
+        for k, column in enumerate([] if values is None else values.T):
+            position.plot(log.time, column, label=None if k else label, **line)
+    for k, (column, name) in enumerate(zip(eta.T, _NAMES[on_surface], strict=True)):
+        position.plot(log.time, column, color=f"C{k}", label=name)
     position.set(ylabel="arc length in m", title=f"Position {where}")
-    if further:
-        speed = further.pop(0)
-        for k, column in enumerate(log["eta_dot"].values.T):
-            speed.plot(log.time, column, color=f"C{k}")
-        speed.set(ylabel="speed in m/s", title=rf"Speed {where} $\dot\eta$")
-    shade_pushes(panels, log)
+    for panel, (curves, ylabel, title, colour, words) in zip(further, rows, strict=True):
+        for k, column in enumerate(curves.T):
+            panel.plot(log.time, column, color=f"C{k if on_surface else colour}")
+        panel.set(ylabel=ylabel, title=title)
+        shown.append(words)
+    shade_pushes([position, *further], log)
     style.place_legend(position)
-    shown = [
-        *(["their references"] * on_surface or ["its reference"] if reference is not None else []),
-        *(["the error between them"] if reference is not None else []),
-        *(["how far the reference yields to forces"] if desired is not None else []),
-        *(["the speed"] if "eta_dot" in log else []),
-    ]
     *first, last = ["Tangential coordinates" if on_surface else "Tangential coordinate", *shown]
     separator = ", and " if len(first) > 1 else " and "
     caption = f"{', '.join(first)}{separator}{last}." if first else f"{last}."

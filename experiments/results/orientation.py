@@ -19,6 +19,26 @@ from reporting import style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# subject, its error, and caption by the number of angles
+_TEXTS = {
+    1: (
+        "Turn of the tool",
+        "Error of the tool's turn",
+        "Angle by which the tool is turned about the yaw axis against the orientation that belongs "
+        "to its place; its tilt is no task",
+    ),
+    2: (
+        "Orientation of the tool's axis",
+        "Error of the tool's axis",
+        "Angles by which the tool's axis is turned away from the direction that belongs to its "
+        "place, about two directions across it; the turn about the axis is free",
+    ),
+    3: (
+        "Orientation",
+        "Orientation error",
+        "{} angles of the tool against the orientation that belongs to its place",
+    ),
+}
 MIN_SPAN = 2.0  # degrees, that an axis of angles shows at least
 
 
@@ -85,17 +105,13 @@ def draw_orientation(log: RunLog) -> style.Drawing:
     """Orientation errors: components with references and, on a logarithmic scale, their norm."""
     canvas, panels = style.make_panels(3 if is_used(log, "phi_p") else 2)
     angles = log["phi"].dim
-    of_axis, of_yaw = angles == 2, angles == 1
     labels = [r"$\varphi$ (about z)", r"$\vartheta$ (about y)", r"$\psi$ (about x)"]
     if _convention(log["phi"].labels) == "ZYZ":
         labels[2] = r"$\psi$ (about z again)"
     if angles < 3:
         labels = [r"$\varphi$", r"$\vartheta$"][:angles]
     error = draw_with_references(panels[0], log, "phi", r"\phi", labels)
-    subject = "Orientation of the tool's axis" if of_axis else "Orientation"
-    fault = "Error of the tool's axis" if of_axis else "Orientation error"
-    if of_yaw:
-        subject, fault = "Turn of the tool", "Error of the tool's turn"
+    subject, fault, caption = _TEXTS[angles]
     name = f"{subject} relative to the path" if error is not None else fault
     panels[0].set(ylabel="angle in mrad", title=name)
     sizes = {r"$\|\phi\|$": log["phi"].values}
@@ -107,18 +123,7 @@ def draw_orientation(log: RunLog) -> style.Drawing:
     draw_sizes(panels[-1], log.time, sizes, "Size of the angles")
     shade_pushes(panels, log)
     style.place_legend(panels[0])
-    caption = (
-        "Angles by which the tool's axis is turned away from the direction that belongs to its"
-        " place, about two directions across it; the turn about the axis is free"
-        if of_axis
-        else f"{_convention(log['phi'].labels)} angles of the tool against the orientation that"
-        " belongs to its place"
-    )
-    if of_yaw:
-        caption = (
-            "Angle by which the tool is turned about the yaw axis against the orientation that"
-            " belongs to its place; its tilt is no task"
-        )
+    caption = caption.format(_convention(log["phi"].labels))
     caption += "." if error is None else ", over the reference that yields to torques (broad)."
     return style.Drawing("orientation", name, caption, canvas)
 

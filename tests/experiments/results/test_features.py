@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments.results.features import draw_figures, render_figures
+from diagrams.scenario import Scenario
+from experiments.results.features import FEATURES, draw_figures, render_figures
 from experiments.results.run_log import RunLog
+from reporting.registry import known_metric
 
 PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axis=1)
 
@@ -103,3 +105,9 @@ def test_a_log_without_samples_has_no_figures():
     log = RunLog(np.zeros(0))
     log.add("eta", np.zeros((0, 1)), "m")
     assert names(log) == []
+
+
+def test_requirements_are_of_known_metrics():
+    for feature in FEATURES:
+        for name in (*feature.requirements(Scenario()), *feature.always):
+            assert known_metric(name) is not None, name
