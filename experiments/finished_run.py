@@ -17,7 +17,7 @@ from diagrams.drawing.replay import record
 from diagrams.drawing.tour import explained
 from experiments.preparation import PreparedRun
 from experiments.results.features import FEATURES, render_figures
-from experiments.results.joints import DriveLimitsOfRun
+from experiments.results.joint_limits import DriveLimitsOfRun
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.requirements import (
     leave_unjudged,

@@ -15,6 +15,7 @@ from experiments.results import (
     guides,
     hand_limits,
     holder,
+    joint_limits,
     joints,
     link,
     mounting,
@@ -38,7 +39,14 @@ FEATURES = [
     *(coordinates.FEATURE, orientation.FEATURE, drives.FEATURE, forces.FEATURE, arrival.FEATURE),
     *(pressing.FEATURE, guidance.FEATURE, guides.FEATURE, hand_limits.FEATURE),
     *(guidance_audit.FEATURE, teleoperation.FEATURE, mounting.FEATURE, holder.FEATURE),
-    *(streaming.FEATURE, obstacles.FEATURE, friction.FEATURE, shape.FEATURE, joints.FEATURE),
+    *(
+        streaming.FEATURE,
+        obstacles.FEATURE,
+        friction.FEATURE,
+        shape.FEATURE,
+        joints.FEATURE,
+        joint_limits.FEATURE,
+    ),
     *(rest.FEATURE, found_links.FEATURE, link.FEATURE, fastest.FEATURE, posture.FEATURE),
     pushes.FEATURE,
 ]

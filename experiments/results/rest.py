@@ -12,7 +12,7 @@ from diagrams.holder_station import HOLDER
 from diagrams.scenario import Scenario, Target
 from diagrams.station import Station
 from experiments.results.feature import Feature, converged_after
-from experiments.results.joints import DriveLimitsOfRun
+from experiments.results.joint_limits import DriveLimitsOfRun
 from experiments.results.run_log import FloatArray, RunLog
 from reporting.metrics import Metrics, format_quantity
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from experiments.results.joints import DriveLimitsOfRun
+from experiments.results.joint_limits import DriveLimitsOfRun
 from experiments.results.requirements import set_targets
 from experiments.results.rest import MotionAfterFault, rest_metrics
 from experiments.results.run_log import RunLog
