@@ -25,7 +25,7 @@ from rich.console import Console
 
 from experiments.finished_run import RunOutcome
 from experiments.scenario_file import read_scenario, scenario_names
-from experiments.simulated_run import run_scenario
+from experiments.simulated_run import RunOptions, run_scenario
 from tests.experiments.live.browser import NAMES, Browser, find_browser
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -244,9 +244,7 @@ def record_run(scenario: str, folder: Path, duration: float | None = None) -> Pa
     outcome: RunOutcome = run_scenario(
         read_scenario(scenario, []),
         out=folder,
-        duration=duration,
-        figures=False,
-        recording=True,
+        options=RunOptions(duration, figures=False),
         progress=_Silent(),
     )
     if outcome.fault is not None:

@@ -28,7 +28,7 @@ from experiments.hardware.statics import StaticCheck
 from experiments.kept_run import Run, load
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile, apply_change, expand_home, read_scenario
-from experiments.simulated_run import run_scenario
+from experiments.simulated_run import RunOptions, run_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.page import Margins
@@ -84,11 +84,8 @@ def run(
             lambda folder: run_scenario(
                 loaded,
                 out=folder,
-                duration=duration,
-                figures=figures,
-                recording=recording,
+                options=RunOptions(duration, after_fault, figures=figures, recording=recording),
                 progress=progress,
-                after_fault=after_fault,
             ),
         )
 

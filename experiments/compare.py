@@ -1,28 +1,23 @@
 """Several runs on one page."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 
-from experiments.compared_motions import motion_differences
-from experiments.results.run_log import RunLog
-from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.reading import read_text
+from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml, read_text
+from reporting import style
 from reporting.folder import open_results
 from reporting.metrics import Metrics
-from reporting.page import Report, report_page, write_report
-from reporting.style import (
-    COLOURS,
-    STYLE,
-    Drawing,
-    Figure,
-    make_panels,
-    place_legend,
-    render,
-)
+from reporting.page import Page, Report
+
+# lines of a panel by the end of their labels
+Lines = Mapping[str, Callable[[RunLog], FloatArray]]
 
 _COMPARED = (
     "max_path_deviation",
@@ -38,6 +33,10 @@ _ORIENTATIONS = {
     "angles": ("Angle about {}", "angle in deg", math.degrees(1.0)),
     "axis": ("Axis of the tool, along {}", "component", 1.0),
 }
+# keys of a scenario that say where the tool is to be, and when
+_MOTION = ("path", "surface", "reference", "duration")
+_FILE = "file"
+_MOST = 4  # differences that are named
 
 
 def write_comparison(folders: Sequence[Path], out: Path) -> Report:
@@ -69,27 +68,18 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Report:
     differences = motion_differences(scenarios)
     inputs = [folder / name for folder in folders for name in ("log.h5", "metrics.json")]
     with open_results(out, "comparison", inputs) as results:
-        figures = [_deviations(logs)]
-        for kind in _ORIENTATIONS:
-            if all(f"{kind}_e" in log for log in logs.values()):
-                figures.append(_orientations(logs, kind))
-        if all("orientation_lead" in log for log in logs.values()):
-            figures.append(_leads(logs))
-        if all("wrench_ext" in log for log in logs.values()):
-            figures.append(_forces(logs))
         first = next(iter(logs.values()))
         motion = "Different motions" if differences else "The same motion"
-        page = report_page(
+        return Page(
             title=" against ".join(logs),
             kind="Comparison",
             description=f"{motion}, side by side.",
             warnings=[_DIFFERENT + "; ".join(differences) + "."] if differences else [],
             scenario_yaml_text="\n---\n".join(scenarios.values()),
             metrics=metrics,
-            figures=figures,
+            figures=_figures(logs),
             log_attributes={k: v for k, v in first.attributes.items() if k != "scenario"},
-        )
-        return write_report(results, figures, page)
+        ).write(results)
 
 
 def _read_log(path: Path) -> RunLog:
@@ -101,80 +91,154 @@ def _read_log(path: Path) -> RunLog:
     return log
 
 
-def _deviations(logs: dict[str, RunLog]) -> Figure:
-    with plt.rc_context(STYLE):
-        canvas, (above, below) = make_panels(2)
-        for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
-            distance = np.linalg.norm(log["xi"].values, axis=1) * 1e3
-            above.plot(log.time, distance, color=colour, label=name)
-            error = (log["eta"].values - log["eta_p"].values)[:, 0] * 1e3
-            below.plot(log.time, error, color=colour)
-        above.set(title="Distance from the path", ylabel="distance in mm")
-        below.set(title="Error along the path", ylabel="error in mm")
-        place_legend(above)
-        caption = "Distance from the path and error along it."
-        return render(Drawing("deviations", "Deviations", caption, canvas))
-
-
-def _leads(logs: dict[str, RunLog]) -> Figure:
-    caption = (
-        "Angle between the orientation that each law asks for and the one that belongs to the "
-        "tool's place on the path: zero where the reference waits."
-    )
-    return _draw_one(
-        {name: np.rad2deg(log["orientation_lead"].values[:, 0]) for name, log in logs.items()},
-        logs,
-        "angle in deg",
-        "Reference orientation ahead of the tool's place",
-        ("orientation_lead", "Waiting or running on", caption),
-    )
-
-
-def _forces(logs: dict[str, RunLog]) -> Figure:
-    caption = "Size of the force that acts on the tool, not what the sensor makes of it."
-    return _draw_one(
-        {
-            name: np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)
-            for name, log in logs.items()
-        },
-        logs,
-        "force in N",
-        "Force on the tool",
-        ("forces", "Forces", caption),
-    )
-
-
-def _draw_one(
-    signals: dict[str, np.ndarray],
-    logs: dict[str, RunLog],
-    ylabel: str,
-    title: str,
-    named: tuple[str, str, str],
-) -> Figure:
-    """Draw one signal of every run in one panel; ``named`` are name, title, caption."""
-    with plt.rc_context(STYLE):
-        canvas, (panel,) = make_panels(1)
-        for colour, (name, values) in zip(COLOURS, signals.items(), strict=False):
-            panel.plot(logs[name].time, values, color=colour, label=name)
-        panel.set(title=title, ylabel=ylabel)
-        place_legend(panel)
-        return render(Drawing(*named, canvas))
-
-
-def _orientations(logs: dict[str, RunLog], kind: str) -> Figure:
-    title, ylabel, factor = _ORIENTATIONS[kind]
-    first = next(iter(logs.values()))
-    with plt.rc_context(STYLE):
-        canvas, panels = make_panels(3)
-        for i, (panel, axis) in enumerate(zip(panels, first[f"{kind}_e"].labels, strict=True)):
-            for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
-                for suffix, style, what in (("e", "-", "tool"), ("d", "--", "reference")):
-                    values = factor * log[f"{kind}_{suffix}"].values[:, i]
-                    panel.plot(log.time, values, style, color=colour, label=f"{name}, {what}")
-            panel.set(title=title.format(axis), ylabel=ylabel)
-        place_legend(panels[0], columns=2)
-        caption = (
-            "Tool and the reference that each law compares it with. With path following the "
-            "reference waits while the tool is held back; with trajectory tracking it runs on."
+def _figures(logs: Mapping[str, RunLog]) -> list[style.Figure]:
+    """Draw what all runs have signals for."""
+    figures = [
+        _draw(
+            logs,
+            ("deviations", "Deviations", "Distance from the path and error along it."),
+            [
+                (
+                    "Distance from the path",
+                    "distance in mm",
+                    {"": lambda log: 1e3 * log.norm("xi")},
+                ),
+                (
+                    "Error along the path",
+                    "error in mm",
+                    {"": lambda log: 1e3 * (log["eta"].values - log["eta_p"].values)[:, 0]},
+                ),
+            ],
         )
-        return render(Drawing("orientations", "Orientation", caption, canvas))
+    ]
+    first, shared = next(iter(logs.values())), set.intersection(*map(set, logs.values()))
+    caption = (
+        "Tool and the reference that each law compares it with. With path following the "
+        "reference waits while the tool is held back; with trajectory tracking it runs on."
+    )
+    for kind, (title, ylabel, factor) in _ORIENTATIONS.items():
+        if f"{kind}_e" in shared:
+            panels = [
+                (title.format(axis), ylabel, _tool_and_reference(kind, i, factor))
+                for i, axis in enumerate(first[f"{kind}_e"].labels)
+            ]
+            figures.append(_draw(logs, ("orientations", "Orientation", caption), panels))
+    if "orientation_lead" in shared:
+        title = "Reference orientation ahead of the tool's place"
+        caption = (
+            "Angle between the orientation that each law asks for and the one that belongs to the "
+            "tool's place on the path: zero where the reference waits."
+        )
+        lead = {"": lambda log: np.rad2deg(log["orientation_lead"].values[:, 0])}
+        texts = ("orientation_lead", "Waiting or running on", caption)
+        figures.append(_draw(logs, texts, [(title, "angle in deg", lead)]))
+    if "wrench_ext" in shared:
+        caption = "Size of the force that acts on the tool, not what the sensor makes of it."
+        force = {"": lambda log: np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)}
+        texts = ("forces", "Forces", caption)
+        figures.append(_draw(logs, texts, [("Force on the tool", "force in N", force)]))
+    return figures
+
+
+def _tool_and_reference(kind: str, column: int, factor: float) -> Lines:
+    return {
+        ", tool": lambda log: factor * log[f"{kind}_e"].values[:, column],
+        ", reference": lambda log: factor * log[f"{kind}_d"].values[:, column],
+    }
+
+
+def _draw(
+    logs: Mapping[str, RunLog],
+    texts: tuple[str, str, str],
+    panels: Sequence[tuple[str, str, Lines]],
+) -> style.Figure:
+    """Draw signals of all runs, a colour for each.
+
+    Args:
+        logs: Log of each run.
+        texts: Name, title and caption.
+        panels: Title, label of the vertical axis, and lines of each panel, the second one dashed.
+    """
+    with style.styled():
+        canvas, drawn = style.make_panels(len(panels))
+        for panel, (title, ylabel, lines) in zip(drawn, panels, strict=True):
+            for k, (run, log) in enumerate(logs.items()):
+                for line, (of, values) in zip(("-", "--"), lines.items(), strict=False):
+                    panel.plot(log.time, values(log), line, color=f"C{k}", label=f"{run}{of}")
+            panel.set(title=title, ylabel=ylabel)
+        style.place_legend(drawn[0], columns=len(panels[0][2]) if len(panels[0][2]) > 1 else None)
+        return style.render(style.Drawing(*texts, canvas))
+
+
+def motion_differences(scenarios: Mapping[str, str]) -> list[str]:
+    """Return in what the motions differ that runs were asked for, one phrase each.
+
+    Robots, laws, disturbances and what the tool meets are what one compares; they are no
+    differences here.
+
+    Args:
+        scenarios: Each run's scenario as resolved, by the run's name. One that is no readable YAML
+            tells nothing.
+    """
+    known = {}
+    for name, text in scenarios.items():
+        with suppress(InputError):
+            if isinstance(data := parse_yaml(text, name), dict):
+                known[name] = data
+    runs = list(known)
+    found = [
+        _values_by_run(key, dict(zip(runs, values, strict=True)))
+        for key, values in _unlike("", [{k: d.get(k) for k in _MOTION} for d in known.values()])
+    ]
+    if len(found) > _MOST:
+        more = len(found) - _MOST
+        found[_MOST:] = [f"{more} more key{'s' * (more > 1)}"]
+    return found
+
+
+def _unlike(key: str, values: Sequence[Any]) -> Iterator[tuple[str, Sequence[Any]]]:
+    """Yield the keys below a key, and their values, that are not the same in all runs."""
+    first = values[0] if values else None
+    if all(value == first for value in values):
+        return
+    if all(isinstance(value, dict) for value in values):
+        tags = {str(value.get(TAG_KEY)) for value in values}
+        if len(tags) == 1:
+            for below in dict.fromkeys(name for value in values for name in value):
+                yield from _unlike(f"{key}.{below}".lstrip("."), [v.get(below) for v in values])
+            return
+    if key.rpartition(".")[2] == _FILE and _same_content(values):
+        return
+    yield key, values
+
+
+def _same_content(files: Sequence[Any]) -> bool:
+    """Return whether files hold the same; by their names where they are gone."""
+    try:
+        return len({read_text(Path(str(file))) for file in files}) == 1
+    except InputError:
+        return len({Path(str(file)).name for file in files}) == 1
+
+
+def _values_by_run(key: str, values: Mapping[str, Any]) -> str:
+    """Return what a key is in which runs."""
+    runs: dict[str, list[str]] = {}
+    for run, value in values.items():
+        runs.setdefault(_value_text(value), []).append(run)
+    if len(runs) == 1:
+        return f"{key} is {next(iter(runs))}, but not the same content"
+    return f"{key} is " + ", ".join(
+        f"{shown} in {' and '.join(own)}" for shown, own in runs.items()
+    )
+
+
+def _value_text(value: Any) -> str:
+    if value is None:
+        return "not given"
+    if isinstance(value, dict):
+        return str(value.get(TAG_KEY) or Path(str(value.get(_FILE) or "another one")).name)
+    if isinstance(value, list) and any(isinstance(entry, dict | list) for entry in value):
+        return f"{len(value)} entr{'y' if len(value) == 1 else 'ies'}"
+    if isinstance(value, str) and "/" in value:
+        return Path(value).name
+    return shortened(f"{value:g}" if isinstance(value, float) else str(value))

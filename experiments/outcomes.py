@@ -75,12 +75,28 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
         status, ends = FAULT, [f"fault: {outcome.fault}; {stop}"]
     if outcome.broken:
         status, ends = status or FAULT, [*ends, _missed(outcome.broken)]
-    if outcome.problem is not None:
-        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
-    elif ends:
+    problems = [] if outcome.problem is None else [outcome.problem]
+    return _judge(status, ends, problems, out, outcome.interrupted)
+
+
+def _judge(
+    status: int, ends: list[str], problems: Sequence[str], out: Path | None, interrupted: bool
+) -> int:
+    """Print one line of how it ended, if it did not end well, and return the exit status.
+
+    Args:
+        status: Exit status if all was written.
+        ends: Why it did not end well, one phrase each.
+        problems: What could not be written.
+        out: Folder that holds everything logged until then, if that is to be said.
+        interrupted: Whether the user stopped it.
+    """
+    if problems:
+        status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
+    elif ends and out is not None:
         ends[-1] += f", everything logged so far is kept in {out}"
     if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
+        print_error("; ".join(ends), after_echo=interrupted)
     return status
 
 
@@ -109,13 +125,8 @@ def judge_live(session: "LiveSession") -> int:
             status = status or FAULT
             ends = [*ends, f"{folder.name} {_missed(outcome.broken)}"]
     problems = [kept.problem for kept in session.kept.values() if kept.problem is not None]
-    if problems:
-        status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
-    elif ends and session.kept:
-        ends[-1] += f", everything logged so far is kept in {[*session.kept][-1]}"
-    if ends:
-        print_error("; ".join(ends), after_echo=session.interrupted)
-    return status
+    out = [*session.kept][-1] if session.kept else None
+    return _judge(status, ends, problems, out, session.interrupted)
 
 
 def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
@@ -140,11 +151,8 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
         ends = [f"{ends[0]}, which are kept in {out}; the same command goes on"]
     elif outcome.refusal is not None:
         status, ends = WRONG_INPUT, [f"error: no run could start: {outcome.refusal}"]
-    if outcome.problem is not None:
-        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
-    if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
-    return status
+    problems = [] if outcome.problem is None else [outcome.problem]
+    return _judge(status, ends, problems, None, outcome.interrupted)
 
 
 def print_export(
@@ -195,6 +203,14 @@ def judge_commands(console: Console, commands: "Commands") -> int:
         print_error(f"fault: {why}, from t = {commands.fault_time:.3f} s on")
         return FAULT
     return 0
+
+
+def _numbers_table(*titles: str) -> Table:
+    """Return a table whose columns are numbers."""
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for title in titles:
+        table.add_column(title, justify="right")
+    return table
 
 
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:

@@ -13,7 +13,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.station import Station
 from experiments.integration import choose_integration
-from experiments.results.promises import check_targets
+from experiments.results.requirements import check_targets
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError, nearest_file, shortened
 from pfsc_drake.yaml.reading import resolve_files

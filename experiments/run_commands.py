@@ -91,7 +91,7 @@ def run_command(
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
-    from experiments.simulated_run import run_scenario
+    from experiments.simulated_run import RunOptions, run_scenario
 
     if chosen.scenario in (IDENTIFICATION, TEACH_IN):
         study_command(chosen.scenario, out or Path("out") / chosen.scenario, quiet)
@@ -111,12 +111,8 @@ def run_command(
             outcome = run_scenario(
                 loaded,
                 out=folder,
-                duration=seconds,
-                figures=drawn.figures,
-                recording=drawn.recording,
+                options=RunOptions(seconds, further, margins, drawn.figures, drawn.recording),
                 progress=progress,
-                after_fault=further,
-                margins=margins,
                 warn=warn,
             )
         print_run(console, outcome, said)

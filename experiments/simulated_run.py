@@ -1,6 +1,7 @@
 """One run: from a scenario file to log, metrics, figures, recording and report."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
@@ -15,16 +16,31 @@ from reporting.interruption import noticed_interruption
 from reporting.progress import ProgressListener
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of a run beside its scenario, those of the command line and of the API.
+
+    Attributes:
+        duration: Simulated time [s] instead of the scenario's.
+        after_fault: How long to go on after a fault [s], so that one sees how it ends.
+        margins: Whether to compute the margins of the loop at the start.
+        figures: Whether to draw figures.
+        recording: Whether to record the motion.
+    """
+
+    duration: float | None = None
+    after_fault: float = 0.0
+    margins: bool = False
+    figures: bool = True
+    recording: bool = True
+
+
 def run_scenario(
     scenario: ScenarioFile,
     *,
     out: Path,
-    duration: float | None,
-    figures: bool,
-    recording: bool,
+    options: RunOptions,
     progress: ProgressListener,
-    margins: bool = False,
-    after_fault: float = 0.0,
     warn: Callable[[str], None] = lambda sentence: None,
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
@@ -32,12 +48,8 @@ def run_scenario(
     Args:
         scenario: The scenario as read.
         out: Folder for the results, see :func:`reporting.folder.open_results`.
-        duration: Simulated time [s] instead of the scenario's.
-        figures: Whether to draw figures.
-        recording: Whether to record the motion.
+        options: What to do beside what the scenario says.
         progress: Told how far the run is.
-        margins: Whether to tell the margins of the loop at the start.
-        after_fault: How long to go on after a fault [s], so that one sees how it ends.
         warn: Called with each warning that is known before anything moves; they are among those
             of the outcome, too.
 
@@ -47,10 +59,11 @@ def run_scenario(
     progress(0.0, "preparing")
     inputs = scenario.inputs()
     check_folder(out, "run", inputs)
-    prepared = prepare(scenario, duration, recording=recording, progress=progress)
+    recording = options.recording
+    prepared = prepare(scenario, options.duration, recording=recording, progress=progress)
     for sentence in prepared.warnings:
         warn(sentence)
-    analysis = _analyse(prepared, scenario.path.parent, progress) if margins else None
+    analysis = _analyse(prepared, scenario.path.parent, progress) if options.margins else None
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
         progress.expect(prepared.settings.duration)
@@ -61,11 +74,11 @@ def run_scenario(
                 prepared.settings.duration,
                 progress,
                 interrupted,
-                after_fault,
+                options.after_fault,
             )
         run = FinishedRun(prepared, scenario.name, result, analysis)
         return write_outcome(
-            run, results, progress, interrupted, figures=figures, recording=recording
+            run, results, progress, interrupted, figures=options.figures, recording=recording
         )
 
 

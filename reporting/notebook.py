@@ -8,13 +8,11 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import quote
 
-from reporting.metrics import NOT_A_NUMBER, Metric, format_quantity
-from reporting.registry import known_metric
+from reporting.metrics import Metric
+from reporting.templates import fill
 
 _SHOWN = 8  # metrics of a short table
 _PARTS = 200  # of a whole, between two looks at its progress
-_CELL = 'style="text-align: left; padding: 0.1em 1.5em 0.1em 0"'
-_MARKS = {"met": "✓ met", "missed": "✗ missed"}
 
 
 def in_notebook() -> bool:
@@ -67,15 +65,16 @@ def short_table(
         warnings: What may not have gone as well as hoped, one sentence each.
         metrics: All of them; those with a target are shown, or the first few, others are folded.
     """
-    chosen = [name for name, metric in metrics.items() if metric.target is not None]
-    chosen = (chosen or list(metrics))[:_SHOWN]
-    rest = [name for name in metrics if name not in chosen]
-    lines = [f"<b>{escape(title)}</b>: {escape('; '.join(ends) or 'completed')}"]
-    lines += [f"⚠ {escape(warning)}" for warning in warnings]
-    summary = f"<summary>{len(rest)} more metrics</summary>"
-    folded = f"<details>{summary}{metrics_table(metrics, rest)}</details>" if rest else ""
-    told = "".join(f"<div>{line}</div>" for line in lines)
-    return told + metrics_table(metrics, chosen) + folded
+    targeted = [name for name, metric in metrics.items() if metric.target is not None]
+    chosen = (targeted or list(metrics))[:_SHOWN]
+    return fill(
+        "notebook.html",
+        title=title,
+        ends=ends,
+        warnings=warnings,
+        metrics={name: metrics[name] for name in chosen},
+        folded={name: metric for name, metric in metrics.items() if name not in chosen},
+    )
 
 
 def metrics_table(metrics: Mapping[str, Metric], names: Sequence[str] | None = None) -> str:
@@ -85,22 +84,8 @@ def metrics_table(metrics: Mapping[str, Metric], names: Sequence[str] | None = N
         metrics: The metrics.
         names: Names of those that are shown; by default all.
     """
-    titles = ("Metric", "Value", "Target")
-    head = f"<tr>{''.join(f'<th {_CELL}>{title}</th>' for title in titles)}</tr>"
-    rows = "".join(_row(name, metrics[name]) for name in (metrics if names is None else names))
-    return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
-
-
-def _row(name: str, metric: Metric) -> str:
-    known, target = known_metric(name), escape(metric.target or "")
-    meaning = f' title="{escape(known.text)}"' if known is not None else ""
-    if metric.bound is not None:
-        comparison, number = metric.bound
-        target = escape(f"{comparison} {format_quantity(number, metric.unit)}")
-    value = escape(format_quantity(metric.value, metric.unit) or NOT_A_NUMBER)
-    mark = _MARKS.get(metric.verdict, metric.verdict)
-    cells = (f"<code>{escape(name)}</code>", value, f"{target} {mark}".strip())
-    return f"<tr{meaning}>{''.join(f'<td {_CELL}>{cell}</td>' for cell in cells)}</tr>"
+    shown = {name: metrics[name] for name in (metrics if names is None else names)}
+    return fill("notebook.html", title=None, metrics=shown, folded={})
 
 
 class NotebookProgress:

@@ -1,18 +1,21 @@
-"""How the project's figures look: colours, sizes, grid, panels, and the picture of each."""
+"""How the project's figures look: colours, sizes, grid, panels, and the picture of each.
 
+Matplotlib is imported when something is drawn.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure as Canvas
-from matplotlib.font_manager import FontProperties
-from matplotlib.lines import Line2D
-from matplotlib.textpath import TextPath
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
 
 FloatArray = NDArray[np.float64]
 
@@ -39,6 +42,7 @@ STYLE: Any = {  # Any: matplotlib's own type of the keys changes with its versio
     "axes.labelcolor": INK,
     "axes.labelsize": 11,
     "axes.linewidth": 0.8,
+    "axes.prop_cycle": f"cycler('color', {list(COLOURS)})",
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",
@@ -98,12 +102,28 @@ class Drawing:
     name: str
     title: str
     caption: str
-    canvas: Canvas
+    canvas: "Canvas"
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the project's style."""
+    from matplotlib import rc_context
+
+    with rc_context(STYLE):
+        yield
+
+
+def make_canvas(width: float, height: float) -> "Canvas":
+    """Return an empty canvas of a width and height [inches]."""
+    from matplotlib.figure import Figure as Canvas
+
+    return Canvas(figsize=(width, height))
 
 
 def make_panels(
     count: int, height: float = 2.3, common_time: bool = True
-) -> tuple[Canvas, list[Axes]]:
+) -> "tuple[Canvas, list[Axes]]":
     """A canvas with panels one above the other, on a common time axis unless told otherwise.
 
     Args:
@@ -114,7 +134,7 @@ def make_panels(
     Returns:
         The canvas and its panels from top to bottom.
     """
-    canvas = Canvas(figsize=(WIDTH, height * count + 0.5))
+    canvas = make_canvas(WIDTH, height * count + 0.5)
     panels = canvas.subplots(count, 1, sharex=common_time, squeeze=False)[:, 0]
     if common_time:
         panels[-1].set_xlabel("time in s")
@@ -122,7 +142,7 @@ def make_panels(
 
 
 def draw_components(
-    panel: Axes, time: ArrayLike, values: ArrayLike, labels: list[str], style: str = "-"
+    panel: "Axes", time: ArrayLike, values: ArrayLike, labels: list[str], style: str = "-"
 ) -> None:
     """Draws the columns of a signal, always in the same colours.
 
@@ -137,7 +157,7 @@ def draw_components(
         panel.plot(time, column, style, color=COLOURS[index % len(COLOURS)], label=label)
 
 
-def draw_reference(panel: Axes, time: ArrayLike, values: ArrayLike, label: str) -> None:
+def draw_reference(panel: "Axes", time: ArrayLike, values: ArrayLike, label: str) -> None:
     """Draws the columns of a reference broad and pale, each in its component's colour.
 
     Args:
@@ -148,11 +168,29 @@ def draw_reference(panel: Axes, time: ArrayLike, values: ArrayLike, label: str) 
     """
     for index, column in enumerate(np.asarray(values).T):
         panel.plot(time, column, **BROAD | {"color": COLOURS[index % len(COLOURS)], "alpha": 0.3})
-    panel.add_line(Line2D([], [], **BROAD, label=label))
+    add_entry(panel, label, **BROAD)
+
+
+def add_entry(panel: "Axes", label: str, **line: Any) -> None:
+    """Add an entry to a panel's legend that stands for several lines.
+
+    Args:
+        panel: The panel.
+        label: Text of the entry.
+        line: Properties of its line, as matplotlib has them.
+    """
+    from matplotlib.lines import Line2D
+
+    panel.add_line(Line2D([], [], label=label, **line))
 
 
 def shade(
-    panels: list[Axes], time: FloatArray, where: ArrayLike, label: str, colour: str, hatch: str = ""
+    panels: "list[Axes]",
+    time: FloatArray,
+    where: ArrayLike,
+    label: str,
+    colour: str,
+    hatch: str = "",
 ) -> None:
     """Shade the times at which something holds, from sample to sample.
 
@@ -166,6 +204,8 @@ def shade(
         colour: Colour of the shade.
         hatch: Pattern, where colour alone could be mistaken.
     """
+    from matplotlib.collections import PolyCollection
+
     spans = _visible_spans(time, where)
     if not len(spans):
         return
@@ -204,7 +244,7 @@ def late_samples(time: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(time >= time[0] + 0.25 * (time[-1] - time[0]))
 
 
-def scale_to_late(panel: Axes, time: FloatArray, values: FloatArray) -> None:
+def scale_to_late(panel: "Axes", time: FloatArray, values: FloatArray) -> None:
     """Scales a panel, zero in the middle, to the last three quarters of what it shows.
 
     Args:
@@ -250,7 +290,7 @@ def fitting_unit(values: FloatArray, unit: str) -> tuple[float, str]:
     return (1e6, f"µ{unit}") if 0.0 < largest(values) < MICRO_BELOW else (1e3, f"m{unit}")
 
 
-def place_legend(panel: Axes, columns: int | None = None) -> None:
+def place_legend(panel: "Axes", columns: int | None = None) -> None:
     """Legend above the panel's right end, and above its title too where both are long.
 
     Args:
@@ -274,6 +314,9 @@ def place_legend(panel: Axes, columns: int | None = None) -> None:
 @cache
 def _text_width(text: str, size: float, weight: str = "normal") -> float:
     """Width of a line of text [points]."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
     if not text:
         return 0.0
     font = FontProperties(weight=weight)

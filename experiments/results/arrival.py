@@ -7,7 +7,8 @@ Signals used, as in the log: ``eta``, ``eta_p`` [samples, k] m, ``time_lost`` [s
 import numpy as np
 
 from diagrams.scenario import Scenario
-from experiments.results.path import tangential_error
+from experiments.results.coordinates import tangential_error
+from experiments.results.feature import Feature
 from experiments.results.run_log import RunLog
 from pfsc_drake.following.tasks.task import Task
 from reporting.metrics import Metrics
@@ -63,3 +64,8 @@ def _distance(task: Task, begin: float) -> float:
     times = np.linspace(max(begin, motion.domain[0]), motion.domain[1], _SAMPLES)
     places = motion.derivatives(times, 0)[:, 0]
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+
+FEATURE = Feature(
+    metrics=lambda log, station, settings: arrival_metrics(log, station.task, settings)
+)

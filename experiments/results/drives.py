@@ -1,154 +1,98 @@
-"""Drives and joints of a run: how near to limits, what a reference asks; what their link did.
+"""Law and drives: virtual input, faults, torques, and how often drives are at a limit.
 
-A simulated joint goes on beyond its limits, a real one does not. Signals used, as in the log:
-``q_J``, ``v_J`` and ``tau_d`` [samples, axes], the latter with attribute ``limits``,
-``saturated_drives`` and ``fault`` [samples, 1]; of a link ``status_age`` and ``clipped``.
+Signals used, as in the log: ``tau_d`` [samples, axes] with attribute ``limits``,
+``saturated_drives`` and ``fault`` [samples, 1].
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagrams.scenario import Scenario, Target
 from diagrams.station import Station
-from experiments.results.fastest import fastest_metrics
+from experiments.results.feature import Feature, Raw
+from experiments.results.forces import shade_pushes
+from experiments.results.joints import axis_labels, draw_limit, nears_limit
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.control.estimation.momentum import drive_momentum
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.supervision import DRIVE_MEMORY
-from pfsc_drake.following.planning.drive_plan import DrivePlan
-from pfsc_drake.robot.coordinate_text import coordinate_text
-from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
+from reporting import style
 from reporting.metrics import Metrics
 
-# relative; a limit that is missed by rounding is not passed
-_ROUNDING = 1e-9
-# names of the position metric by whether a joint turns
-_MARGIN = {True: "joint_limit_margin", False: "slide_limit_margin"}
-_SHARE = "joint_velocity_share"
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 SATURATION_MARGIN = 1e-9  # relative; a clipped command equals the limit up to rounding
+PEAK_RATIO = 4.0  # first peak to the rest of the run, from which on the rest is drawn enlarged
+EFFORTS = {"Nm": "torque", "N": "force"}
+_EFFORT_TITLES = {"Nm": "torques", "N": "forces"}
+_TITLES = {"eta": "Tangential", "xi": "Transversal", "phi": "Rotational"}
+_SYMBOLS = {"eta": r"\eta", "xi": r"\xi", "phi": r"\phi"}
+_DWARFED = 4.0  # by how much the start has to be larger than the rest to be cut off
 
 
-@dataclass(frozen=True)
-class DriveLimitsOfRun:
-    """Limits of N joints; infinite where there are none.
+def add_drives(log: RunLog, station: Station, raw: Raw) -> None:
+    """Add what the law commands, how it judges itself, and torques of drives and transmissions.
 
-    Attributes:
-        names: Names of the joints.
-        revolute: Whether they turn (else they slide), shape (N,).
-        position: Lower and upper limits [rad or m], shape (N, 2).
-        velocity: Largest speeds [rad/s or m/s], shape (N,).
+    Args:
+        log: To add to.
+        station: The station that was simulated.
+        raw: What it logged.
     """
+    law, layout, degree = raw["law"], station.law.layout, station.law.linearization.relative_degree
+    faults = [fault.name.lower() for fault in Fault]
+    names = [f"v_{coordinate.name}" for coordinate in station.task.place.coordinates]
+    log.add("virtual_input", law[:, layout.virtual_input], f"SI/s^{degree}", names)
+    fault, rcond, saturated = law[:, layout.status].T[:3]
+    log.add("fault", fault.astype(int), labels=faults)
+    log.add("rcond", rcond)
+    log.add("saturated_drives", saturated.astype(int))
+    requested = raw["stop_category"]
+    if "servo_stop_category" in raw:
+        requested = np.hstack([requested, raw["servo_stop_category"]])
+    # the lowest category is the most urgent, and below 0 there is none
+    urgent = np.where(requested < 0.0, np.inf, requested).min(axis=1)
+    log.add("stop_category", np.where(np.isfinite(urgent), urgent, -1.0).astype(int))
+    if degree > 1:
+        log.add("tau_d", law[:, layout.drive], limits=station.law.limits)
+    if station.servo is not None:
+        if not station.robot.is_massless:
+            log.add("tau_d", raw["drive_torque"], limits=station.servo.limits)
+        log.add("servo_fault", raw["servo_fault"].astype(int), labels=faults)
+    elastic = station.robot.elastic_joints
+    if elastic.any():
+        q_J, v_J, q_M, v_M = np.hsplit(raw["joint_state"], 4)
+        K_s, K_d = station.robot.K_s[elastic], station.robot.K_d[elastic]
+        tau_J = K_s * (q_M - q_J)[:, elastic] + K_d * (v_M - v_J)[:, elastic]
+        log.add("tau_J", tau_J, labels=[f"tau_J_{i + 1}" for i in np.flatnonzero(elastic)])
 
-    names: list[str]
-    revolute: NDArray[np.bool_]
-    position: FloatArray
-    velocity: FloatArray
 
-    @classmethod
-    def of(cls, robot: RobotModel) -> "DriveLimitsOfRun":
-        """Return the limits of a robot.
+def drive_metrics(log: RunLog) -> Metrics:
+    """Return torques of the drives and how often they are at their limits, if they are logged.
 
-        Args:
-            robot: The robot.
-        """
-        return cls(
-            list(robot.names),
-            robot.gather("is_revolute"),
-            robot.gather("position_limits"),
-            largest_speeds(robot),
-        )
-
-    def metric_names(self) -> list[str]:
-        """Return the names of the metrics that :meth:`metrics` gives."""
-        bounded = np.isfinite(self.position).any(axis=1)
-        names = [name for kind, name in _MARGIN.items() if (bounded & self._turns(kind)).any()]
-        return [*names, *([_SHARE] if np.isfinite(self.velocity).any() else [])]
-
-    def metrics(self, log: RunLog) -> Metrics:
-        """Return how near a run came to the limits, with joint and time as the source.
-
-        ``joint_limit_margin`` [rad] is the least distance of a turning joint from a limit of its
-        position, negative if it passed it; ``slide_limit_margin`` [m] that of a sliding one.
-        ``joint_velocity_share`` is the largest ratio of a joint's speed to its limit. Each is
-        there if a joint has such a limit. What is not a number does not count.
-
-        Args:
-            log: With ``q_J`` and ``v_J``.
-        """
-        metrics, known, q = Metrics(), self.metric_names(), log["q_J"].values
-        margin = np.minimum(q - self.position[:, 0], self.position[:, 1] - q)
-        for kind, name in _MARGIN.items():
-            if name in known:
-                least = _least(np.where(self._turns(kind), margin, np.inf), log)
-                metrics.add(name, least[0], source=least[1])
-        if _SHARE in known:
-            least = _least(-self._share(log), log)
-            metrics.add(_SHARE, -least[0], source=least[1])
+    Args:
+        log: Log of a run.
+    """
+    metrics = Metrics()
+    if "tau_d" not in log:
         return metrics
-
-    def warnings(self, log: RunLog) -> list[str]:
-        """Return one sentence for each limit that a run passed.
-
-        Args:
-            log: With ``q_J`` and ``v_J``.
-        """
-        return [*self._passed_positions(log), *self._passed_velocities(log)]
-
-    def _passed_positions(self, log: RunLog) -> Iterator[str]:
-        q, rounding = log["q_J"].values, _ROUNDING * np.maximum(1.0, np.abs(self.position))
-        for i, name in enumerate(self.names):
-            for side, sign in enumerate((-1.0, 1.0)):
-                beyond = sign * (q[:, i] - self.position[i, side])
-                passed = np.flatnonzero(beyond > rounding[i, side])
-                if not passed.size:
-                    continue
-                farthest = int(np.nanargmax(beyond))
-                limit, reached = (
-                    coordinate_text(value, revolute=bool(self.revolute[i]))
-                    for value in (self.position[i, side], q[farthest, i])
-                )
-                yield (
-                    f"joint {i + 1} '{name}' passes its limit of {limit} at "
-                    f"t = {log.time[passed[0]]:.3f} s and reaches {reached} at "
-                    f"t = {log.time[farthest]:.3f} s; the simulation lets it pass"
-                )
-
-    def _passed_velocities(self, log: RunLog) -> Iterator[str]:
-        share, v = self._share(log), log["v_J"].values
-        for i, name in enumerate(self.names):
-            passed = np.flatnonzero(share[:, i] > 1.0 + _ROUNDING)
-            if not passed.size:
-                continue
-            fastest = int(np.nanargmax(share[:, i]))
-            limit, reached = (
-                coordinate_text(value, revolute=bool(self.revolute[i]))
-                for value in (self.velocity[i], abs(v[fastest, i]))
-            )
-            yield (
-                f"joint {i + 1} '{name}' passes its speed limit of {limit}/s at "
-                f"t = {log.time[passed[0]]:.3f} s and reaches {reached}/s at "
-                f"t = {log.time[fastest]:.3f} s; the simulation lets it pass"
-            )
-
-    def _turns(self, kind: object) -> NDArray[np.bool_]:
-        """Return which joints turn, or which do not, shape (N,)."""
-        return np.asarray(self.revolute == kind)
-
-    def _share(self, log: RunLog) -> FloatArray:
-        """Return the ratios of the speeds to their limits, shape (samples, N)."""
-        return np.abs(log["v_J"].values) / self.velocity
+    for axis, torque in enumerate(peak_torque(log), start=1):
+        metrics.add(f"peak_torque_{axis}", float(torque), log["tau_d"].unit)
+    saturated = saturation_count(log)
+    metrics.add("saturated_samples", saturated)
+    metrics.add("saturated_share", saturated / max(log.time.size, 1))
+    if log["tau_d"].limits is not None and "fault" in log:
+        metrics.add("limit_reversals", limit_reversals(log))
+    return metrics
 
 
-def _least(values: FloatArray, log: RunLog) -> tuple[float, str | None]:
-    """Return the least of some joints' values, shape (samples, N), and where it is."""
-    known = np.where(np.isnan(values), np.inf, values)
-    if not np.isfinite(known).any():
-        return np.nan, None
-    k, i = np.unravel_index(np.argmin(known), known.shape)
-    return float(known[k, i]), f"q_{i + 1} at t = {log.time[k]:.3f} s"
+def _requirements(settings: Scenario) -> dict[str, Target]:
+    """Require fewer reversals than the supervision takes for chatter."""
+    turns = settings.faults.chatter_turns
+    return (
+        {"limit_reversals": Target(f"< {turns:g}", "faults.chatter_turns")} if turns > 0.0 else {}
+    )
 
 
 def peak_torque(log: RunLog) -> FloatArray:
@@ -243,120 +187,103 @@ def is_saturated(log: RunLog) -> np.ndarray:
     return saturated
 
 
-def plan_metrics(plan: DrivePlan | None) -> Metrics:
-    """Return the shares of the drives' limits that a reference takes, and how it was slowed.
+def draw_efforts(log: RunLog) -> style.Drawing:
+    """Drive torques or forces, three axes per panel, with limits near enough to matter (dashed).
+
+    Where a short peak flattens everything else, a second panel shows the rest enlarged.
+    """
+    signal = log["tau_d"]
+    title = f"Drive {_EFFORT_TITLES.get(signal.unit, 'torques and forces')}"
+    groups = [range(i, min(i + 3, signal.dim)) for i in range(0, signal.dim, 3)]
+    dwarfed = [style.is_dwarfed(log.time, signal.values[:, group], PEAK_RATIO) for group in groups]
+    canvas, panels = style.make_panels(len(groups) + sum(dwarfed), height=2.6)
+    labels = axis_labels(signal.dim)
+    places = iter(panels)
+    for group, enlarge in zip(groups, dwarfed, strict=True):
+        panel = next(places)
+        _draw_group(panel, log, group, labels)
+        axes = f"axes {group[0] + 1} to {group[-1] + 1}" if len(group) > 1 else labels[group[0]]
+        panel.set(ylabel=effort_label(signal.unit), title=f"{title}, {axes}")
+        style.place_legend(panel)
+        if enlarge:
+            panel = next(places)
+            values = signal.values[:, group]
+            for axis in group:
+                panel.plot(log.time, signal.values[:, axis], color=f"C{axis}")
+            style.scale_to_late(panel, log.time, values)
+            enlarged = "The same, scaled to the last three quarters"
+            panel.set(ylabel=effort_label(signal.unit), title=enlarged)
+    caption = f"{title.removeprefix('Drive ').capitalize()} of the drives"
+    limited = any(nears_limit(signal, axis) for axis in range(signal.dim))
+    caption += "; dashed lines are limits within reach." if limited else "."
+    name = title.lower().replace(" ", "_")
+    return style.Drawing(name, title, caption, canvas)
+
+
+def effort_label(unit: str) -> str:
+    """Label of an axis, in two lines where drives are of both kinds."""
+    return f"{EFFORTS[unit]} in {unit}" if unit in EFFORTS else f"torque or force\nin {unit}"
+
+
+def _draw_group(panel: "Axes", log: RunLog, group: range, labels: list[str]) -> None:
+    """The torques or forces of some axes with their limits."""
+    signal = log["tau_d"]
+    for axis in group:
+        colour = f"C{axis}"
+        panel.plot(log.time, signal.values[:, axis], color=colour, label=labels[axis])
+        draw_limit(panel, signal, axis)
+
+
+def draw_virtual_input(log: RunLog) -> style.Drawing | None:
+    """Virtual input v of the law (Fig. 3.6 c, 4.4 c), a panel for each kind of coordinates.
 
     Args:
-        plan: Plan of the reference; None where nobody planned it.
+        log: With ``virtual_input``, whose labels are those of the coordinates after ``v_``.
     """
-    metrics = Metrics()
-    if plan is None or not len(plan.times):
-        return metrics
-    joints = len(plan.limits) // 2
-    metrics.update(fastest_metrics(plan))
-    shares = {"planned" if plan.limiting else "asked": plan.asked}
-    if plan.is_slowed:
-        shares["planned"] = plan.demand
-        metrics.add("slowest_pace", float(plan.pace.min()))
-        metrics.add("waiting_time", float(plan.waiting_time))
-    # drives whose limits nobody knows have no share of them
-    limited = np.isfinite(plan.limits[:joints]).any()
-    for name, demand in shares.items() if limited else ():
-        share = np.max(np.abs(demand[:, :joints]) / plan.limits[:joints])
-        metrics.add(f"{name}_torque_share", float(share))
-    return metrics
+    signal = log["virtual_input"]
+    kinds = [name for name in _TITLES if name in log]
+    if not kinds:
+        return None
+    canvas, panels = style.make_panels(len(kinds), height=2.1)
+    for kind, panel in zip(kinds, panels, strict=True):
+        columns = [signal.labels.index(f"v_{label}") for label in log[kind].labels]
+        values = signal.values[:, columns]
+        labels = [_symbol(kind, label) for label in log[kind].labels]
+        panel.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
+        style.draw_components(panel, log.time, values, labels)
+        title = _TITLES[kind]
+        if style.is_dwarfed(log.time, values, _DWARFED):
+            style.scale_to_late(panel, log.time, values)
+            title += ", scaled to the last three quarters"
+        unit = _written(signal.unit, log[kind].unit)
+        panel.set(ylabel=f"$v$ in {unit}", title=title)
+    shade_pushes(panels, log)
+    for panel in panels:
+        style.place_legend(panel)
+    order = signal.unit.rpartition("^")[2]
+    word = {"1": "first", "2": "second", "3": "third", "4": "fourth"}[order]
+    caption = (
+        f"What the law asks of the {word} time derivatives of the coordinates: that of the"
+        " reference, less what errors and their integrals are fed back with."
+    )
+    return style.Drawing("virtual_input", "Virtual input of the law", caption, canvas)
 
 
-_COEFFICIENTS = {"f_c": "coulomb", "f_v": "viscous"}
+def _symbol(kind: str, label: str) -> str:
+    """Symbol of a component, of a coordinate like ``xi_1``."""
+    return f"$v_{{{_SYMBOLS[kind]}{label.removeprefix(kind)}}}$"
 
 
-def add_friction(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> None:
-    """Add friction, its estimate, and the momenta and coefficients if those are estimated.
-
-    Args:
-        log: Log of the run.
-        station: The station that was simulated.
-        raw: What its station logged.
-    """
-    if "friction_torque" in raw:
-        log.add("tau_f", raw["friction_torque"])
-    if "friction_estimate" not in raw:
-        return
-    estimate, axes = raw["friction_estimate"], station.robot.dimension
-    parts = np.split(estimate, estimate.shape[1] // axes, axis=1)
-    names = ("friction_estimate", "f_c_estimate", "f_v_estimate")
-    for name, part in zip(names, parts, strict=False):
-        log.add(name, part)
-    if len(parts) == 1:
-        return
-    if "tau_f" in log:
-        friction = station.diagram.GetSubsystemByName("joint_friction")
-        for name, values in zip(("f_c", "f_v"), friction.coefficients(log.time), strict=True):
-            log.add(name, values)
-    log.add("momentum", _momentum(station, raw["joint_state"]))
+def _written(unit: str, coordinate: str) -> str:
+    """Unit of a derivative, ``SI/s^2``, in that of its coordinate, for an axis."""
+    base, _, order = unit.replace("SI", coordinate).partition("^")
+    return base if order == "1" else f"{base}$^{order}$"
 
 
-def friction_metrics(log: RunLog) -> Metrics:
-    """Return the metrics of friction that the log has signals for.
-
-    Errors of coefficients are those at the last sample, of each axis and of the worst.
-    """
-    metrics = Metrics()
-    if log.time.size == 0:
-        return metrics
-    if "friction_estimate" in log and "tau_f" in log:
-        error = log["friction_estimate"].values - log["tau_f"].values
-        for axis, rms in enumerate(np.sqrt(np.mean(error**2, axis=0)), start=1):
-            metrics.add(f"rms_friction_error_{axis}", float(rms), log["tau_f"].unit)
-    for name, kind in _COEFFICIENTS.items():
-        if f"{name}_estimate" not in log or name not in log:
-            continue
-        errors = np.abs(relative_errors(log, name)[-1])
-        metrics.add(f"max_{kind}_error", float(np.nanmax(errors, initial=0.0)))
-        for axis, value in enumerate(errors, start=1):
-            metrics.add(f"{kind}_error_{axis}", float(value))
-    return metrics
-
-
-def relative_errors(log: RunLog, name: str) -> FloatArray:
-    """Return the errors of estimated coefficients, by the true ones, shape (samples, axes).
-
-    NaN where there is no such friction.
-
-    Args:
-        log: With an estimate and its truth.
-        name: ``f_c`` or ``f_v``.
-    """
-    estimate, truth = log[f"{name}_estimate"].values, log[name].values
-    return np.asarray(estimate / np.where(truth > 0.0, truth, np.nan) - 1.0)
-
-
-def _momentum(station: Station, state: FloatArray) -> FloatArray:
-    """Return the momenta on which friction acts, shape (samples, N), of App. A's ``D(q) q'``."""
-    if len(state) == 0:
-        return np.zeros((0, station.robot.dimension))
-    function = drive_momentum(station.robot).function.map(len(state))
-    return np.array(function(state.T)[0]).T
-
-
-def link_metrics(log: RunLog) -> Metrics:
-    """Return what the link did, if there was one.
-
-    Args:
-        log: Log of the run.
-    """
-    metrics = Metrics()
-    if "status_age" not in log:
-        return metrics
-    ages = log["status_age"].values[:, 0]
-    ages = ages[np.isfinite(ages)]
-    median, p99 = np.percentile(ages, [50, 99]) if len(ages) else (np.nan, np.nan)
-    metrics.add("link_answer_us", float(median))
-    metrics.add("link_answer_us_p99", float(p99))
-    metrics.add("missed_ticks", int(np.isnan(log["status_age"].values).sum()))
-    metrics.add("clipped_ticks", int(np.count_nonzero(log["clipped"].values)))
-    if "sent_difference" in log:
-        difference = log["sent_difference"]
-        largest = float(difference.values.max(initial=0.0))
-        metrics.add("largest_sent_difference", largest, difference.unit)
-    return metrics
+FEATURE = Feature(
+    signals=add_drives,
+    metrics=lambda log, station, settings: drive_metrics(log),
+    requirements=_requirements,
+    warnings=lambda log, station, settings: saturation_warnings(log),
+    figures={"virtual_input": draw_virtual_input, "drive_torques": draw_efforts},
+)

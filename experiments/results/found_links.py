@@ -1,12 +1,12 @@
-"""Where links were found without encoders on them, how sure that was, and how true."""
-
-from collections.abc import Mapping
+"""Links located without encoders on them: estimate, standard deviation, error."""
 
 import numpy as np
 
 from diagrams.station import Station
-from experiments.results.run_log import FloatArray, RunLog, peak
+from experiments.results.feature import Feature, Raw
+from experiments.results.run_log import RunLog, peak
 from pfsc_drake.robot.robot_model import pose_function
+from reporting import style
 from reporting.metrics import Metrics
 
 _SIGMAS = 2.0
@@ -16,9 +16,11 @@ _OF_BLOCK = {
     "velocity_deviation": "v_J_deviation",
     "tool_deviation": "y_t_deviation",
 }
+_MILLI = 1e3
+_UNITS = {"rad": "mrad", "m": "mm"}
 
 
-def add_found_links(log: RunLog, station: Station, raw: Mapping[str, FloatArray]) -> None:
+def add_found_links(log: RunLog, station: Station, raw: Raw) -> None:
     """Add where links and tool were found, by what, and standard deviations, if they were.
 
     Args:
@@ -50,7 +52,7 @@ def found_links_metrics(log: RunLog) -> Metrics:
     metrics = Metrics()
     if "q_J_deviation" not in log:
         return metrics
-    tool = np.linalg.norm(log["y_t_deviation"].values, axis=1)
+    tool = log.norm("y_t_deviation")
     metrics.add("largest_tool_deviation", peak(tool))
     if "q_J_found" not in log:
         return metrics
@@ -60,3 +62,40 @@ def found_links_metrics(log: RunLog) -> Metrics:
     share = float(np.mean(off[found] <= _SIGMAS * deviation[found])) if found.any() else np.nan
     metrics.add("links_within_two_sigma", share)
     return metrics
+
+
+def draw_found_links(log: RunLog) -> style.Drawing:
+    """Errors of the links' positions and of the tool point, beside two standard deviations.
+
+    Args:
+        log: With ``q_J``, ``q_J_found``, ``q_J_deviation``, and the same of ``y_t``.
+    """
+    signal = log["q_J"]
+    canvas, panels = style.make_panels(signal.dim + 1, height=1.15)
+    off = _MILLI * (log["q_J_found"].values - signal.values)
+    deviation = _SIGMAS * _MILLI * log["q_J_deviation"].values
+    for axis, panel in enumerate(panels[:-1]):
+        band = deviation[:, axis]
+        panel.fill_between(log.time, -band, band, color=style.REFERENCE, alpha=0.2, linewidth=0.0)
+        panel.plot(log.time, off[:, axis], color=f"C{axis}", label="error")
+        panel.set(ylabel=_UNITS.get(signal.unit, "mrad or mm"))
+        panel.set_title(f"axis {axis + 1}", fontsize=10)
+    tool = _MILLI * np.linalg.norm(log["y_t_found"].values - log["y_t"].values, axis=1)
+    band = _SIGMAS * _MILLI * log.norm("y_t_deviation")
+    panels[-1].fill_between(log.time, 0.0, band, color=style.REFERENCE, alpha=0.2, linewidth=0.0)
+    panels[-1].plot(log.time, tool, color="C0")
+    panels[-1].set(ylabel="mm")
+    panels[-1].set_title("tool point", fontsize=10)
+    style.place_legend(panels[0])
+    caption = (
+        "Positions of the links as they were found from motors and torques, less the true ones, and"
+        " by how far the tool point is off then; grey: within two standard deviations."
+    )
+    return style.Drawing("found_links", "Links as found", caption, canvas)
+
+
+FEATURE = Feature(
+    signals=add_found_links,
+    metrics=lambda log, station, settings: found_links_metrics(log),
+    figures={"found_links": draw_found_links},
+)

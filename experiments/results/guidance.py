@@ -1,17 +1,22 @@
-"""A tool that is led by hand within virtual fixtures: its signals, metrics and warnings."""
+"""Guidance of the tool by hand within virtual fixtures."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import Scenario, Target
 from diagrams.station import Station
-from experiments.results.guides import add_guides
+from experiments.results.feature import Feature, Raw
+from experiments.results.forces import shade_pushes
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord, Mode
-from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.following.tasks.space_task import SpaceTask
+from reporting import style
 from reporting.metrics import Metrics
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # name in the log of what the record has
 _SINGLE = {
@@ -25,24 +30,19 @@ _SINGLE = {
     "limit": "speed_limit",
     "squeezed": "squeezed",
 }
-# ticks over which motion is compared, and m/s by which it has to change meanwhile, rms
-_SPAN, _MOVED = 20, 2e-3
-# of the lag, and s, that it may be wrong by
-_SHARE, _LEAST = 0.3, 1e-3
-# m, from a region that leaves no room
-_TIGHT = 1e-3
+MILLI = 1e3
+FAR = 0.03  # m, distances above which nobody needs to see
+CLOSE = 3e-4  # m, of the enlargement
+MOST_NAMED = 6  # regions with an entry in a legend
 
 
-def add_guidance(
-    log: RunLog, station: Station, raw: dict[str, FloatArray], y_t: FloatArray
-) -> None:
+def add_guidance(log: RunLog, station: Station, raw: Raw) -> None:
     """Add modes, what the rules went by, and how far the tool truly is from each region.
 
     Args:
         log: To add to.
         station: The station that was simulated.
         raw: What it logged.
-        y_t: True tool points [m], shape (samples, 3).
     """
     task = station.task
     if "guidance" not in raw or not isinstance(task, SpaceTask):
@@ -59,34 +59,9 @@ def add_guidance(
     log.add("near_regions", rows["near"], labels=slots)
     for name in ("labels", "evaluated", "on"):
         log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), labels=names)
-    distances = task.distances(y_t, region_times(log, task.lead.lag))
+    distances = task.distances(raw["true_pose"][:, :3], region_times(log, task.lead.lag))
     distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
     log.add("region_distance", distances, labels=names)
-    kinds, forces = limit_forces(rows["near"], len(names), station.robot.dimension)
-    log.add("limit_force", forces, labels=kinds)
-    add_guides(log, task, raw, y_t)
-
-
-def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str], FloatArray]:
-    """Return by what forces the limits of the robot itself held the tool.
-
-    Args:
-        near: Slots as recorded, shape (samples, slots x 10).
-        regions: Number of regions, behind which the limits are numbered.
-        joints: N.
-
-    Returns:
-        Kinds of limits as in :func:`limit_kinds`, each once, and their forces [N], shape
-        (samples, kinds).
-    """
-    all_kinds = limit_kinds(joints)
-    kinds = list(dict.fromkeys(all_kinds))
-    slots = near.reshape(len(near), near.shape[1] // len(SLOT), len(SLOT))
-    index, phi = slots[..., SLOT.index("index")] - regions, slots[..., SLOT.index("phi")]
-    forces = np.zeros((len(near), len(kinds)))
-    for number, kind in enumerate(all_kinds):
-        forces[:, kinds.index(kind)] += np.sum(np.where(index == number, phi, 0.0), axis=1)
-    return kinds, forces
 
 
 def region_times(log: RunLog, lag: float) -> FloatArray:
@@ -147,7 +122,7 @@ def guidance_metrics(log: RunLog) -> Metrics:
     steps = np.linalg.norm(np.diff(command, axis=0), axis=1)
     metrics.add("largest_command_step", float(np.nanmax(steps, initial=0.0)))
     metrics.add("largest_command", float(np.nanmax(np.linalg.norm(command, axis=1))))
-    period = float(np.median(np.diff(log.time))) if log.time.size > 1 else 0.0
+    period = log.period
     power = np.sum(log["guiding_force"].values * command, axis=1)
     # the least that the hand has given up to any instant: what it got out of the fixtures
     metrics.add("energy_from_fixtures", max(0.0, float(-np.nanmin(np.cumsum(power)) * period)))
@@ -193,100 +168,169 @@ def soft_regions(log: RunLog) -> FloatArray:
     return np.unique(index[(stiffness > 0.0) & (index >= 0.0)]).astype(int)
 
 
-def limit_metrics(log: RunLog) -> Metrics:
-    """Return for how long, and how hard, the robot's own limits held the hand.
-
-    Args:
-        log: Log of a run; without ``limit_force`` there are no such metrics.
-    """
-    metrics = Metrics()
-    if "limit_force" not in log or log.time.size < 2:
-        return metrics
-    forces = np.nan_to_num(log["limit_force"].values)
-    period = float(np.median(np.diff(log.time)))
-    held = np.count_nonzero(np.any(forces > 0.0, axis=1))
-    metrics.add("time_at_limits", held * period)
-    metrics.add("largest_limit_force", float(np.max(forces)))
-    return metrics
+def has_regions(log: RunLog) -> bool:
+    """Whether the log is that of a tool that regions may hold."""
+    return log["region_distance"].dim > 0
 
 
-def guidance_warnings(log: RunLog, settings: Scenario) -> list[str]:
-    """Return what a run within fixtures has shown to be otherwise, one sentence each.
-
-    Args:
-        log: Log of the run.
-        settings: Its scenario.
-    """
-    if "squeezed" not in log or not log.time.size or settings.fixtures is None:
-        return []
-    return [*_squeezed(log), *_late_servos(log, settings)]
-
-
-def observed_lag(log: RunLog, believed: float) -> float | None:
-    """Return the lag of velocity servos, from what was asked of them and measured [s].
-
-    The rules look at ``z = y + tau y' + T sum of commands under way``. Behind servos with
-    ``y'' = (v - y') / tau`` it moves by T v in a tick. What it moves beside that is the error of
-    ``tau`` times the change of ``y'``.
-
-    Args:
-        log: Log of a run with the law ``velocity_servo``.
-        believed: ``tau`` [s].
-
-    Returns:
-        None where the tool hardly moved.
-    """
-    y = log["y_t_measured" if "y_t_measured" in log else "y_t"].values
-    z, v = log["rest_point"].values, log["velocity_command"].values
-    known = np.isfinite(v).all(axis=1)
-    if np.count_nonzero(known) <= _SPAN:
+def draw_guidance(log: RunLog) -> style.Drawing | None:
+    """Mode, distance from the regions that were near, enlarged, and the speed."""
+    if not has_regions(log):
         return None
-    z, v, period = z[known], v[known], float(np.median(np.diff(log.time)))
-    # what was asked at a tick counts from the next one on
-    error = z - period * (np.cumsum(v, axis=0) - v)
-    rate = np.gradient(y[known], period, axis=0)
-    beside, change = (x[_SPAN:] - x[:-_SPAN] for x in (error, rate))
-    if np.sqrt(np.mean(change**2)) < _MOVED:
+    canvas, (mode, distance, close, speed) = style.make_panels(4)
+    _draw_mode(mode, log)
+    values, names = _near_distances(log)
+    for panel in (distance, close):
+        panel.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
+        for k, (column, name) in enumerate(zip(values.T, names, strict=True)):
+            label = name if k < MOST_NAMED else None
+            panel.plot(log.time, MILLI * column, color=f"C{k}", label=label)
+        panel.set(ylabel="distance in mm")
+    distance.set(title="Distance from the regions", ylim=(-0.05 * MILLI * FAR, MILLI * FAR))
+    close.set(title="The same, close by", ylim=(-MILLI * CLOSE, MILLI * CLOSE))
+    command = log.norm("velocity_command")
+    speed.plot(log.time, command, color="C0")
+    speed.set(title="Speed that is asked of the tool", ylabel="speed in m/s")
+    shade_pushes([distance], log)
+    style.place_legend(distance)
+    caption = (
+        "What the tool is led along; how far it truly is from the regions, negative inside; "
+        "and how fast it is asked to move."
+    )
+    return style.Drawing("guidance", "Guidance within fixtures", caption, canvas)
+
+
+def _draw_mode(panel: "Axes", log: RunLog) -> None:
+    names = log["mode"].labels
+    panel.step(log.time, log["mode"].values[:, 0], where="post", color="C0")
+    panel.set(title="Mode", yticks=range(len(names)), ylim=(-0.3, len(names) - 0.7))
+    panel.set_yticklabels(names)
+
+
+def _near_distances(log: RunLog) -> tuple[FloatArray, list[str]]:
+    """Return the distances of regions that were near [m], the closest first, and their names."""
+    values, names = log["region_distance"].values, log["region_distance"].labels
+    least = np.nanmin(values, axis=0, initial=np.inf)
+    shown = [i for i in np.argsort(least) if least[i] < FAR]
+    return values[:, shown], [names[i] for i in shown]
+
+
+def draw_contact(log: RunLog) -> style.Drawing | None:
+    """The longest way along one surface: tangential and transversal coordinates, and forces."""
+    rows, region = _longest_contact(log)
+    if rows.size <= 1:
         return None
-    return believed - float(np.sum(beside * change) / np.sum(change**2))
+    canvas, (tangential, transversal, force) = style.make_panels(3)
+    time = log.time[rows]
+    slot = slots_of(log, region)
+    n, phi = slot["n"][rows], slot["phi"][rows]
+    coordinates = _along(log["y_t"].values[rows], n)
+    style.draw_components(tangential, time, coordinates, [r"$\eta_{1,1}$", r"$\eta_{1,2}$"])
+    tangential.set(title="Tangential coordinates", ylabel="way in m")
+    xi = log["region_distance"].values[rows, region]
+    transversal.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
+    transversal.plot(time, MILLI * xi, color="C0", label=r"$\xi_1$")
+    transversal.set(title="Transversal coordinate, negative inside", ylabel="distance in mm")
+    f = log["guiding_force"].values[rows]
+    pressing = -np.sum(f * n, axis=1)
+    force.plot(time, phi, color="C1", label=r"of the fixture $\varphi$")
+    force.plot(time, pressing, "--", color=style.INK, label="of the hand, into it")
+    force.plot(
+        time, np.linalg.norm(f + pressing[:, None] * n, axis=1), color="C2", label="along it"
+    )
+    force.set(title="Forces", ylabel="force in N")
+    for panel in (tangential, transversal, force):
+        style.place_legend(panel)
+    name = log["region_distance"].labels[region]
+    caption = f"The longest way along one surface, {name}."
+    return style.Drawing("contact", "Along a surface", caption, canvas)
 
 
-def _late_servos(log: RunLog, settings: Scenario) -> list[str]:
-    fixtures, servo = settings.fixtures, settings.servo
-    if fixtures is None or settings.controller.law_record.commands_torque:
-        return []
-    believed = fixtures.lag_behind(servo.bandwidth)
-    lag = observed_lag(log, believed)
-    if lag is None or abs(lag - believed) <= max(_SHARE * believed, _LEAST):
-        return []
-    least = 2.0 * (lag + servo.bus_delay)
-    return [
-        f"the tool follows the asked velocity by {1e3 * lag:.2g} ms later, not by "
-        f"{1e3 * believed:.2g} ms as fixtures.servo_lag has it (by default 1 / servo.bandwidth), "
-        f"and so enters regions deeper: set it, and fixtures.guidance.approach_time to {least:.2g} "
-        "s or more"
-    ]
+def _longest_contact(log: RunLog) -> tuple[FloatArray, int]:
+    """Return the samples of the longest way along a single region, and which it is."""
+    held = log["region_labels"].values
+    alone = held * (held.sum(axis=1, keepdims=True) == 1)
+    longest: tuple[FloatArray, int] = np.zeros(0, dtype=int), 0
+    for region, column in enumerate(alone.T):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], column, [0]]))).reshape(-1, 2)
+        for begin, end in edges:
+            if end - begin > longest[0].size:
+                longest = np.arange(begin, end), region
+    return longest
 
 
-def _squeezed(log: RunLog) -> list[str]:
-    ticks = np.flatnonzero(log["squeezed"].values[:, 0] > 0.5)
-    if not ticks.size:
-        return []
-    distance = log["region_distance"]
-    period = float(np.median(np.diff(log.time)))
-    names = [
-        name
-        for i, name in enumerate(distance.labels or [])
-        if np.any(_is_tight(slots_of(log, i))[ticks])
-    ]
-    deepest = -float(np.nanmin(distance.values[ticks], initial=0.0))
-    return [
-        f"{' and '.join(names)} squeezed the tool for {period * ticks.size:.3g} s from t = "
-        f"{log.time[ticks[0]]:.3f} s on: no place near it is admitted by all of them, and it was "
-        f"up to {1e3 * deepest:.2g} mm in one"
-    ]
+def _along(y_t: FloatArray, n: FloatArray) -> FloatArray:
+    """Return the way of a tool along a surface [m], shape (samples, 2).
+
+    The second coordinate rises as much as the surface allows, the first is level.
+    """
+    up = np.eye(3)[np.argmin(np.abs(n).mean(axis=0)) if np.abs(n[:, 2]).mean() > 0.9 else 2]
+    rising = up - n * (n @ up)[:, None]
+    rising /= np.linalg.norm(rising, axis=1, keepdims=True)
+    level = np.cross(rising, n)
+    steps = np.diff(y_t, axis=0)
+    ways = np.stack([np.sum(steps * e[:-1], axis=1) for e in (level, rising)], axis=1)
+    return np.vstack([np.zeros(2), np.cumsum(ways, axis=0)])
 
 
-def _is_tight(slots: dict[str, FloatArray]) -> NDArray[np.bool_]:
-    """Return when the tool was in a hard region, or all but, shape (samples,)."""
-    return (slots["stiffness"] == 0.0) & (slots["h"] < _TIGHT)
+def gives_energy(log: RunLog) -> bool:
+    """Whether regions moved or gave way, so that energy went back and forth."""
+    if "guide" in log:
+        return True
+    if not has_regions(log):
+        return False
+    slots = log["near_regions"].values
+    return bool(np.any(log["spring_energy"].values > 0.0)) or _moves(slots)
+
+
+def _moves(slots: FloatArray) -> bool:
+    u = slots.reshape(len(slots), -1, len(SLOT))[..., SLOT.index("u")]
+    return bool(np.any(u != 0.0))
+
+
+def draw_energy(log: RunLog) -> style.Drawing | None:
+    """Tank, springs, what the hand has given, and the pace of moving regions."""
+    if not gives_energy(log):
+        return None
+    canvas, (stored, given, pace) = style.make_panels(3)
+    stored.plot(log.time, log["tank"].values[:, 0], color="C0", label="tank $x$")
+    stored.plot(
+        log.time,
+        log["spring_energy"].values[:, 0],
+        color="C1",
+        label="springs and guides $V$" if "guide" in log else "springs $V$",
+    )
+    stored.set(title="Energy that is stored", ylabel="energy in J")
+    period = log.period
+    power = np.sum(log["guiding_force"].values * log["velocity_command"].values, axis=1)
+    given.plot(log.time, np.cumsum(power) * period, color="C2", label="the hand's work")
+    bound = -float(log["tank"].values[0, 0] + log["spring_energy"].values[0, 0])
+    given.axhline(bound, color=style.INK, linestyle="--", label="never below")
+    given.set(title=r"Work of the hand $\int f \cdot v\, dt$", ylabel="work in J")
+    pace.plot(log.time, log["region_rate"].values[:, 0], color="C3")
+    pace.set(
+        title=r"Share of their pace with which regions move $\rho$", ylabel="share", ylim=(0, 1.05)
+    )
+    for panel in (stored, given):
+        style.place_legend(panel)
+    caption = (
+        "The tank pays for what moving or pushing regions give to the hand, and damping fills it; "
+        "the work of the hand never falls below what was stored at the start."
+    )
+    return style.Drawing("energy", "Energy of the fixtures", caption, canvas)
+
+
+def _requirements(settings: Scenario) -> dict[str, Target]:
+    """Require that no hard region is entered by more than its bound."""
+    if settings.fixtures is None:
+        return {}
+    return {"deepest_violation": Target(f"<= {settings.fixtures.bound:g}", "fixtures.bound")}
+
+
+FEATURE = Feature(
+    signals=add_guidance,
+    metrics=lambda log, station, settings: guidance_metrics(log),
+    requirements=_requirements,
+    always=("deepest_violation",),
+    figures={"guidance": draw_guidance, "contact": draw_contact, "energy": draw_energy},
+)

@@ -1,19 +1,25 @@
-"""Signals and metrics of a workpiece that moves: who carries it, and how the robot sees it."""
+"""Workpiece that moves: the robot or turntable that carries it, and the tool on it."""
 
 import numpy as np
 
 from diagrams.holder_station import HOLDER
 from diagrams.station import Station
 from diagrams.turntable_station import TURNTABLE
+from experiments.results.feature import Feature, Raw
+from experiments.results.joints import axis_labels
 from experiments.results.run_log import FloatArray, RunLog, peak
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.manifolds.carried import flange_motion_function
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, frame_size
+from pfsc_drake.geometry import angle_between
 from pfsc_drake.geometry.rotation import placed_points
+from reporting import style
 from reporting.metrics import Metrics
 
+_SMOOTHED = 5  # samples, of speeds that are differences of true positions
 
-def workpiece_motion(station: Station, raw: dict[str, np.ndarray]) -> FloatArray | None:
+
+def workpiece_motion(station: Station, raw: Raw) -> FloatArray | None:
     """Return the true motion of the workpiece, up to its velocity.
 
     Args:
@@ -57,7 +63,7 @@ def seen_poses(pose: FloatArray, frames: FloatArray) -> FloatArray:
     return np.hstack([y_C, R_Ce.reshape(-1, 9)])
 
 
-def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+def add_holder_signals(log: RunLog, station: Station, raw: Raw) -> None:
     """Add where the workpiece is, and what the robot does that holds it.
 
     Args:
@@ -65,12 +71,12 @@ def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]
         station: The station that was simulated.
         raw: What it logged.
     """
-    holder, frames = station.holder, workpiece_motion(station, raw)
-    if frames is None:
+    if "workpiece_motion" not in raw:
         return
+    holder, frames = station.holder, raw["workpiece_motion"]
     if holder is None:
         log.add("workpiece_pose", frames[:, :POSE_SIZE])
-        log.add("y_t_world", placed_points(log["y_t"].values, frames))
+        log.add("y_t_world", placed_points(raw["true_pose"][:, :3], frames))
         angles, rates = np.hsplit(raw[f"{TURNTABLE}motion"], 2)
         log.add("turntable_angles", angles)
         log.add("turntable_rates", rates)
@@ -78,7 +84,7 @@ def add_holder_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]
         return
     own = {name.removeprefix(HOLDER): x for name, x in raw.items() if name.startswith(HOLDER)}
     log.add("workpiece_pose", frames[:, :POSE_SIZE])
-    log.add("y_t_world", placed_points(log["y_t"].values, frames))
+    log.add("y_t_world", placed_points(raw["true_pose"][:, :3], frames))
     robot, layout = holder.part.robot, holder.law.layout
     limits = {
         "q_J": robot.gather("position_limits"),
@@ -137,7 +143,7 @@ def holder_metrics(log: RunLog, begin: float) -> Metrics:
     metrics.add("peak_tool_speed_world", peak(_speeds(time, log["y_t_world"].values)))
     held = f"{HOLDER}xi" in log
     if held:
-        xi = np.linalg.norm(log[f"{HOLDER}xi"].values, axis=1)
+        xi = log.norm(f"{HOLDER}xi")
         metrics.add("max_workpiece_deviation", peak(xi[counting]))
     error = log["frame_error"].values
     metrics.add("max_frame_error", peak(error[counting, 0]))
@@ -153,3 +159,73 @@ def _speeds(time: FloatArray, points: FloatArray) -> FloatArray:
     """Return the speed of a point from sample to sample [m/s], shape (samples - 1,)."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.asarray(steps / np.diff(time))
+
+
+def draw_two_arms(log: RunLog) -> style.Drawing:
+    """Speeds of tool and workpiece, how the workpiece turns, and how far it is from its belief."""
+    canvas, panels = style.make_panels(4)
+    pose, time = log["workpiece_pose"].values, log.time
+    speeds, turning, slope, belief = panels
+    speeds.plot(time, log["eta_dot"].values[:, 0], color="C0", label="along the path")
+    speeds.plot(time, _speed(log["y_t_world"].values, time), color="C1", label="tool, world")
+    speeds.plot(time, _speed(pose[:, :3], time), color="C2", label="workpiece, world")
+    speeds.set(ylabel="speed in m/s", title="Speeds of tool and workpiece")
+    style.place_legend(speeds)
+    R = pose[:, 3:].reshape(-1, 3, 3)
+    turned = np.rad2deg([angle_between(R[:, :, k], R[:1, :, k]) for k in range(3)])
+    style.draw_components(turning, time, turned.T, ["x axis", "y axis", "z axis"])
+    turning.set(ylabel="angle in deg", title="How far the workpiece's axes are from the start")
+    style.place_legend(turning)
+    if "holder_xi" in log:
+        own = log["holder_xi"].values
+        scale, unit = style.fitting_unit(own, "m")
+        style.draw_components(slope, time, scale * own, [r"$\xi_1$", r"$\xi_2$"])
+        title = "The workpiece beside its own path, as measured"
+        slope.set(ylabel=f"deviation in {unit}", title=title)
+    else:
+        angles = np.rad2deg(log["turntable_angles"].values)
+        labels = [f"axis {k + 1}" for k in range(angles.shape[1])]
+        style.draw_components(slope, time, angles, labels)
+        slope.set(ylabel="angle in deg", title="Axes of the turntable")
+    style.place_legend(slope)
+    error = log["frame_error"].values
+    scale, unit = style.fitting_unit(error[:, :1], "m")
+    belief.plot(time, scale * error[:, 0], color="C0")
+    belief.set(ylabel=f"distance in {unit}", title="Where it is against where its motion is told")
+    caption = (
+        "Speeds of the tool on the workpiece and of both in the world, how the workpiece turns, "
+        "what carries it, and what the tool's controller cannot know of where it is."
+    )
+    return style.Drawing("two_arms", "Two arms", caption, canvas)
+
+
+def draw_holder_torques(log: RunLog) -> style.Drawing:
+    """Drive torques of the robot that holds the workpiece, three axes per panel."""
+    signal = log["holder_tau_d"]
+    groups = [range(i, min(i + 3, signal.dim)) for i in range(0, signal.dim, 3)]
+    canvas, panels = style.make_panels(len(groups))
+    labels = axis_labels(signal.dim)
+    for panel, group in zip(panels, groups, strict=True):
+        chosen = [labels[i] for i in group]
+        style.draw_components(panel, log.time, signal.values[:, group], chosen)
+        panel.set(ylabel=f"torque in {signal.unit}")
+        style.place_legend(panel)
+    caption = "Torques of the drives of the robot that holds the workpiece."
+    return style.Drawing("holder_torques", "Drive torques of the holder", caption, canvas)
+
+
+def _speed(points: FloatArray, time: FloatArray) -> FloatArray:
+    """Return the speed of a point [m/s], shape (samples,)."""
+    if len(time) <= _SMOOTHED:
+        return np.full(len(time), np.nan)
+    rates = np.gradient(points, time, axis=0)
+    kernel = np.ones(_SMOOTHED) / _SMOOTHED
+    smooth = [np.convolve(rate, kernel, mode="same") for rate in rates.T]
+    return np.asarray(np.linalg.norm(smooth, axis=0))
+
+
+FEATURE = Feature(
+    signals=add_holder_signals,
+    metrics=lambda log, station, settings: holder_metrics(log, settings.reference.dwell),
+    figures={"two_arms": draw_two_arms, "holder_torques": draw_holder_torques},
+)

@@ -1,4 +1,4 @@
-"""Obstacles that cross a path: their distance from the arm, and what waiting for them costs.
+"""Obstacles that cross a path: distance from the arm, scaled speed of the reference, time lost.
 
 Signals used, as in the log: ``obstacle_position`` [samples, 3K] m, ``obstacle_distance``
 [samples, K] m, ``arm_speed`` [samples, 1] m/s, ``time_lost`` [samples, 1] s.
@@ -6,16 +6,23 @@ Signals used, as in the log: ``obstacle_position`` [samples, 3K] m, ``obstacle_d
 
 import numpy as np
 
+from diagrams.scenario import Scenario, Target
 from diagrams.scenario.obstacles import CrossingParameters
 from diagrams.station import Station
+from experiments.results.feature import Feature, Raw
 from experiments.results.run_log import FloatArray, RunLog, peak
 from pfsc_drake.control.obstacles.clearance import least_distances
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import arm_outline, outline_points
+from reporting import style
 from reporting.metrics import Metrics
 
+_PASSES, _WAITS = "#DCFCE7", "#FEF3C7"
+_RESTING = 0.05  # of the planned pace, below which the reference waits
+_FAR = 2.0  # m, distances above which nobody needs to see
 
-def add_obstacles(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> None:
+
+def add_obstacles(log: RunLog, station: Station, raw: Raw) -> None:
     """Add where obstacles are, how far the true arm is from them, and how progress waits.
 
     Args:
@@ -92,3 +99,59 @@ def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metric
     speed = np.linalg.norm(np.gradient(position, log.time, axis=0), axis=2)
     metrics.add("largest_obstacle_speed", peak(speed[np.isfinite(speed)]))
     return metrics
+
+
+def draw_obstacles(log: RunLog) -> style.Drawing:
+    """Distance between arm and obstacles, pace of the reference, and time lost.
+
+    Args:
+        log: With ``obstacle_distance``, ``waiting_pace``, ``permitted_pace``, ``time_lost``.
+    """
+    canvas, (distance, pace, lost) = style.make_panels(3, height=2.4)
+    signal = log["obstacle_distance"]
+    for k, column in enumerate(signal.values.T):
+        name = signal.labels[k].replace("_", " ")
+        distance.plot(log.time, column, color=f"C{k}", label=name)
+    if signal.limits is not None:
+        margin = float(signal.limits[0, 0])
+        distance.axhline(margin, linestyle="--", color=style.INK, linewidth=1.1, label="margin")
+    top = min(_FAR, 1.05 * float(np.nanmax(signal.values, initial=0.1)))
+    distance.set(ylabel="distance in m", title="Arm and obstacles", ylim=(0.0, top))
+    going = log["waiting_pace"].values[:, 0]
+    permitted = log["permitted_pace"].values[:, 0]
+    pace.plot(log.time, going, color="C0", label="pace")
+    pace.plot(log.time, permitted, "--", color=style.REFERENCE, label="permitted, whatever they do")
+    pace.set(ylabel="pace / planned", title="Pace of the reference")
+    pace.set_ylim(min(-0.02, 1.05 * float(going.min(initial=0.0))), 1.05)
+    lost.plot(log.time, log["time_lost"].values[:, 0], color="C1")
+    lost.set(ylabel="time in s", title="Time lost", ylim=(0.0, None))
+    running = np.flatnonzero(going)
+    waits = np.abs(going) < _RESTING
+    if running.size:
+        waits[: running[0]] = waits[running[-1] :] = False
+    style.shade([distance, pace, lost], log.time, waits, "waits", _WAITS)
+    for panel in (distance, pace):
+        style.place_legend(panel)
+    caption = (
+        "True distance between the surfaces of the arm and of what crosses its path; the share of "
+        "its planned pace at which the reference moves, and what could still be stopped in time; "
+        "how much later than planned the reference is."
+    )
+    return style.Drawing("obstacles", "Obstacles", caption, canvas)
+
+
+def _requirements(settings: Scenario) -> dict[str, Target]:
+    """Require the margin of the watch while the arm moves."""
+    if settings.obstacles is None:
+        return {}
+    margin = settings.obstacles.watch.margin
+    return {"least_distance_while_moving": Target(f">= {margin:g}", "obstacles.watch.margin")}
+
+
+FEATURE = Feature(
+    signals=add_obstacles,
+    metrics=lambda log, station, settings: obstacle_metrics(log, settings.obstacles),
+    requirements=_requirements,
+    always=("least_distance_while_moving",),
+    figures={"obstacles": draw_obstacles},
+)

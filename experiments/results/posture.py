@@ -1,172 +1,32 @@
-"""What happens to an arm beside its tool: pushes on its links, its elbow, its posture.
+"""Posture of redundant arms, and conditioning of the decoupling matrix.
 
-Signals used, as in the log: ``push_force`` [samples, 3K] N, ``elbow`` and perhaps
-``elbow_undisturbed`` [samples, 3] m, ``q_J``, ``v_J`` [samples, N] rad and rad/s, ``q_posture``
-[samples, N] rad, ``eta``, ``eta_dot`` [samples, 1] m and m/s.
+Signals used, as in the log: ``q_J``, ``v_J`` [samples, N] rad and rad/s, ``q_posture``
+[samples, N] rad, ``eta``, ``eta_dot`` [samples, 1] m and m/s, ``rcond`` [samples, 1].
 """
 
 import math
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from diagrams.robots.arm import Arm
+from diagrams.scenario import Scenario
 from diagrams.station import Station
-from experiments.results.run_log import FloatArray, RunLog
+from experiments.results.feature import Feature, Raw
+from experiments.results.forces import shade_pushes
+from experiments.results.joints import axis_labels, has_spare_joints, position_unit
+from experiments.results.pushes import finite_peak, is_redundant
+from experiments.results.run_log import RunLog
 from pfsc_drake import jets
-from pfsc_drake.physics.link_forces import link_points_function
+from reporting import style
 from reporting.metrics import Metrics
-
-# what stands in a station's log where links are pushed
-_PUSHES = "push_wrench"
-# of a lap, by which a tool that rests after a lap may miss its end
-_SAME = 1e-4
-PUSHED = 0.05  # share of a run's largest force, from which on it counts as a push
-
-
-def is_redundant(station: Station) -> bool:
-    """Return whether a station's robot has more joints than its task needs."""
-    return station.robot.dimension > station.law.linearization.num_outputs
-
-
-def has_elbow(station: Station) -> bool:
-    """Return whether a point of a station's arm is worth a look beside its tool."""
-    arm = isinstance(station.part, Arm)
-    return arm and (_PUSHES in station.log.rows or is_redundant(station))
-
-
-def elbow_motion(station: Station, joint_state: FloatArray) -> FloatArray:
-    """Return where the elbow is [m], shape (samples, 3).
-
-    It is the point that is pushed, the first of several; else, of a redundant arm, the origin of
-    the middle link's joint frame.
-
-    Args:
-        station: The station, with an elbow, see :func:`has_elbow`.
-        joint_state: ``[q_J, v_J, q_M, v_M]``, shape (samples, 4N).
-    """
-    assert isinstance(station.part, Arm)  # see has_elbow
-    if len(joint_state) == 0:
-        return np.zeros((0, 3))
-    chain = station.part.robot
-    point = (chain.dimension // 2, np.zeros(3))
-    if _PUSHES in station.log.rows:
-        first = station.diagram.GetSubsystemByName("link_pushes").places[0]
-        point = (first.link, first.p_LQ)
-    function = link_points_function(chain, [point]).map(len(joint_state))
-    return np.array(function(joint_state[:, : chain.dimension].T)).T
-
-
-def push_forces(raw: dict[str, FloatArray]) -> FloatArray:
-    """Return the forces on K points of links, world axes [N], shape (samples, 3K).
-
-    Args:
-        raw: Logged signals of a station, with ``push_wrench``.
-    """
-    wrenches = raw[_PUSHES]
-    force = wrenches.reshape(len(wrenches), wrenches.shape[1] // 6, 2, 3)[:, :, 0]
-    return force.reshape(len(wrenches), wrenches.shape[1] // 2)
-
-
-def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> None:
-    """Add pushes, three columns for each point, and where the elbow is and would have been.
-
-    Args:
-        log: With ``eta``.
-        station: The station that was simulated.
-        raw: Its logged signals.
-    """
-    labels = [f"{station.robot.names[station.robot.dimension // 2]} {axis}" for axis in "xyz"]
-    if _PUSHES in raw:
-        places = station.diagram.GetSubsystemByName("link_pushes").places
-        labels = [f"{place.name} {axis}" for place in places for axis in "xyz"]
-        log.add("push_force", push_forces(raw), labels=labels)
-        log.add("push_point", raw["push_point"], labels=labels)
-    if not has_elbow(station):
-        return
-    elbow = elbow_motion(station, raw["joint_state"])
-    log.add("elbow", elbow, labels=labels[:3])
-    undisturbed = None
-    if _PUSHES in raw and station.task.lap is not None:
-        force, eta = log["push_force"].values, log["eta"].values[:, 0]
-        undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.task.lap)
-    if undisturbed is not None:
-        log.add("elbow_undisturbed", undisturbed, labels=labels[:3])
-
-
-def lap_before(
-    eta: FloatArray, values: FloatArray, disturbed: NDArray[np.bool_], lap: float
-) -> FloatArray | None:
-    """Return what was at the same place of a closed path in the lap before a disturbance.
-
-    Args:
-        eta: Arc length, laps counted [m], shape (samples,).
-        values: Shape (samples, dim).
-        disturbed: Whether something disturbs, shape (samples,).
-        lap: Length of the path [m].
-
-    Returns:
-        Shape (samples, dim), the values themselves before the disturbance; None where it never
-        comes, or before a whole lap forwards is driven.
-    """
-    if not disturbed.any():
-        return None
-    first = int(np.argmax(disturbed))
-    if not eta[first] - eta[0] >= lap * (1.0 - _SAME):
-        return None
-    along = np.maximum.accumulate(eta[:first])
-    beyond = np.maximum(np.ceil((eta[first:] - along[-1]) / lap - _SAME), 0.0)
-    place = eta[first:] - lap * beyond
-    expected = [np.interp(place, along, column[:first]) for column in values.T]
-    return np.vstack([values[:first], np.stack(expected, axis=1)])
-
-
-def push_size(log: RunLog) -> FloatArray:
-    """Return the size of the largest force on a point of a link [N], shape (samples,)."""
-    force = log["push_force"].values.reshape(len(log.time), -1, 3)
-    return np.asarray(np.linalg.norm(force, axis=2).max(axis=1))
-
-
-def elbow_shift(log: RunLog) -> FloatArray:
-    """Return how far the elbow is from where it would have been [m], shape (samples, 3).
-
-    Without ``elbow_undisturbed``, from where it was when it was first pushed, zero before.
-    """
-    elbow = log["elbow"].values
-    if "elbow_undisturbed" in log:
-        return np.asarray(elbow - log["elbow_undisturbed"].values)
-    pushed = push_size(log) > 0.0
-    first = int(np.argmax(pushed))
-    shift = elbow - elbow[first]
-    shift[: first if pushed.any() else len(shift)] = 0.0
-    return np.asarray(shift)
-
-
-def elbow_travel(log: RunLog) -> float:
-    """Return the largest distance of the elbow from where it would have been [m].
-
-    Without ``elbow_undisturbed``, from where it was when it was first pushed, while it is pushed.
-    """
-    distance = np.linalg.norm(elbow_shift(log), axis=1)
-    if "elbow_undisturbed" not in log:
-        size = push_size(log)
-        distance = distance[size >= PUSHED * size.max(initial=0.0)]
-    return finite_peak(distance)
-
-
-def finite_peak(values: FloatArray) -> float:
-    """Return the largest finite magnitude, NaN of none."""
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max()) if finite.size else math.nan
-
 
 REST = 0.1  # s, end of a run over which the joints' speeds are looked at
 AT_REST = 1e-3  # m/s, below which the tool rests
 AWAY = 1e-2  # m, from where on the tool has set off
+_WORTH_A_LOOK = 10.0  # times the threshold, below which conditioning is drawn of any arm
 
 
-def add_posture(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+def add_posture(log: RunLog, station: Station, raw: Raw) -> None:
     """Log the posture reference, the coordinate that is kept, and what damping lets slip.
 
     Args:
@@ -198,7 +58,7 @@ def add_posture(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
 
 
 def posture_metrics(log: RunLog, lap: float | None) -> Metrics:
-    """Return the metrics of posture and pushes that a run has.
+    """Return the metrics of posture that a run has.
 
     Args:
         log: Log of a run.
@@ -211,16 +71,7 @@ def posture_metrics(log: RunLog, lap: float | None) -> Metrics:
         if lap is not None:
             metrics.add("posture_return", posture_return(log, lap), angle)
         metrics.add("final_joint_speed", final_joint_speed(log), log["v_J"].unit)
-    if "push_force" in log:
-        metrics.add("largest_push", finite_peak(push_size(log)))
-        metrics.add("elbow_travel", elbow_travel(log))
     return metrics
-
-
-def has_spare_joints(log: RunLog) -> bool:
-    """Return whether a run's robot has more joints than the coordinates that it follows."""
-    outputs = sum(log[name].dim for name in ("eta", "xi", "phi") if name in log)
-    return 0 < outputs < log["q_J"].dim
 
 
 def max_posture_error(log: RunLog) -> float:
@@ -278,3 +129,78 @@ def _setting_off(log: RunLog) -> int:
     gone = int(np.argmax(away)) if away.any() else len(eta)
     resting = np.flatnonzero(np.abs(speed[:gone]) < AT_REST)
     return int(resting[-1]) if resting.size else 0
+
+
+def draw_conditioning(log: RunLog) -> style.Drawing | None:
+    """Reciprocal condition number of the decoupling matrix over time and along the path.
+
+    It is worth a look of redundant arms, and near its threshold.
+
+    Args:
+        log: With ``rcond``, perhaps with ``eta``.
+    """
+    signal = log["rcond"]
+    known = signal.values[np.isfinite(signal.values)]
+    near = signal.limits is not None and np.any(known < _WORTH_A_LOOK * signal.limits[0, 0])
+    if not known.size or not (near or has_spare_joints(log)):
+        return None
+    along = "eta" in log
+    canvas, panels = style.make_panels(1 + along, height=2.6, common_time=False)
+    values = np.where(signal.values[:, 0] > 0.0, signal.values[:, 0], np.nan)
+    over = [("over time", "time in s", log.time)]
+    over += [("along the path", r"$\eta$ in m", log["eta"].values[:, 0])] if along else []
+    for panel, (title, label, horizontal) in zip(panels, over, strict=True):
+        panel.semilogy(horizontal, values, color="C0", label="conditioning")
+        if signal.limits is not None:
+            least = float(signal.limits[0, 0])
+            panel.axhline(
+                least, linestyle="--", color=style.ALERT, linewidth=1.2, label="threshold"
+            )
+        panel.set(xlabel=label, ylabel="1 / condition", title=f"Conditioning {title}")
+    style.place_legend(panels[0])
+    caption = "Reciprocal condition number of the decoupling matrix; 0 at a singular posture"
+    caption += ", dashed: the least that the law accepts" if signal.limits is not None else ""
+    return style.Drawing("conditioning", "Conditioning along the path", f"{caption}.", canvas)
+
+
+def draw_posture(log: RunLog) -> style.Drawing:
+    """How far the joints are from the reference posture, and the swivel angle where it is logged.
+
+    Args:
+        log: With ``q_J`` and ``q_posture``, perhaps with ``swivel`` and its reference.
+    """
+    signal = log["q_J"]
+    factor, unit = position_unit(signal)
+    swivel = "swivel" in log
+    canvas, panels = style.make_panels(1 + swivel, height=2.8)
+    error = factor * (signal.values - log["q_posture"].values)
+    panels[0].axhline(0.0, color=style.REFERENCE, linewidth=0.8)
+    style.draw_components(panels[0], log.time, error, axis_labels(signal.dim))
+    panels[0].set(ylabel=f"error in {unit}", title="Distance from the reference posture")
+    if swivel:
+        angle = np.rad2deg(log["swivel"].values)
+        panels[1].plot(log.time, angle[:, 0], color="C0", label="swivel angle")
+        if angle.shape[1] == 2:
+            panels[1].plot(
+                log.time, angle[:, 1], "--", color=style.INK, linewidth=1.1, label="reference"
+            )
+        panels[1].set(ylabel="angle in deg", title="Swivel angle of the elbow")
+    shade_pushes(panels, log)
+    for panel in panels:
+        style.place_legend(panel)
+    caption = "Joint coordinates less those of the reference posture; the tool needs the difference"
+    return style.Drawing("posture", "Posture", f"{caption}.", canvas)
+
+
+def _known(station: Station, _settings: Scenario) -> list[str]:
+    """Return properties of robot and path that metrics of posture need."""
+    properties = {"redundant": is_redundant(station), "closed": station.task.lap is not None}
+    return [name for name, is_so in properties.items() if is_so]
+
+
+FEATURE = Feature(
+    signals=add_posture,
+    metrics=lambda log, station, settings: posture_metrics(log, station.task.lap),
+    known=_known,
+    figures={"posture": draw_posture, "conditioning": draw_conditioning},
+)

@@ -13,6 +13,7 @@ from diagrams.drawing.recorded import (
 )
 from diagrams.holder_station import HOLDER
 from diagrams.station import Station
+from experiments.results.feature import Raw
 from experiments.results.guidance import region_times
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.following.tasks.space_task import SpaceTask
@@ -71,7 +72,7 @@ def collect_motion(
 
 
 def _holder(
-    station: Station, raw: dict[str, FloatArray], log: RunLog, frames: NDArray[np.int_]
+    station: Station, raw: Raw, log: RunLog, frames: NDArray[np.int_]
 ) -> RecordedHolder | None:
     """Return how the workpiece moves, if it does, and what a robot does that holds it."""
     if station.turntable is not None:

@@ -1,16 +1,20 @@
-"""Vibration of a robot whose reference rests.
+"""Robots at rest: vibration where the reference rests, and the motion after a fault.
 
 Signals used, as in the log: the references ``eta_p``, ``xi_p``, ``phi_p`` and ``q_posture`` as far
-as there are any, ``tau_d`` [samples, axes] with its limits and ``y_t`` [samples, 3], where the tool
-really is; of a workpiece that moves ``turntable_angles``, or references and torques of the robot
-that holds it.
+as there are any, ``tau_d`` [samples, axes] with its limits, ``q_J``, ``v_J`` [samples, axes] and
+``y_t`` [samples, 3], the actual tool point; of a workpiece that moves ``turntable_angles``, or
+references and torques of the robot that holds it.
 """
 
 import numpy as np
 
 from diagrams.holder_station import HOLDER
-from experiments.results.run_log import RunLog
-from reporting.metrics import Metrics
+from diagrams.scenario import Scenario, Target
+from diagrams.station import Station
+from experiments.results.feature import Feature, converged_after
+from experiments.results.joint_limits import DriveLimitsOfRun
+from experiments.results.run_log import FloatArray, RunLog
+from reporting.metrics import Metrics, format_quantity
 
 # s; of a rest that counts, of what is looked at, and of what comes after: there a motion begins
 # whose derivatives are felt before its speed is
@@ -26,7 +30,17 @@ _REFERENCES = (
 )
 _TORQUES = ("tau_d", f"{HOLDER}tau_d")
 # share of a drive's limit, peak to peak, and speed of the tool [m/s], that a robot at rest may have
-_ALLOWED_VIBRATION, _ALLOWED_SPEED = 0.02, 2e-3
+_ALLOWED_AT_REST = {"rest_vibration": 0.02, "rest_speed": 2e-3}
+# names of the metric by whether a joint turns
+_MOTION = {True: "motion_after_fault", False: "slide_motion_after_fault"}
+# units of a joint's position and the motion that is allowed beside that of the stop
+_UNITS, _ALLOWED = {True: "rad", False: "m"}, {True: 0.1, False: 0.02}
+# s, the longest stop that is allowed; with the rate 1 - 3 x^2 + 2 x^3 it takes half of v T
+_LONGEST_STOP = 1.0
+# speed of a joint that rests [rad/s or m/s]
+_AT_REST = 0.01
+# change of a position that is worth a word [rad or m]
+_WORTH_A_WORD = 1e-3
 
 
 def rest_metrics(log: RunLog, begin: float) -> Metrics:
@@ -55,18 +69,6 @@ def rest_metrics(log: RunLog, begin: float) -> Metrics:
     at = int(np.argmax(speeds))
     metrics.add("rest_speed", speeds[at], source=_source(log, windows[at]))
     return metrics
-
-
-def set_rest_targets(metrics: Metrics) -> None:
-    """Require that a robot whose references rest does so, too.
-
-    Args:
-        metrics: Of the run.
-    """
-    allowed = {"rest_vibration": _ALLOWED_VIBRATION, "rest_speed": _ALLOWED_SPEED}
-    for name, bound in allowed.items():
-        if name in metrics:
-            metrics.set_target(name, f"<= {bound:g}", "a robot at rest does not vibrate")
 
 
 def _vibration(log: RunLog, name: str, window: slice) -> tuple[float, str]:
@@ -102,3 +104,84 @@ def _rests(log: RunLog, begin: float) -> list[slice]:
             ends = np.searchsorted(time, [end - _WINDOW - 1e-9, end + 1e-9])
             windows.append(slice(int(ends[0]), int(ends[1])))
     return windows
+
+
+def _metrics(log: RunLog, station: Station, settings: Scenario) -> Metrics:
+    metrics = rest_metrics(log, converged_after(settings, log))
+    if "fault_time" in log.attributes and log.time.size:
+        metrics |= MotionAfterFault(log, DriveLimitsOfRun.of(station.robot)).metrics()
+    return metrics
+
+
+class MotionAfterFault:
+    """Motion of the joints and the tool from a fault to the end of a log.
+
+    Args:
+        log: Log of a run with a fault, its time in the attribute ``fault_time``.
+        limits: Names and kinds of the joints.
+    """
+
+    def __init__(self, log: RunLog, limits: DriveLimitsOfRun) -> None:
+        begin = float(log.attributes["fault_time"])
+        first = min(int(np.searchsorted(log.time, begin - 1e-9)), log.time.size - 1)
+        q, v = (log[name].values[first:] for name in ("q_J", "v_J"))
+        self._limits, self._end = limits, float(log.time[-1])
+        self._moved = _farthest(q - q[0])
+        allowance = np.where(limits.revolute, _ALLOWED[True], _ALLOWED[False])
+        self._allowed = 0.5 * _LONGEST_STOP * np.abs(v[0]) + allowance
+        self._speed = np.abs(v[-1])
+        y_t = log["y_t"].values[first:]
+        self._tool = float(np.nanmax(np.linalg.norm(y_t - y_t[0], axis=1), initial=0.0))
+
+    @property
+    def rests(self) -> bool:
+        """Whether all joints rest at the end."""
+        return bool(np.all(self._speed < _AT_REST))
+
+    def metrics(self) -> Metrics:
+        """Return the motion of the joint that went farthest beyond its stop, with its bound.
+
+        ``motion_after_fault`` [rad] of joints that turn, ``slide_motion_after_fault`` [m] of
+        others. The bound is 0.1 rad or 20 mm beside a stop within a second from the speed at the
+        fault.
+        """
+        metrics, share = Metrics(), self._moved / self._allowed
+        for kind, name in _MOTION.items():
+            own = np.flatnonzero(self._limits.revolute == kind)
+            if own.size:
+                worst = int(own[np.argmax(share[own])])
+                metrics.add(name, self._moved[worst], source=f"joint {worst + 1}")
+                metrics.set_target(name, f"<= {self._allowed[worst]:.3g}")
+        return metrics
+
+    def sentence(self) -> str:
+        """Return the motion in words, for the last line of a run."""
+        state = "stopped" if self.rests else "still moving"
+        words, i = [f"{state} at t = {self._end:.3f} s"], int(np.argmax(self._moved))
+        if not self.rests:
+            fastest = int(np.argmax(self._speed))
+            speed = f"{self._speed[fastest]:.3g} {self._unit(fastest)}/s"
+            words = [f"{words[0]}, joint {fastest + 1} at {speed}"]
+        if self._moved[i] > _WORTH_A_WORD:
+            joint = format_quantity(float(self._moved[i]), self._unit(i))
+            tool = format_quantity(self._tool, "m")
+            words.append(f"after the fault joint {i + 1} moved {joint}, the tool {tool}")
+        return "; ".join(words)
+
+    def _unit(self, joint: int) -> str:
+        return _UNITS[bool(self._limits.revolute[joint])]
+
+
+def _farthest(way: FloatArray) -> FloatArray:
+    """Return the largest magnitude of each column, shape (N,); NaN does not count."""
+    return np.asarray(np.nanmax(np.abs(way), axis=0, initial=0.0))
+
+
+FEATURE = Feature(
+    metrics=_metrics,
+    requirements=lambda settings: {
+        name: Target(f"<= {bound:g}", "a robot at rest does not vibrate")
+        for name, bound in _ALLOWED_AT_REST.items()
+    },
+    always=tuple(_MOTION.values()),
+)

@@ -125,6 +125,15 @@ class RunLog:
         self.signals[name] = signal
         return signal
 
+    @property
+    def period(self) -> float:
+        """Time from sample to sample [s], the median; 0 of less than two samples."""
+        return float(np.median(np.diff(self.time))) if self.time.size > 1 else 0.0
+
+    def norm(self, name: str) -> FloatArray:
+        """Return the Euclidean norm of a signal at each sample, shape (samples,)."""
+        return np.asarray(np.linalg.norm(self[name].values, axis=1))
+
     def write(self, path: Path) -> None:
         """Writes the log, see :meth:`to_hdf5`, to a file, which is replaced if it exists."""
         path.write_bytes(self.to_hdf5())

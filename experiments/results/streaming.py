@@ -1,19 +1,25 @@
-"""Signals and metrics of a path whose way points come while the tool moves."""
+"""Waypoints that come while the tool moves."""
 
 import math
 
 import numpy as np
 
+from diagrams.scenario import Target
 from diagrams.station import Station
-from experiments.results.run_log import FloatArray, RunLog
+from experiments.results.feature import Feature, Raw
+from experiments.results.run_log import RunLog
 from pfsc_drake.control.streams.messages import StreamStatus
+from reporting import style
 from reporting.metrics import Metrics
 
 _GOES = 1e-3  # m/s, from which on the tool counts as on its way
+# m, by which a tool may be past the end of what it knows of its path: it follows its reference
+_PAST = 1e-3
 _ARRIVED = 1e-3  # m, from where it ends
+_MM = 1e3
 
 
-def add_stream(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> None:
+def add_stream(log: RunLog, station: Station, raw: Raw) -> None:
     """Add what became of way points.
 
     Args:
@@ -69,3 +75,39 @@ def travel_time(log: RunLog) -> float:
         return math.nan
     off = np.flatnonzero(np.abs(eta - eta[-1]) > _ARRIVED)
     return float(log.time[off[-1]] - log.time[on[0]])
+
+
+def draw_stream(log: RunLog) -> style.Drawing:
+    """Speed with what bends allow, the way left, and way points, over time.
+
+    Args:
+        log: With ``way_left``, ``bend_speed``, ``way_points``, ``stream_status``.
+    """
+    canvas, (speed, left, points) = style.make_panels(3, height=2.0)
+    speed.plot(log.time, log["eta_dot"].values, color="C0", label="tool")
+    limit = log["bend_speed"].values
+    speed.plot(log.time, limit, "--", color=style.REFERENCE, label="bends allow")
+    speed.set(ylabel="m/s", title="Speed along the path")
+    way = log["way_left"].values[:, 0]
+    left.plot(log.time, _MM * way, color="C1")
+    left.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
+    left.set(ylabel="mm", title="Way left that is known")
+    points.step(log.time, log["way_points"].values[:, 0], where="post", color="C2")
+    ends = log["stream_status"].values[:, 0] >= StreamStatus.ENDING
+    style.shade([speed, left, points], log.time, ends, "goes to the last one, to rest", "#E5E7EB")
+    points.set(ylabel="way points", xlabel="t in s", title="Way points taken")
+    style.place_legend(speed)
+    caption = (
+        "Speed of the tool along its path, and what bends allow where it is; how far the path is "
+        "known ahead of it; how many way points have been taken."
+    )
+    return style.Drawing("stream", "Way points on the fly", caption, canvas)
+
+
+FEATURE = Feature(
+    signals=add_stream,
+    metrics=lambda log, station, settings: stream_metrics(log),
+    requirements=lambda settings: {"past_known_way": Target(f"<= {_PAST:g}", "room to stop")},
+    always=("past_known_way",),
+    figures={"stream": draw_stream},
+)

@@ -1,24 +1,35 @@
-"""A tool that is led from afar: its signals, how well it follows, and its energy, checked."""
+"""Teleoperation: signals of leader and ports, tracking of the leader, audit of the energy."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import Scenario, Target
+from diagrams.station import Station
+from experiments.results.feature import Feature, Raw
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.teleoperation.port import RECORD, SIDES, TURNING_RECORD
+from reporting import style
 from reporting.metrics import Metrics
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _AXES = ("x", "y", "z")
 _LONGEST = 1.5  # s, by which a tool may follow late
+_OWED = 1e-3  # m, that leader and follower may be apart in the end for want of energy
+_ALWAYS = ("least_port_tank", "energy_margin")
 _STEP = 4  # ticks between delays that are tried
 
 
-def add_teleoperation(log: RunLog, raw: dict[str, FloatArray]) -> None:
+def add_teleoperation(log: RunLog, _station: Station | None, raw: Raw) -> None:
     """Add what leader, channel and both ports did.
 
     Args:
         log: To add to.
-        raw: What the station logged.
+        _station: The station, of which nothing is needed.
+        raw: What it logged.
     """
     here = [side for side in SIDES if f"{side}_record" in raw]
     if not here:
@@ -75,12 +86,12 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
     apart = log["led_point"].values[-1] - log["y_t"].values[-1]
     metrics.add("led_distance_end", float(np.linalg.norm(apart)))
     metrics.add("largest_handle_speed", handle_speed(log))
-    felt = np.linalg.norm(log["leader_force"].values, axis=1)
+    felt = log.norm("leader_force")
     metrics.add("largest_felt_force", float(felt.max()))
     if "led_orientation" in log:
         ends = (log[name].values[-1:].reshape(-1, 3, 3) for name in ("R_e", "led_orientation"))
         metrics.add("led_turn_end", float(np.linalg.norm(turns_between(*ends))))
-        moment = np.linalg.norm(log["leader_moment"].values, axis=1)
+        moment = log.norm("leader_moment")
         metrics.add("largest_felt_moment", float(moment.max()))
     scale = way.motion_scale / way.force_scale
     metrics.add("energy_margin", float(energy_above_bound(log, scale).min()))
@@ -121,7 +132,7 @@ def handle_warnings(log: RunLog, settings: Scenario) -> list[str]:
 def _following(log: RunLog) -> tuple[float, float]:
     """Return the delay by which the tool follows best [s], and how far it is then, rms [m]."""
     led, tool = log["led_point"].values, log["y_t"].values
-    period = float(np.median(np.diff(log.time)))
+    period = log.period
     longest = min(round(_LONGEST / period), len(tool) // 2)
     delays = range(0, max(longest, 1), _STEP)
     errors = [
@@ -220,3 +231,117 @@ def tank_residual(log: RunLog, capacity: float) -> float:
     before = tank[:-1] - work + np.diff(received, axis=0)
     expected = np.minimum(before, capacity) - np.diff(sent, axis=0)
     return float(np.max(np.abs(expected - tank[1:]), initial=0.0))
+
+
+def draw_teleoperation(log: RunLog) -> style.Drawing:
+    """Where the leader has the tool and where that is, and what both sides feel."""
+    canvas, (way, apart, force) = style.make_panels(3)
+    led, tool = log["led_point"].values, log["y_t"].values
+    _plot_axes(way, log.time, tool - tool[0], led - led[0])
+    way.set(title="Way of the tool, and of the leader (dashed)", ylabel="way in m")
+    distance = np.linalg.norm((led - led[0]) - (tool - tool[0]), axis=1)
+    apart.plot(log.time, 1e3 * distance, color="C0")
+    apart.set(title="Between where the leader is and the tool", ylabel="distance in mm")
+    _plot_sizes(force, log, "force", "that leads the tool")
+    force.set(title="Forces", ylabel="force in N")
+    style.place_legend(way)
+    style.place_legend(force)
+    caption = (
+        "Ways since the start in the follower's lengths. A force at rest holds the leader off by "
+        "the force times the delay, by the impedance of the waves."
+    )
+    return style.Drawing("teleoperation", "Led from afar", caption, canvas)
+
+
+def draw_led_turns(log: RunLog) -> style.Drawing:
+    """How the leader has the tool turned and how it is, and the moments that both sides feel."""
+    canvas, (turn, apart, moment) = style.make_panels(3)
+    led, tool = (log[name].values.reshape(-1, 3, 3) for name in ("led_orientation", "R_e"))
+    turned = [turns_between(np.broadcast_to(R[:1], R.shape), R) for R in (tool, led)]
+    _plot_axes(turn, log.time, *turned)
+    turn.set(title="Turn of the tool, and of the leader (dashed)", ylabel="turn in rad")
+    angle = np.linalg.norm(turns_between(tool, led), axis=1)
+    apart.plot(log.time, 1e3 * angle, color="C0")
+    apart.set(title="Between how the leader is turned and the tool", ylabel="angle in mrad")
+    _plot_sizes(moment, log, "moment", "that turns the tool")
+    moment.set(title="Moments", ylabel="moment in Nm")
+    style.place_legend(turn)
+    style.place_legend(moment)
+    caption = "Turns since the start, axis times angle, along the world's axes."
+    return style.Drawing("led_turns", "Turned from afar", caption, canvas)
+
+
+def _plot_axes(panel: "Axes", time: np.ndarray, tool: np.ndarray, led: np.ndarray) -> None:
+    """Plot what the tool does along each axis, and dashed what the leader asks for."""
+    for k, axis in enumerate(_AXES):
+        panel.plot(time, tool[:, k], color=f"C{k}", label=axis)
+        panel.plot(time, led[:, k], "--", color=f"C{k}", linewidth=0.9)
+
+
+def _plot_sizes(panel: "Axes", log: RunLog, kind: str, given: str) -> None:
+    """Plot how large forces or moments are at both sides."""
+    felt = log.norm(f"leader_{kind}")
+    at_tool = np.linalg.norm(log[f"port_{kind}"].values[:, 3:], axis=1)
+    panel.plot(log.time, felt, color="C1", label="that the hand feels")
+    panel.plot(log.time, at_tool, color=style.INK, linewidth=0.9, label=given)
+
+
+def draw_port_energy(log: RunLog) -> style.Drawing:
+    """Work of both ports, and the energy in channel and tanks."""
+    canvas, (work, stored, share) = style.make_panels(3)
+    done = -works(log)
+    work.plot(log.time, done[:, 0], color="C0", label="taken from the hand")
+    work.plot(log.time, -done[:, 1], color="C1", label="given to the follower")
+    bound = float(log["port_tank"].values[0].sum())
+    total = done.sum(axis=1)
+    work.plot(log.time, total, color=style.INK, label="taken less given")
+    work.axhline(-bound, color=style.INK, linestyle="--", linewidth=0.9, label="never below")
+    work.set(title="Work of the coupling's forces", ylabel="work in J")
+    tank, under_way = log["port_tank"].values, stored_in_channel(log)
+    for k, name in enumerate(("leader", "follower")):
+        stored.plot(log.time, tank[:, k], color=f"C{k}", label=f"tank of the {name}")
+        stored.plot(
+            log.time,
+            under_way[:, k],
+            ":",
+            color=f"C{k}",
+            label=f"under way from the {name}",
+        )
+    stored.set(title="Energy that is stored", ylabel="energy in J")
+    for k, name in enumerate(("leader", "follower")):
+        share.plot(log.time, log["port_share"].values[:, k], color=f"C{k}", label=name)
+    share.set(title="Share of force and wave that could be paid", ylabel="share", ylim=(0, 1.05))
+    for panel in (work, stored, share):
+        style.place_legend(panel)
+    caption = (
+        "What the coupling takes from the hand, less what it gives to the follower, lies in tanks "
+        "and channel or is lost; it never gives more than was in the tanks at the start."
+    )
+    return style.Drawing("port_energy", "Energy of the teleoperation", caption, canvas)
+
+
+def _requirements(settings: Scenario) -> dict[str, Target]:
+    """Require passivity, and that leader and follower meet in the end."""
+    coupling = settings.teleoperation
+    if coupling is None:
+        return {}
+    tanks = dict.fromkeys(
+        _ALWAYS if coupling.passive else (), Target(">= 0", "teleoperation.passive")
+    )
+    return tanks | {"owed_distance_end": Target(f"<= {_OWED:g}", "leader and follower meet")}
+
+
+FEATURE = Feature(
+    signals=add_teleoperation,
+    metrics=lambda log, station, settings: teleoperation_metrics(log, settings),
+    requirements=_requirements,
+    always=_ALWAYS,
+    # a leader may be in another process
+    known=lambda station, settings: () if settings.teleoperation is None else ("led_point",),
+    warnings=lambda log, station, settings: handle_warnings(log, settings),
+    figures={
+        "teleoperation": draw_teleoperation,
+        "led_turns": draw_led_turns,
+        "port_energy": draw_port_energy,
+    },
+)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
-from reporting.page import Report, report_page, write_report
+from reporting.page import Page, Report
 from reporting.provenance import standard_attributes
 from reporting.style import Figure
 
@@ -29,13 +29,12 @@ def write_study_page(
         figures: Pictures.
     """
     results.write("metrics.json", metrics.to_json())
-    page = report_page(
+    return Page(
         kind="Study",
         title=title,
         description=description,
         scenario_yaml_text="\n".join(overrides),
         metrics=metrics,
-        figures=list(figures),
+        figures=figures,
         log_attributes=standard_attributes(title),
-    )
-    return write_report(results, list(figures), page)
+    ).write(results)

@@ -37,7 +37,7 @@ from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import ResultsFolder, check_folder, open_results
 from reporting.interruption import noticed_interruption
 from reporting.metrics import Metric
-from reporting.page import report_page, write_report
+from reporting.page import Page
 from reporting.progress import CountDisplay
 from reporting.provenance import standard_attributes
 
@@ -220,7 +220,7 @@ def _conclude(
     if wanted not in (None, chosen) and chosen is not None:
         there = f"{', '.join(spreads)}{suggestion(wanted, spreads)}"
         warnings.append(f"--metric {wanted}: no run has it; there are {there}")
-    page = report_page(
+    report = Page(
         kind="Sweep",
         title=sweep.scenario.name,
         description=_description(sweep, rows),
@@ -234,8 +234,7 @@ def _conclude(
         warnings=warnings,
         commands=commands,
         cards=key_metrics(metrics, chosen),
-    )
-    report = write_report(results, figures, page)
+    ).write(results)
     return SweepOutcome(
         report.path,
         rows,

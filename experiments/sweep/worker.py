@@ -149,15 +149,16 @@ def run_task(task: RunTask) -> RunRow:
 def _run(task: RunTask, clock: _Clock) -> RunRow:
     logging.getLogger("drake").setLevel(logging.CRITICAL)
     try:
-        from experiments.simulated_run import run_scenario  # Drake takes seconds to import
+        from experiments.simulated_run import (
+            RunOptions,
+            run_scenario,
+        )  # Drake takes seconds to import
 
         with TemporaryDirectory(prefix="pfsc_drake_sweep_") as folder:
             outcome = run_scenario(
                 task.scenario(),
                 out=Path(folder) / "run",
-                duration=task.duration,
-                figures=False,
-                recording=False,
+                options=RunOptions(task.duration, figures=False, recording=False),
                 progress=clock,
             )
     except InputError as error:

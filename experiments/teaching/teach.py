@@ -7,7 +7,7 @@ from pathlib import Path
 from experiments.finished_run import RunOutcome
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
-from experiments.simulated_run import run_scenario
+from experiments.simulated_run import RunOptions, run_scenario
 from experiments.teaching.comparison import Fit, FollowedShape
 from experiments.teaching.taught_figures import draw_pictures
 from experiments.teaching.taught_path import (
@@ -22,7 +22,7 @@ from experiments.teaching.taught_path import (
 from pfsc_drake.geometry import waypoints_text
 from reporting.folder import ResultsFolder, check_folder, open_results
 from reporting.metrics import Metrics
-from reporting.page import Report, report_page, write_report
+from reporting.page import Page, Report
 from reporting.provenance import standard_attributes
 
 KIND, FOLLOW = "teaching", "follow"
@@ -128,9 +128,7 @@ def run_and_tell(
     outcome = run_scenario(
         loaded,
         out=out,
-        duration=None,
-        figures=drawn,
-        recording=drawn,
+        options=RunOptions(figures=drawn, recording=drawn),
         progress=_Quarters(loaded.name, progress),
     )
     if outcome.interrupted:
@@ -178,7 +176,7 @@ def _write_page(
     warnings = []
     if "fault" in taught.log.attributes:
         warnings.append(f"while it was taught: {taught.log.attributes['fault']}")
-    page = report_page(
+    return Page(
         kind="Teaching",
         title=f"Taught in {taught.settings.name}",
         description=_DESCRIPTION,
@@ -193,8 +191,7 @@ def _write_page(
         },
         cards=_cards(followed),
         details=f"Scenario {YAML_NAME}",
-    )
-    return write_report(results, pictures, page)
+    ).write(results)
 
 
 def _cards(followed: FollowedShape | None) -> list[str]:

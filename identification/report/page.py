@@ -22,7 +22,7 @@ from identification.report.figures import (
 )
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
-from reporting.page import Report, Table, report_page, write_report
+from reporting.page import Page, Report, Table
 from reporting.provenance import standard_attributes
 from reporting.style import Figure
 
@@ -177,21 +177,19 @@ def write_page(results: ResultsFolder, content: PageContent) -> Report:
     """
     metrics = summary(content)
     results.write("metrics.json", metrics.to_json())
-    figures = _figures(content)
-    page = report_page(
+    return Page(
         kind="Identification",
         title=content.subject.name,
         description=_description(content),
         scenario_yaml_text="\n".join(content.findings.estimate.names),
         details="Base parameters in full",
         metrics=metrics,
-        figures=figures,
+        figures=_figures(content),
         tables=_tables(content),
         log_attributes={**standard_attributes(content.subject.name), **content.attributes},
         recording=content.recording,
         warnings=content.warnings,
-    )
-    return write_report(results, figures, page)
+    ).write(results)
 
 
 def summary(content: PageContent) -> Metrics:

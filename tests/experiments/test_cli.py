@@ -1,5 +1,6 @@
 """Command line: exit status, streams and messages; the simulation itself is replaced."""
 
+import collections
 import json
 import subprocess
 import sys
@@ -43,8 +44,8 @@ class FakeRun:
         self.calls: list[tuple] = []
         self.warns: list[str] = []
 
-    def run_scenario(self, scenario, out, duration, figures, recording, progress, warn, **_):
-        self.calls.append((scenario, out, duration, figures, recording))
+    def run_scenario(self, scenario, out, options, progress, warn):
+        self.calls.append((scenario, out, options.duration, options.figures, options.recording))
         progress(0.0, "building")
         for sentence in self.warns:
             warn(sentence)
@@ -61,6 +62,8 @@ def fake_run(monkeypatch):
     fake = FakeRun()
     module = types.ModuleType("experiments.simulated_run")
     module.run_scenario = fake.run_scenario
+    options = ("duration", "after_fault", "margins", "figures", "recording")
+    module.RunOptions = collections.namedtuple("RunOptions", options)
     monkeypatch.setitem(sys.modules, "experiments.simulated_run", module)
     return fake
 

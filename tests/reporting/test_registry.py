@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from experiments.figures.all import _DRAWN
+from experiments.results.features import FEATURES
 from reporting.metrics import Metrics
 from reporting.provenance import PROJECT_ROOT
 from reporting.registry import (
@@ -47,9 +47,10 @@ def test_signals_name_figures_and_figures_signals():
         assert drawn or not needed, figure.name
 
 
-def test_every_figure_is_drawn_in_the_order_of_the_registry():
-    assert [name for name in FIGURES if name in _DRAWN] == list(_DRAWN)
-    assert set(FIGURES) - set(_DRAWN) == {"path", "surface_fit"}
+def test_every_figure_is_drawn_by_one_feature():
+    drawn = [name for feature in FEATURES for name in feature.figures]
+    assert len(drawn) == len(set(drawn))
+    assert set(FIGURES) - set(drawn) == {"path", "surface_fit"}
 
 
 def test_every_row_says_what_it_is():

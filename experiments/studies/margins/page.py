@@ -29,7 +29,7 @@ from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.folder import check_folder, open_results
 from reporting.metrics import Metrics
 from reporting.notebook import metrics_table
-from reporting.page import Report, report_page, write_report
+from reporting.page import Page, Report
 from reporting.progress import ProgressListener
 from reporting.provenance import standard_attributes
 from reporting.style import (
@@ -324,14 +324,13 @@ def write_margins(
         analysis = analyse(settings, scenario.path.parent, box, progress)
     with open_results(out, "margins", inputs) as results:
         results.write("margins.json", margins_json(analysis))
-        figures = draw_margins(analysis)
-        page = report_page(
+        page = Page(
             kind="Sampled loop",
             title=f"Margins of {scenario.name}",
             description=" ".join(sentences(analysis)),
             scenario_yaml_text=dump_typed(settings),
             metrics=metrics_of(analysis),
-            figures=figures,
+            figures=draw_margins(analysis),
             log_attributes=standard_attributes(scenario.name),
         )
-        return MarginsOutcome(analysis, write_report(results, figures, page))
+        return MarginsOutcome(analysis, page.write(results))

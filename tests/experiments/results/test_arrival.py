@@ -7,7 +7,7 @@ import pytest
 
 from diagrams.scenario import Scenario
 from experiments.results.arrival import arrival_metrics
-from experiments.results.promises import broken_promises, leave_unjudged
+from experiments.results.requirements import leave_unjudged, missed_targets
 from experiments.results.run_log import RunLog
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 
@@ -50,11 +50,11 @@ def test_the_share_counts_what_the_reference_has_left_and_what_the_tool_lags(end
 
 def test_a_tool_that_waits_to_the_end_breaks_a_promise_and_the_line_says_why():
     found = arrival(6.0, lost=1.5, pace=0.0)
-    (broken,) = broken_promises(found)
+    (broken,) = missed_targets(found)
     assert broken.startswith("arrived = 0.75, target >= 0.998")
     assert broken.endswith("(the tool still waits for an obstacle)")
     leave_unjudged(found, fault=False)
-    assert broken_promises(found) == []
+    assert missed_targets(found) == []
     assert found["arrived"].verdict == "not judged"
 
 

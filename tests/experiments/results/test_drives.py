@@ -1,134 +1,19 @@
-"""Drives and joints of a run: how near to limits, what a reference asks; what their link did."""
-
-import math
+"""Law and drives: torques, limits and virtual input, from made-up logs."""
 
 import numpy as np
 import pytest
 
-from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.results.drives import DriveLimitsOfRun, limit_reversals
-from experiments.results.promises import broken_promises, leave_unjudged, set_promises
+from experiments.results.drives import (
+    draw_efforts,
+    draw_virtual_input,
+    limit_reversals,
+    peak_torque,
+    saturation_count,
+)
+from experiments.results.requirements import leave_unjudged, missed_targets, set_targets
 from experiments.results.run_log import RunLog
-from experiments.scenario_file import find_scenario
-from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.links import ChainLink
-from pfsc_drake.yaml.typed import load_file
 from reporting.metrics import Metrics
-
-INF = np.inf
-
-
-def limits(position, velocity, revolute=(True, True)):
-    return DriveLimitsOfRun(
-        [f"j{i}" for i in range(len(velocity))],
-        np.array(revolute),
-        np.array(position, dtype=float),
-        np.array(velocity, dtype=float),
-    )
-
-
-@pytest.fixture
-def log():
-    """Four samples 0.1 s apart: q_1 rises to 1.3, q_2 falls to -0.5 and comes back."""
-    log = RunLog(0.1 * np.arange(4.0))
-    log.add("q_J", [[0.0, 0.5], [0.9, 0.1], [1.3, -0.5], [1.2, 0.0]], "rad")
-    log.add("v_J", [[0.0, -1.0], [5.0, -4.0], [2.0, 1.0], [-6.0, 3.0]], "rad/s")
-    return log
-
-
-def test_nothing_without_limits(log):
-    free = limits([[-INF, INF]] * 2, [INF, INF])
-    assert free.metric_names() == []
-    assert dict(free.metrics(log)) == {}
-    assert free.warnings(log) == []
-
-
-def test_within_limits(log):
-    within = limits([[-2.0, 2.0], [-1.0, INF]], [INF, 8.0])
-    metrics = within.metrics(log)
-    assert list(metrics) == within.metric_names() == ["joint_limit_margin", "joint_velocity_share"]
-    margin, share = metrics.values()
-    # q_2 comes within 0.5 of -1, q_1 within 0.7 of 2
-    assert margin.value == pytest.approx(0.5)
-    assert (margin.unit, margin.source) == ("rad", "q_2 at t = 0.200 s")
-    assert share.value == pytest.approx(4.0 / 8.0)
-    assert (share.unit, share.source) == ("1", "q_2 at t = 0.100 s")
-    assert within.warnings(log) == []
-
-
-def test_beyond_limits(log):
-    narrow = limits([[-1.0, 1.0], [-0.2, 1.0]], [5.5, 4.0])
-    metrics = narrow.metrics(log)
-    assert metrics["joint_limit_margin"].value == pytest.approx(-0.3)
-    assert metrics["joint_velocity_share"].value == pytest.approx(6.0 / 5.5)
-    assert metrics["joint_velocity_share"].source == "q_1 at t = 0.300 s"
-    assert narrow.warnings(log) == [
-        "joint 1 'j0' passes its limit of 57.3 deg at t = 0.200 s and reaches 74.5 deg at "
-        "t = 0.200 s; the simulation lets it pass",
-        "joint 2 'j1' passes its limit of -11.5 deg at t = 0.200 s and reaches -28.6 deg at "
-        "t = 0.200 s; the simulation lets it pass",
-        "joint 1 'j0' passes its speed limit of 315.1 deg/s at t = 0.300 s and reaches "
-        "343.8 deg/s at t = 0.300 s; the simulation lets it pass",
-    ]
-
-
-def test_a_limit_that_is_reached_is_not_passed(log):
-    exact = limits([[0.0, 1.3], [-0.5 + 1e-12, 0.5]], [6.0, 4.0 * (1.0 - 1e-12)])
-    assert exact.warnings(log) == []
-    assert exact.metrics(log)["joint_limit_margin"].value == pytest.approx(0.0, abs=1e-11)
-
-
-def test_slides_and_joints_are_not_compared(log):
-    both = limits([[-2.0, 2.0], [-0.6, 0.6]], [INF, 2.0], revolute=[True, False])
-    metrics = both.metrics(log)
-    assert list(metrics) == ["joint_limit_margin", "slide_limit_margin", "joint_velocity_share"]
-    assert list(metrics) == both.metric_names()
-    assert metrics["joint_limit_margin"].value == pytest.approx(0.7)
-    assert metrics["slide_limit_margin"].value == pytest.approx(0.1)
-    assert metrics["slide_limit_margin"].unit == "m"
-    (warning,) = both.warnings(log)
-    assert "speed limit of 2 m/s at t = 0.100 s and reaches 4 m/s" in warning
-
-
-def test_what_is_no_number_does_not_count(log):
-    some = limits([[-1.0, 1.0], [-1.0, 1.0]], [4.0, 8.0])
-    log["q_J"].values[2:, 0] = math.nan
-    log["v_J"].values[1, 0] = math.nan
-    metrics = some.metrics(log)
-    assert metrics["joint_limit_margin"].value == pytest.approx(0.1)
-    assert metrics["joint_velocity_share"].value == pytest.approx(1.5)
-    (warning,) = some.warnings(log)
-    assert "t = 0.300 s" in warning
-    log["q_J"].values[:] = math.nan
-    assert math.isnan(some.metrics(log)["joint_limit_margin"].value)
-    empty = RunLog(np.zeros(0))
-    empty.add("q_J", np.zeros((0, 2)), "rad")
-    empty.add("v_J", np.zeros((0, 2)), "rad/s")
-    assert math.isnan(some.metrics(empty)["joint_velocity_share"].value)
-    assert some.warnings(empty) == []
-
-
-@pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_delta"])
-def test_limits_of_a_robot(name):
-    path = find_scenario(name)
-    robot = build_station(load_file(Scenario, path), path.parent).robot
-    own = DriveLimitsOfRun.of(robot)
-    margin = "joint_limit_margin" if name == "pfc_elastic_3r" else "slide_limit_margin"
-    assert own.metric_names() == [margin, "joint_velocity_share"]
-    np.testing.assert_array_equal(own.position, robot.gather("position_limits"))
-    np.testing.assert_array_equal(own.velocity, robot.gather("velocity_limit"))
-    assert own.names == list(robot.names)
-
-
-def test_a_speed_limit_of_zero_is_none():
-    def link(name, speed):
-        body = (np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, np.zeros(3), np.eye(3))
-        return ChainLink(name, "revolute", *body, velocity_limit=speed)
-
-    own = DriveLimitsOfRun.of(SerialChain((link("a", 0.0), link("b", 2.0))))
-    np.testing.assert_array_equal(own.velocity, [INF, 2.0])
-    assert own.metric_names() == ["joint_velocity_share"]
 
 
 def test_reversals_from_limit_to_limit_are_counted_of_what_drives_apply():
@@ -154,6 +39,101 @@ def test_reversals_from_limit_to_limit_are_a_requirement_with_the_bound_of_the_s
     scenario, found = Scenario(), Metrics()
     scenario.faults.chatter_turns = 4.0
     found.add("limit_reversals", 4.5)
-    set_promises(found, scenario)
+    set_targets(found, scenario)
     leave_unjudged(found, fault=False)
-    assert broken_promises(found) == ["limit_reversals = 4.5, target < 4"]
+    assert missed_targets(found) == ["limit_reversals = 4.5, target < 4"]
+
+
+def test_torques_and_saturation():
+    torque = np.array([[1.0, -5.0], [-3.0, 2.0], [2.9, 5.0 * (1 - 1e-12)], [0.0, 4.9]])
+    log = RunLog(np.arange(4.0))
+    log.add("tau_d", torque, "Nm", limits=[3.0, 5.0])
+    np.testing.assert_allclose(peak_torque(log), [3.0, 5.0])
+    assert saturation_count(log) == 3
+    log.add("tau_d", torque, "Nm")
+    assert saturation_count(log) == 0
+
+
+def test_what_a_law_asks_too_much_of_servos_counts():
+    """Speeds that the law asks for, torques of the servos, and the safe state after a fault."""
+    log = RunLog(np.arange(6.0))
+    log.add("tau_d", np.array([1.0, 3.0, 1.0, 1.0, 1.0, -3.0]), "Nm", limits=3.0)
+    log.add("saturated_drives", np.array([0, 2, 1, 0, 6, 0]), "1")
+    log.add("fault", np.array([0, 0, 0, 0, 4, 4]), "1", ["none"])
+    # sample 4: the law asks in vain, for there is a fault; sample 5: the drives brake
+    assert saturation_count(log) == 3
+    del log.signals["tau_d"]
+    assert saturation_count(log) == 2
+
+
+def test_only_limits_within_reach_are_drawn(drawn_log):
+    panels = draw_efforts(drawn_log).canvas.axes
+    dashed = [
+        [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "--"]
+        for panel in panels
+    ]
+    # Axis 3 of 1, 2, 3 Nm is the only one beyond half of 5 Nm in the first panel.
+    assert dashed == [[-5.0, 5.0], [-5.0, 5.0] * 3]
+    assert "limits" in draw_efforts(drawn_log).caption
+    drawn_log["tau_d"].values *= 0.4  # 2.4 Nm at most
+    assert "limits" not in draw_efforts(drawn_log).caption
+
+
+def test_a_short_peak_does_not_hide_the_rest(drawn_log):
+    drawn_log["tau_d"].values[:3, 0] = 100.0
+    panels = draw_efforts(drawn_log).canvas.axes
+    titles = [panel.get_title() for panel in panels]
+    assert titles == [
+        "Drive torques, axes 1 to 3",
+        "The same, scaled to the last three quarters",
+        "Drive torques, axes 4 to 6",
+    ]
+    late = np.abs(drawn_log["tau_d"].values[50:, :3]).max()
+    assert panels[1].get_ylim() == pytest.approx((-1.2 * late, 1.2 * late))
+    # axes 1 and 3 come near their limits, two lines each
+    assert [len(panel.lines) for panel in panels[:2]] == [3 + 4, 3]
+
+
+TIME = np.linspace(0.0, 2.0, 201)
+
+
+@pytest.fixture(name="log")
+def fixture_log():
+    """Two tangential and one transversal coordinate, of which the latter converges quickly."""
+    log = RunLog(TIME)
+    log.add("eta", np.zeros((201, 2)), "m", ["eta_1", "eta_2"])
+    log.add("xi", np.zeros(201), "m", ["xi"])
+    v = np.column_stack([np.sin(TIME), np.cos(TIME), -30.0 * np.exp(-20.0 * TIME)])
+    log.add("virtual_input", v, "SI/s^2", ["v_eta_1", "v_eta_2", "v_xi"])
+    return log
+
+
+def test_each_kind_of_coordinates_has_its_panel(log):
+    drawing = draw_virtual_input(log)
+    tangential, transversal = drawing.canvas.axes
+    shown = {line.get_label(): line.get_ydata() for line in tangential.lines[1:]}
+    np.testing.assert_array_equal(shown[r"$v_{\eta_1}$"], np.sin(TIME))
+    np.testing.assert_array_equal(shown[r"$v_{\eta_2}$"], np.cos(TIME))
+    assert tangential.get_title() == "Tangential"
+    assert tangential.get_ylabel() == "$v$ in m/s$^2$"
+    assert "second time derivatives" in drawing.caption
+    # the start would leave nothing to be seen of the rest
+    assert transversal.get_title() == "Transversal, scaled to the last three quarters"
+    assert transversal.get_ylim()[1] < 0.01
+
+
+def test_of_velocity_servos_it_is_a_velocity(log):
+    log["virtual_input"].unit = "SI/s^1"
+    log.add("phi", np.zeros(201), "rad", ["phi_z"])
+    log["virtual_input"].values = np.ones((201, 4))
+    log["virtual_input"].labels.append("v_phi_z")
+    drawing = draw_virtual_input(log)
+    units = [panel.get_ylabel().removeprefix("$v$ in ") for panel in drawing.canvas.axes]
+    assert units == ["m/s", "m/s", "rad/s"]
+    assert "first time derivatives" in drawing.caption
+
+
+def test_it_needs_coordinates(log):
+    assert draw_virtual_input(log)
+    log.signals = {"virtual_input": log["virtual_input"]}
+    assert draw_virtual_input(log) is None

@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import ReferenceParameters
-from experiments.figures.fastest import draw_fastest
-from experiments.results.drives import plan_metrics
-from experiments.results.fastest import add_limits, given_metrics, rate_warnings
+from experiments.results.fastest import (
+    add_limits,
+    draw_fastest,
+    given_metrics,
+    plan_metrics,
+    rate_warnings,
+)
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.planning.limiting import Limiting
 from pfsc_drake.following.planning.drive_plan import DrivePlan

@@ -7,13 +7,19 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, JointFrictionParameters, LawGains
-from experiments.results.drives import friction_metrics
+from experiments.results.friction import (
+    draw_friction,
+    draw_friction_coefficients,
+    draw_friction_estimate,
+    friction_metrics,
+)
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, expected_signals
 from experiments.simulation import simulate
 from pfsc_drake.robot.models.parameters import load_parameters
 from tests.experiments.results.registry_names import names_about
 from tests.scenarios import shipped_scenario
+from tests.shades import spans
 
 
 def make_log():
@@ -87,3 +93,59 @@ def test_of_elastic_joints_it_is_that_of_the_motors(settings):
     inertia = load_parameters("comau_racer_1_4").rotors.reflected_inertia[:3]
     assert np.abs(log["v_M"].values).max() > 0.01
     np.testing.assert_allclose(log["momentum"].values, inertia * log["v_M"].values, rtol=1e-12)
+
+
+def test_friction_with_the_velocity_it_acts_on(drawn_log):
+    """Both zeros at one height; at rest where the velocity is below a hundredth."""
+    time = drawn_log.time
+    drawn_log["v_M"].values = np.outer(np.clip(time - 0.5, -0.1, 0.1), np.full(6, 2.0))
+    drawing = draw_friction(drawn_log)
+    left, right = drawing.canvas.axes[2], drawing.canvas.axes[6 + 2]
+    np.testing.assert_array_equal(left.lines[0].get_ydata(), drawn_log["tau_f"].values[:, 2])
+    np.testing.assert_array_equal(right.lines[0].get_ydata(), drawn_log["v_M"].values[:, 2])
+    assert left.get_ylabel() == "torque in Nm"
+    assert right.get_ylabel() == "motor velocity\nin rad/s"
+    for panel in (left, right):
+        assert sum(panel.get_ylim()) == pytest.approx(0.0)
+    assert spans(left) == [pytest.approx((0.5, 0.505))]
+
+
+@pytest.fixture(name="log")
+def fixture_log():
+    time = np.linspace(0.0, 10.0, 101)
+    log, rising = RunLog(time), 1.0 - 0.3 * np.exp(-time)
+    log.add("tau_f", np.outer(np.sign(np.sin(time)), [40.0, 9.0]), "Nm")
+    log.add("friction_estimate", np.outer(rising * np.sign(np.sin(time)), [40.0, 9.0]), "Nm")
+    log.add("momentum", np.outer(np.sin(time), [30.0, 2.0]), "Nm s")
+    for name, unit in (("f_c", "Nm"), ("f_v", "Nm s/rad")):
+        log.add(name, np.outer(np.ones(101), [40.0, 9.0]), unit)
+        log.add(f"{name}_estimate", np.outer(rising, [40.0, 9.0]), unit)
+    return log
+
+
+def test_the_estimate_lies_over_the_truth(log):
+    panels = draw_friction_estimate(log).canvas.axes
+    assert [panel.get_title() for panel in panels] == ["Axis 1", "Axis 2"]
+    true, estimate = panels[1].lines
+    assert np.array_equal(true.get_ydata(), log["tau_f"].values[:, 1])
+    assert np.array_equal(estimate.get_ydata(), log["friction_estimate"].values[:, 1])
+
+
+def test_coefficients_in_per_cent_of_the_true_ones(log):
+    momentum, coulomb, viscous = draw_friction_coefficients(log).canvas.axes
+    assert np.array_equal(momentum.lines[1].get_ydata(), log["momentum"].values[:, 1])
+    assert momentum.get_ylabel() == "momentum in Nm s"
+    for panel in (coulomb, viscous):
+        curve = panel.lines[1].get_ydata()
+        assert curve[0] == pytest.approx(70.0)
+        assert curve[-1] == pytest.approx(100.0, abs=0.01)
+        # late values decide the scale
+        assert panel.get_ylim()[0] > 70.0
+
+
+def test_momenta_of_the_last_axes_have_a_panel_of_their_own(log):
+    log.add("momentum", np.outer(np.ones(101), np.arange(1.0, 7.0)), "Nm s")
+    first, last, *_ = draw_friction_coefficients(log).canvas.axes
+    assert [line.get_label() for line in first.lines] == ["$p_1$", "$p_2$", "$p_3$"]
+    assert [line.get_label() for line in last.lines] == ["$p_4$", "$p_5$", "$p_6$"]
+    assert last.lines[-1].get_ydata()[0] == 6.0

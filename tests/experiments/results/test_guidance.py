@@ -1,36 +1,21 @@
-"""Metrics of a tool led within regions, from what a log says of a motion made up here."""
-
-import math
+"""Guidance within virtual fixtures: metrics and figures, from made-up logs."""
 
 import numpy as np
 import pytest
 
-from diagrams.scenario import Scenario
-from diagrams.scenario.robot import ServoParameters
-from diagrams.scenario.virtual_fixtures import FixtureParameters
+from experiments.results.features import draw_figures
 from experiments.results.guidance import (
     deepest_violation,
+    draw_contact,
+    draw_energy,
+    draw_guidance,
+    gives_energy,
     guidance_metrics,
-    guidance_warnings,
-    limit_forces,
-    observed_lag,
     region_times,
 )
 from experiments.results.run_log import RunLog
-from pfsc_drake.control.fixtures.guidance import ProgramGuidance
-from pfsc_drake.control.fixtures.parameters import GuidanceParameters
-from pfsc_drake.control.fixtures.program import MOST_NEAR, SLOTS
+from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT
-from pfsc_drake.following.options.controller import ControllerParameters
-from tests.control.fixtures.point_robot import (
-    DELAY,
-    LAG,
-    PERIOD,
-    half_space,
-    lead,
-    point,
-    random_hand,
-)
 
 NAN = np.nan
 
@@ -98,20 +83,6 @@ def test_a_soft_region_that_yields_is_not_violated():
     assert metrics["deepest_in_soft"].value == pytest.approx(8.5e-3)
 
 
-def test_forces_of_the_robots_own_limits_stand_behind_the_regions():
-    """Of two regions and three joints: joint 2 at its speed, its lower end, a singular posture."""
-    slots = np.zeros((2, SLOTS, len(SLOT)))
-    index, phi = SLOT.index("index"), SLOT.index("phi")
-    slots[..., index] = -1.0
-    held = [(1, 50.0), (2 + 4, 1.0), (2 + 5, 2.0), (2 + 7, 4.0), (2 + 12, 8.0), (2 + 13, 16.0)]
-    for slot, (number, force) in enumerate(held):
-        slots[1, slot, index], slots[1, slot, phi] = number, force
-    kinds, forces = limit_forces(slots.reshape(2, -1), 2, 3)
-    assert kinds == ["speed_1", "end_1", "speed_2", "end_2", "speed_3", "end_3", "singular"]
-    assert not forces[0].any()
-    np.testing.assert_array_equal(forces[1], [0, 0, 3.0, 4.0, 0, 0, 24.0])
-
-
 def test_the_tool_meets_regions_as_they_were_a_lag_ago():
     """Of a clock that runs, waits and runs on; before the start it had not begun."""
     lag, time = 7e-3, 1e-3 * np.arange(200)
@@ -123,60 +94,79 @@ def test_the_tool_meets_regions_as_they_were_a_lag_ago():
     np.testing.assert_allclose(met[7:], clock[:-7], atol=1e-12)
 
 
-def run(walls, believed, hand, start, noise=0.0):
-    """Log of a point behind servos of 5 ms and a bus of 2 ms."""
-    guidance = ProgramGuidance(
-        point(walls, believed), GuidanceParameters(), [math.inf] * len(walls)
-    )
-    record = lead(guidance, start, hand, 1.5)
-    rows, layout = np.array([step.record for step in record.steps]), guidance.layout
-    part = {name: rows[:, place] for name, place in layout.fields.items()}
-    log = RunLog(PERIOD * np.arange(len(rows)))
-    y = np.array(record.y)
-    log.add("y_t", y, "m")
-    log.add("y_t_measured", y + noise * np.random.default_rng(1).normal(size=y.shape), "m")
-    log.add("velocity_command", part["velocity"], "m/s")
-    log.add("rest_point", part["point"], "m")
-    log.add("squeezed", part["squeezed"], "1")
-    log.add("near_regions", part["near"], "", [f"{k}_{s}" for s in range(MOST_NEAR) for k in SLOT])
-    names = [f"plane_{i + 1}" for i in range(len(walls))]
-    log.add("region_distance", np.array([[w(p, 0.0)[0] for w in walls] for p in y]), "m", names)
+TIME = np.linspace(0.0, 2.0, 2001)
+
+
+ON = (TIME > 0.5) & (TIME < 1.5)  # on the cylinder r = 0.2 m about z, turning and rising
+
+
+@pytest.fixture(name="log")
+def fixture_log():
+    log, count = RunLog(TIME), len(TIME)
+    angle, height = 0.5 * TIME, 0.1 * TIME
+    y_t = np.column_stack([0.2 * np.cos(angle), 0.2 * np.sin(angle), height])
+    log.add("y_t", y_t, "m", ["x", "y", "z"])
+    log.add("eta", y_t, "m")
+    log.add("eta_p", y_t, "m")
+    log.add("mode", ON.astype(int), "1", ["free", "surface", "edge", "corner"])
+    near = np.where(ON, 1e-5, 0.01)
+    log.add("region_distance", np.column_stack([near, np.full(count, 0.5)]), "m", ["well", "far"])
+    log.add("region_labels", np.column_stack([ON, 0 * ON]).astype(int), "1", ["well", "far"])
+    slots = np.zeros((count, SLOTS, len(SLOT)))
+    slots[..., 0] = -1.0
+    slots[:, 2, 0] = 0.0  # the well stands in any slot
+    slots[:, 2, 2:5] = -np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    slots[:, 2, SLOT.index("phi")] = np.where(ON, 7.0, 0.0)
+    log.add("near_regions", slots.reshape(count, -1), "")
+    log.add("velocity_command", np.full((count, 3), 0.1), "m/s")
+    log.add("guiding_force", np.full((count, 3), -2.0), "N")
+    log.add("tank", np.full((count, 1), 0.5), "J")
+    log.add("spring_energy", np.zeros((count, 1)), "J")
+    log.add("region_rate", np.ones((count, 1)), "1")
     return log
 
 
-def scenario(believed):
-    return Scenario(
-        controller=ControllerParameters(law="velocity_servo", manifold="space"),
-        fixtures=FixtureParameters(servo_lag=believed),
-        servo=ServoParameters(bandwidth=300.0, bus_delay=DELAY),
-    )
+def test_mode_has_its_names(log):
+    mode = draw_guidance(log).canvas.axes[0]
+    assert [label.get_text() for label in mode.get_yticklabels()] == log["mode"].labels
+    np.testing.assert_array_equal(mode.lines[0].get_ydata(), ON)
 
 
-FLOOR = half_space((0, 0, -0.03), (0, 0, 1))
+def test_only_regions_that_were_near_are_drawn(log):
+    _, distance, *_ = draw_guidance(log).canvas.axes
+    names = [line.get_label() for line in distance.lines]
+    assert "well" in names
+    assert "far" not in names
 
 
-@pytest.mark.parametrize("believed", [2e-3, 5e-3, 12e-3])
-def test_the_lag_is_seen_whatever_was_believed(believed):
-    """Also with 1 um of noise on the measured place, and where the floor holds the tool."""
-    log = run([FLOOR], believed, random_hand(2), (0, 0, 0), noise=1e-6)
-    assert observed_lag(log, believed) == pytest.approx(LAG, rel=0.1)
-    said = guidance_warnings(log, scenario(believed))
-    assert bool(said) == (believed != LAG)
-    if said:
-        assert f"not by {1e3 * believed:g} ms" in said[0]
-        least = float(said[0].split("approach_time to ")[1].split(" s")[0])
-        assert least == pytest.approx(2.0 * (LAG + DELAY), rel=0.1)
+def test_coordinates_along_a_cylinder_are_arc_and_height(log):
+    """As in Fig. 5.10: the first is the arc in the plane, the second the height."""
+    assert draw_contact(log)
+    level, rising = draw_contact(log).canvas.axes[0].lines
+    t = TIME[ON] - TIME[ON][0]
+    np.testing.assert_allclose(rising.get_ydata(), 0.1 * t, atol=1e-9)
+    np.testing.assert_allclose(np.abs(level.get_ydata()), 0.2 * 0.5 * t, atol=1e-6)
 
 
-def test_a_tool_that_rests_tells_no_lag():
-    log = run([FLOOR], 2e-3, lambda t, y: np.zeros(3), (0, 0, 0))
-    assert observed_lag(log, 2e-3) is None
-    assert guidance_warnings(log, scenario(2e-3)) == []
+def test_forces_of_the_contact(log):
+    force = draw_contact(log).canvas.axes[2].lines
+    np.testing.assert_allclose(force[0].get_ydata(), 7.0)
+    angle = 0.5 * TIME[ON]
+    into = -2.0 * (np.cos(angle) + np.sin(angle))
+    np.testing.assert_allclose(force[1].get_ydata(), into, atol=1e-12)
 
 
-def test_walls_that_squeeze_are_named_with_how_deep_it_was():
-    walls = [half_space((0.5, 0, 0), (1, 0, 0)), FLOOR, half_space((0, 0, -0.034), (0, 0, -1))]
-    log = run(walls, LAG, lambda t, y: np.zeros(3), (1.0, 0, -0.032))
-    (said,) = guidance_warnings(log, scenario(LAG))
-    assert said.startswith("plane_2 and plane_3 squeezed the tool for 1.5 s from t = 0.000 s on")
-    assert "up to 2 mm in one" in said
+def test_energy_is_drawn_where_some_went_back_and_forth(log):
+    assert not gives_energy(log)
+    log["spring_energy"].values[100] = 1e-3
+    assert gives_energy(log)
+    work = draw_energy(log).canvas.axes[1].lines[0].get_ydata()
+    assert work[-1] == pytest.approx(-0.6 * 2.001, rel=1e-6)
+
+
+def test_a_tool_in_space_has_no_progress_along_anything(log):
+    names = [drawing.name for drawing in draw_figures(log, [np.zeros((2, 3))] * 2)]
+    assert "progress" not in names
+    assert {"guidance", "contact"} <= set(names)
+    log["region_labels"].values[:] = 0
+    assert draw_contact(log) is None

@@ -13,6 +13,8 @@ from experiments.simulation import simulate
 from tests.scenarios import shipped_scenario
 
 DURATION = 0.3
+
+
 COARSE = 2000.0
 
 

@@ -1,13 +1,15 @@
-"""What happens to an arm beside its tool: pushes on its links, its elbow, its posture."""
+"""Posture of redundant arms and conditioning, from made-up logs."""
 
 import math
 
 import numpy as np
 import pytest
 
-from experiments.results.posture import elbow_shift, elbow_travel, lap_before, posture_metrics
+from experiments.results.features import draw_figures
+from experiments.results.posture import draw_conditioning, draw_posture, posture_metrics
 from experiments.results.run_log import RunLog
 from tests.experiments.results.registry_names import names_about
+from tests.shades import shades
 
 LAP = 1.0
 
@@ -31,16 +33,6 @@ def log():
     log.add("push_force", np.outer(pushed, [3.0, 4.0, 0.0, 0.0, 0.0, 1.0]), "N")
     log.add("elbow", np.outer(0.5 * q[:, 0] + 0.1 * pushed, [1.0, 0.0, 0.0]), "m")
     return log
-
-
-def test_all_metrics(log):
-    metrics = posture_metrics(log, LAP)
-    about = ("q_posture", "redundant", "push_force")
-    assert list(metrics) == names_about(log, *about, also=("redundant", "closed"))
-    assert metrics["max_posture_error"].value == pytest.approx(0.02)
-    assert metrics["posture_return"].value == pytest.approx(0.1, rel=1e-3)
-    assert metrics["final_joint_speed"].value == pytest.approx(0.0, abs=1e-9)
-    assert metrics["largest_push"].value == pytest.approx(5.0)
 
 
 def test_servos_log_no_rate_of_progress(log):
@@ -78,34 +70,6 @@ def test_what_joints_do_before_the_tool_sets_off_does_not_count(log):
     assert metrics["posture_return"].value == pytest.approx(0.1, rel=1e-2)
 
 
-def test_the_elbows_travel_is_from_its_undisturbed_motion(log):
-    elbow, eta = log["elbow"].values, log["eta"].values[:, 0]
-    disturbed = log["push_force"].values.any(axis=1)
-    undisturbed = lap_before(eta, elbow, disturbed, LAP)
-    expected = 0.5 * np.sin(2.0 * np.pi * eta / LAP)
-    np.testing.assert_allclose(undisturbed[:, 0], expected, atol=4e-4)
-    # without it: from where it was when the push began, the tool's own motion included
-    assert elbow_travel(log) > 0.2
-    log.add("elbow_undisturbed", undisturbed, "m")
-    assert elbow_travel(log) == pytest.approx(0.1, rel=1e-3)
-
-
-def test_a_push_while_the_tool_rests_after_a_lap():
-    """A hair before or beyond the lap's end; what it did before the lap began is forgotten."""
-    eta = np.concatenate([np.zeros(50), np.linspace(0.0, 0.99995, 500), np.full(50, 1.00004)])
-    eta = np.concatenate([eta, np.linspace(1.00004, 1.5, 250)])
-    values = np.sin(2.0 * np.pi * eta)[:, None]
-    values[:20] += 0.5
-    expected = lap_before(eta, values, np.arange(len(eta)) > 560, LAP)
-    np.testing.assert_allclose(expected, values, atol=2e-3)
-
-
-def test_no_lap_before_no_undisturbed_motion(log):
-    elbow, eta = log["elbow"].values, log["eta"].values[:, 0]
-    assert lap_before(eta, elbow, eta > 0.5, LAP) is None
-    assert lap_before(eta, elbow, eta > 9.0, LAP) is None
-
-
 def test_square_robots_have_none_of_them(log):
     for name in ("q_posture", "push_force"):
         del log.signals[name]
@@ -114,20 +78,47 @@ def test_square_robots_have_none_of_them(log):
     assert not names_about(log, "q_posture", "redundant", "push_force", also=("closed",))
 
 
-def test_what_the_elbow_does_before_it_is_pushed_is_no_shift(log):
-    first = int(np.argmax(log["push_force"].values[:, 0] > 0.0))
-    assert np.ptp(log["elbow"].values[:first, 0]) > 0.5
-    shift = elbow_shift(log)
-    assert not shift[:first].any()
-    elbow = log["elbow"].values
-    np.testing.assert_allclose(shift[first:], elbow[first:] - elbow[first])
-    log["push_force"].values[:] = 0.0
-    assert not elbow_shift(log).any()
+def drawn(panel, label):
+    (line,) = [line for line in panel.lines if line.get_label() == label]
+    return np.asarray(line.get_ydata())
 
 
-def test_what_the_elbow_does_after_it_is_pushed_is_no_travel(log):
-    travel, pushed = elbow_travel(log), log["push_force"].values.any(axis=1)
-    last = np.flatnonzero(pushed)[-1]
-    log["elbow"].values[last + 1 :] += 9.0
-    assert elbow_travel(log) == travel
-    assert np.abs(elbow_shift(log)).max() > 8.0
+@pytest.fixture
+def pushed_log(drawn_log):
+    """Two points are pushed, the first from 0.4 to 0.6 s; it goes 3 mm and 4 mm away."""
+    during = (drawn_log.time > 0.4) & (drawn_log.time < 0.6)
+    force = np.outer(during, [0.0, 30.0, 0.0, 1.0, 0.0, 0.0])
+    labels = [f"{name} {axis}" for name in ("link_4", "hand") for axis in "xyz"]
+    drawn_log.add("push_force", force, "N", labels)
+    drawn_log.add("elbow", 0.5 + np.outer(during, [3e-3, 4e-3, 0.0]), "m", labels[:3])
+    return drawn_log
+
+
+def test_posture_error_and_swivel_angle(pushed_log):
+    pushed_log.add("q_posture", pushed_log["q_J"].values - 0.1, "rad")
+    pushed_log.add("swivel", np.tile([0.2, 0.3], (201, 1)), "rad")
+    panels = draw_posture(pushed_log).canvas.axes
+    assert drawn(panels[0], "axis 3") == pytest.approx(np.rad2deg(0.1))
+    assert drawn(panels[1], "swivel angle") == pytest.approx(np.rad2deg(0.2))
+    assert drawn(panels[1], "reference") == pytest.approx(np.rad2deg(0.3))
+    labels = [shown.get_label() for shown in shades(panels[0])]
+    assert labels == ["tool pushed", "link pushed"]
+
+
+def test_conditioning_over_time_and_path(drawn_log):
+    drawn_log.add("rcond", np.full(201, 0.05), "1", limits=[[1e-3, np.inf]])
+    assert draw_conditioning(drawn_log) is None  # as many joints as coordinates, far from singular
+    drawn_log["rcond"].values[7] = 5e-3
+    assert draw_conditioning(drawn_log)
+    drawn_log["rcond"].values[9] = 0.0  # of a law that stopped
+    panels = draw_conditioning(drawn_log).canvas.axes
+    assert panels[1].get_xlabel() == r"$\eta$ in m"
+    assert panels[1].lines[0].get_xdata()[-1] == pytest.approx(0.3)
+    for panel in panels:
+        assert drawn(panel, "threshold")[0] == 1e-3
+        assert np.isnan(drawn(panel, "conditioning")[9])
+    drawn_log["rcond"].values[:] = 0.05
+    del drawn_log.signals["phi"]
+    assert draw_conditioning(drawn_log)  # spare joints
+    names = [drawing.name for drawing in draw_figures(drawn_log, [np.zeros((2, 3))])]
+    assert "conditioning" in names

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario.teleoperation import TeleoperationParameters
-from experiments.figures.all import draw_figures
-from experiments.results.promises import broken_promises, set_promises
+from experiments.results.features import draw_figures
+from experiments.results.requirements import missed_targets, set_targets
 from experiments.results.run_log import RunLog
 from experiments.results.teleoperation import (
     add_teleoperation,
@@ -23,7 +23,11 @@ from tests.experiments.results.registry_names import names_about
 from tests.scenarios import shipped_scenario
 
 TIME = np.arange(2000) * 1e-3
+
+
 LATE = 120  # ticks
+
+
 FORCE, START = np.array([3.0, 0.0, 0.0]), np.array([0.5, 0.0, 1.0])
 
 
@@ -56,7 +60,7 @@ def fixture_log():
         "led_point": way + START,
     }
     log = RunLog(TIME)
-    add_teleoperation(log, raw)
+    add_teleoperation(log, None, raw)
     log.add("y_t", late + START)
     return log
 
@@ -77,8 +81,8 @@ def test_a_handle_that_is_too_fast_is_reported(log, settings):
 def test_what_a_side_owes_is_a_requirement(log, settings):
     metrics = teleoperation_metrics(log, settings)
     assert metrics["owed_distance_end"].value == 4e-3
-    set_promises(metrics, settings)
-    missed = broken_promises(metrics)
+    set_targets(metrics, settings)
+    missed = missed_targets(metrics)
     assert any(phrase.startswith("owed_distance_end = 4\u202fmm") for phrase in missed)
 
 

@@ -12,7 +12,7 @@ import yaml
 
 from experiments.cli import main
 from experiments.scenario_file import read_scenario
-from experiments.simulated_run import run_scenario
+from experiments.simulated_run import RunOptions, run_scenario
 
 BARE = ("--no-figures", "--no-recording")
 
@@ -37,9 +37,7 @@ def run(out, happening, figures=False):
     return run_scenario(
         read_scenario("pfc_elastic_3r", overrides),
         out=out,
-        duration=0.3,
-        figures=figures,
-        recording=False,
+        options=RunOptions(0.3, figures=figures, recording=False),
         progress=happening,
     )
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.scenario_file import read_scenario
-from experiments.simulated_run import run_scenario
+from experiments.simulated_run import RunOptions, run_scenario
 from pfsc_drake.errors import InputError
 from reporting.progress import NoProgress
 
@@ -16,9 +16,7 @@ def _run(folder, *overrides, duration=2.0):
     return run_scenario(
         read_scenario("pfc_crossing_6r", list(overrides), ()),
         out=folder,
-        duration=duration,
-        figures=False,
-        recording=False,
+        options=RunOptions(duration, figures=False, recording=False),
         progress=NoProgress(),
     )
 
