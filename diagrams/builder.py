@@ -103,11 +103,13 @@ def build_station(
     check_joints(scenario, task, part.robot.dimension)
     carrier = _add_carrier(builder, scenario, task, folder, progress, like)
     frame = None if carrier is None else carrier.frame
-    start = find_start(scenario.start, task, part, workpiece, mounting, frame)
-    if like is not None:
-        start = like.controlled.begun
-    check_trajectory(scenario)
+    start = (
+        find_start(scenario.start, task, part, workpiece, mounting, frame)
+        if like is None
+        else like.controlled.begun
+    )
     check_obstacles(scenario, task, part)
+    check_trajectory(scenario)
     placed = part, task, task.manifold, outside(scenario), start[0]
     at_tool = scenario.operator is not None and scenario.teleoperation is None
     around = Surroundings(*placed, at_tool, mounting, spring)

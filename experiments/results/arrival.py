@@ -34,7 +34,9 @@ def arrival_metrics(log: RunLog, task: Task, settings: Scenario) -> Metrics:
         task: Its task.
         settings: Its scenario.
     """
-    metrics, end = Metrics(), task.end
+    metrics, motion = Metrics(), task.motion
+    assert motion is not None  # of a station's task
+    end = motion.domain[1]
     if "eta" not in log or "eta_p" not in log or "way_left" in log or not log.time.size:
         return metrics
     length = _distance(task, 0.0)
