@@ -101,14 +101,9 @@ class Run:
         Its index is the time ``t`` [s], its columns are pairs of a signal and a component, so that
         ``table["xi"]`` has the components of ``xi``. Signals of names (``mode``, ``fault``) are
         categorical, with one component of the signal's own name. Units are in ``attrs["units"]``.
-
-        Raises:
-            InputError: If pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise InputError("pandas is not installed; allowed: pip install pandas") from None
+        import pandas as pd
+
         columns: dict[tuple[str, str], Any] = {}
         for name, signal in self.log.signals.items():
             if _tells_names(signal):

@@ -259,14 +259,7 @@ def test_runs_from_before_tell_no_outcome(short, tmp_path):
     assert (old.fault, old.warnings) == (None, [])
 
 
-def test_without_pandas(short, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(InputError, match="pandas is not installed; allowed: pip install pandas"):
-        short.to_dataframe()
-
-
 def test_a_table_of_pandas(short):
-    pytest.importorskip("pandas")
     table = short.to_dataframe()
     np.testing.assert_array_equal(table.index, short.log.time)
     assert table.index.name == "t"
