@@ -261,7 +261,7 @@ def test_a_robot_without_names(load_scenario):
     assert "q_1 = 0.1781 m" in sentence or "q_2 = 0.186 m" in sentence or "q_3" in sentence
 
 
-@pytest.mark.slow(but="6-wrist")
+@pytest.mark.slow
 @pytest.mark.parametrize(("num_joints", "name"), [(5, "robot"), (6, "wrist")])
 def test_a_wrist_that_aims_its_tool(through_the_wrist, num_joints, name):
     """The fourth joint turns nothing but the tool about its axis where both are in line."""

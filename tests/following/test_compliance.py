@@ -149,6 +149,7 @@ def test_a_tool_yields_across_a_surface_like_its_spring():
     assert tool.read("manifold_state")[2] == pytest.approx(force / 2500.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_what_yields_can_do_without_a_sensor_before_torques(path):
     """There is no port for a wrench then; and velocity servos tell no torques."""
     builder = DiagramBuilder()

@@ -192,6 +192,7 @@ def test_values_out_of_range(data, part):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_shipped_operator(load_scenario):
     """The first two seconds: led along the path, gently."""
     settings = load_scenario("operator_hand_6r")

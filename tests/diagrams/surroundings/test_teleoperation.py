@@ -85,6 +85,7 @@ def test_along_a_path_the_follower_moves_farther_by_the_scale():
     np.testing.assert_array_equal(log["leader_force"].values[opened], 0.0)
 
 
+@pytest.mark.slow
 def test_the_tool_turns_as_the_hand_does():
     """A hand that turns by 0.15 rad within half a second, and a wrist that turns twice as far."""
     settings = shipped_scenario("teleop_path")

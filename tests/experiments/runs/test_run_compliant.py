@@ -35,6 +35,7 @@ def test_the_tool_follows_the_yielding_reference(log):
     assert np.abs(log["xi"] - log["xi_p"]).max() < 1e-3
 
 
+@pytest.mark.slow(but="rigid")
 def test_nothing_moves_while_taring(log):
     """The scenario's bias of 12 N would deflect by 6 mm."""
     rest = log["t"] < 0.29

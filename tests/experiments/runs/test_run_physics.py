@@ -159,6 +159,7 @@ def test_rates_are_derivatives(three_axes, law):
         assert error < (2e-3 if position == "q_M" else 2e-4) * scale, position
 
 
+@pytest.mark.slow(but=["elastic", "rigid"])
 @pytest.mark.parametrize("law", LAWS)
 def test_torques_move_links_and_motors(three_axes, arm, law):
     """Newton's law on both sides of the springs, (2.65), with Drake's rigid links."""

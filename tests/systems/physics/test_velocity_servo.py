@@ -109,6 +109,7 @@ def test_rests_at_the_start():
     assert np.max(np.abs(u[1])) > 50.0
 
 
+@pytest.mark.slow
 def test_saturates_without_windup():
     """Little torque beyond gravity: slow, but no overshoot when it arrives."""
     weight = Station(np.zeros(6)).run(0.01)[2][-1]
