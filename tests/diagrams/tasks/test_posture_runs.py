@@ -110,7 +110,7 @@ def test_an_elbow_that_hardly_moves_alone_leaves_the_joints_to_the_tool(run):
     assert 0.5 < shares.max() < 0.85
 
 
-@pytest.mark.slow(but="own0")
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [GainParameters(bandwidth=20.0), GainParameters()])
 def test_poles_are_chosen_for_more_joints_than_outputs(load_scenario, own):
     settings = load_scenario("pfc_elastic_7r")

@@ -78,6 +78,7 @@ class Station:
         return v.sample_times(), v.data().T, u.data().T
 
 
+@pytest.mark.slow(but=["0", "4"])
 @pytest.mark.parametrize("axis", range(6))
 def test_step_within_the_bandwidth(axis):
     """63 % after one time constant, no overshoot; the other axes come back to rest."""
