@@ -221,6 +221,9 @@ def test_what_is_known_without_a_run(six_axes):
     turned = sentence(Fault.ORIENTATION_ERROR)
     assert turned.startswith(f"{Fault.ORIENTATION_ERROR.explanation} at eta = 0.026 m")
     assert "phi_z = 0.0 deg" in turned or "phi_z = -0.0 deg" in turned
+    force, asked = np.array([3.0, 12.5, 7.0, 0.0, 0.0, 0.0]), np.array([30.0])
+    pressed = sentence(Fault.PRESS_FORCE_LOST, manifold_force=force, press=asked)
+    assert pressed.endswith(": 12.5 N are measured, 30 N asked for at eta = 0.026 m, t = 0.500 s")
     point = now.signals["manifold_point"].copy()
     point[station.task.place.layout.eta] = np.nan
     lost = sentence(Fault.PROJECTION_FAILED, manifold_point=point)
