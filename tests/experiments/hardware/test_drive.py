@@ -147,6 +147,21 @@ def test_an_iiwas_messages_do_as_well():
     assert np.abs(log["xi"].values[log.time > 0.4]).max() < 2e-5
 
 
+def test_what_was_lost_lies_between_both_statuses(monkeypatch):
+    """Torques on a straight line; positions are those of ``test_bridge``."""
+    loop, told = Loop(panda()).begin().run(0.02), []
+    drive, tell = loop.drive, loop.drive._tell
+    monkeypatch.setattr(drive, "_tell", lambda *given: (told.append(given), tell(*given)))
+    torque = drive._last_torque
+    for _ in range(2):
+        loop.robot.advance()
+    loop.robot.tell()
+    drive.answer(changed(torque=torque + 3.0)(loop.end.receive(0.0)))
+    torques = np.array([given[1] for given in told])
+    np.testing.assert_allclose(torques - torque, np.outer([1.0, 2.0, 3.0], np.ones(7)), rtol=1e-9)
+    assert [tick.missed for tick in drive.record.ticks[-3:]] == [1, 1, 2]
+
+
 @pytest.mark.slow
 def test_lost_packets_are_bridged():
     loop = Loop(panda(), lose=0.03).begin().run(0.9)
