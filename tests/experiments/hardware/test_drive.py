@@ -252,6 +252,7 @@ def test_what_is_measured_is_watched():
 
     loop.run(3.0, shift)
     assert loop.fault.startswith("joint 4 jumped by 2.8")
+    assert loop.drive.time < 2.0  # at rest for a while, and not for as long as it may take
     assert loop.speed() < 0.05
     assert np.rad2deg(np.abs(loop.robot.status().q - before)).max() < 5.0
 

@@ -253,6 +253,7 @@ def test_a_closed_path_counts_laps(three_axes, points, laps):
     np.testing.assert_allclose(result["y_t"][-1], on_first_lap, atol=1e-5)
 
 
+@pytest.mark.slow(but="elastic")
 @pytest.mark.parametrize("law", LAWS)
 def test_a_start_on_a_later_lap(three_axes, law):
     result = three_axes(f"controller.law={law}", "reference.points=[4.0, 4.1]", duration="0.05")

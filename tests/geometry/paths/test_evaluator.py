@@ -39,6 +39,7 @@ def _path(closed: bool) -> Path:
 OPEN, CLOSED = _path(False), _path(True)
 
 
+@pytest.mark.slow(but=["1-closed", "2-open", "3-closed", "4-open"])
 @pytest.mark.parametrize("path", [OPEN, CLOSED], ids=["open", "closed"])
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_fields(path: Path, order: int) -> None:
