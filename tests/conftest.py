@@ -46,22 +46,23 @@ def pytest_collection_modifyitems(config, items):
     chosen = any("::" in argument for argument in config.args)
     unmet = _keep_quick(items)
     if unmet and not chosen:
-        raise pytest.UsageError("; ".join(f"{name} has no case {unmet[name]}" for name in unmet))
+        raise pytest.UsageError("; ".join(f"{name} has no case {case}" for name, case in unmet))
 
 
 def _keep_quick(items):
-    """Take the mark from the case that ``slow(but=..)`` leaves out; return those not found."""
-    wanted, met = {}, set()
+    """Take the mark from the cases that ``slow(but=..)`` leaves out; return those not found."""
+    wanted, met = set(), set()
     for item in items:
         mark = item.get_closest_marker("slow")
         if mark is None or "but" not in mark.kwargs:
             continue
-        name = item.nodeid.partition("[")[0]
-        wanted[name] = mark.kwargs["but"]
-        if item.callspec.id == mark.kwargs["but"]:
-            met.add(name)
+        name, cases = item.nodeid.partition("[")[0], mark.kwargs["but"]
+        kept = {(name, case) for case in ([cases] if isinstance(cases, str) else cases)}
+        wanted |= kept
+        if (name, item.callspec.id) in kept:
+            met.add((name, item.callspec.id))
             item.own_markers.remove(mark)
-    return {name: case for name, case in wanted.items() if name not in met}
+    return sorted(wanted - met)
 
 
 @pytest.hookimpl(tryfirst=True)

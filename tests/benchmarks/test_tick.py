@@ -188,7 +188,7 @@ def fixture_chain(request):
     return Chain(*CASES[request.param])
 
 
-@pytest.mark.slow(but="6R elastic oriented with all")
+@pytest.mark.slow(but="3R elastic")
 def test_whole_tick(chain, benchmark):
     before = chain.tick().copy()
     drive = benchmark.pedantic(chain.tick, setup=chain.remember, rounds=3000, warmup_rounds=50)
@@ -213,6 +213,7 @@ def test_updates(chain, benchmark):
     assert chain.controller.GetOutputPort("fault").Eval(inner) == Fault.NONE
 
 
+@pytest.mark.slow(but="3R elastic")
 def test_projection_and_manifold_point(chain, benchmark):
     evaluator = chain.path.evaluator(chain.law.linearization.relative_degree)
     y_t = (chain.path.position.derivatives(THETA, 0)[0] - 0.002).tolist()
@@ -220,6 +221,7 @@ def test_projection_and_manifold_point(chain, benchmark):
     assert point[0] == pytest.approx(THETA, abs=0.05)
 
 
+@pytest.mark.slow(but="3R elastic")
 def test_law(chain, benchmark):
     linearization = chain.law.linearization
     r, m = linearization.relative_degree, linearization.num_outputs

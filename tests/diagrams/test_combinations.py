@@ -147,6 +147,7 @@ def arm_in_a_notch(load_exact_scenario):
     return settings
 
 
+@pytest.mark.slow
 def test_an_arm_runs_in_a_notch(arm_in_a_notch):
     """Displaced by 4 mm, with 2 mm free: the tool yields, and the sensor feels the contact."""
     arm_in_a_notch.notch.displacement = [0.004, 0.0, 0.0]

@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from diagrams.scenario_task import make_task
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
@@ -18,6 +17,7 @@ from diagrams.scenario import (
     ReferenceParameters,
     StartParameters,
 )
+from diagrams.scenario_task import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe
@@ -221,6 +221,9 @@ def test_what_is_known_without_a_run(six_axes):
     turned = sentence(Fault.ORIENTATION_ERROR)
     assert turned.startswith(f"{Fault.ORIENTATION_ERROR.explanation} at eta = 0.026 m")
     assert "phi_z = 0.0 deg" in turned or "phi_z = -0.0 deg" in turned
+    force, asked = np.array([3.0, 12.5, 7.0, 0.0, 0.0, 0.0]), np.array([30.0])
+    pressed = sentence(Fault.PRESS_FORCE_LOST, manifold_force=force, press=asked)
+    assert pressed.endswith(": 12.5 N are measured, 30 N asked for at eta = 0.026 m, t = 0.500 s")
     point = now.signals["manifold_point"].copy()
     point[station.task.place.layout.eta] = np.nan
     lost = sentence(Fault.PROJECTION_FAILED, manifold_point=point)
@@ -261,7 +264,7 @@ def test_a_robot_without_names(load_scenario):
     assert "q_1 = 0.1781 m" in sentence or "q_2 = 0.186 m" in sentence or "q_3" in sentence
 
 
-@pytest.mark.slow(but="6-wrist")
+@pytest.mark.slow
 @pytest.mark.parametrize(("num_joints", "name"), [(5, "robot"), (6, "wrist")])
 def test_a_wrist_that_aims_its_tool(through_the_wrist, num_joints, name):
     """The fourth joint turns nothing but the tool about its axis where both are in line."""

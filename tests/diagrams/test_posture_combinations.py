@@ -43,7 +43,7 @@ COMBINATIONS = [
 ]
 
 
-@pytest.mark.slow(but="reference-rigid")
+@pytest.mark.slow
 @pytest.mark.parametrize(("task", "law"), COMBINATIONS)
 def test_a_posture_moves_and_the_tool_does_not_notice(load_exact_scenario, law, task):
     settings = load_exact_scenario("pfc_elbow_7r")

@@ -74,6 +74,7 @@ def check_rest(station, result, times, log, *, degrees=5.0):
     assert np.isfinite(drive).all()
 
 
+@pytest.mark.slow(but=["1-nan", "4-frozen", "7-jump", "10-nan"])
 @pytest.mark.parametrize("kind", ["nan", "frozen", "jump"])
 @pytest.mark.parametrize("component", [1, 4, 7, 10])
 def test_a_sensor_of_an_elastic_joint(soft, kind, component):
@@ -87,7 +88,7 @@ def test_a_sensor_of_an_elastic_joint(soft, kind, component):
     check_rest(station, result, times, log, degrees=6.0)
 
 
-@pytest.mark.slow(but="jump-v_J_6")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name"),
     [
@@ -204,6 +205,7 @@ def test_a_force_sensor(six_axes, kind, size, time, expected):
     check_rest(station, result, times, log)
 
 
+@pytest.mark.slow(but=["False-True", "True-False"])
 @pytest.mark.parametrize(("whole", "noisy"), [(False, True), (True, True), (True, False)])
 def test_a_force_sensor_that_stands_still(six_axes, whole, noisy):
     failure = six_axes.simulation.force_sensor_failure
@@ -291,7 +293,7 @@ def test_three_free_turns_about_the_tools_axis(six_axes):
     assert np.abs(drive[300:]).max() < 600.0
 
 
-@pytest.mark.slow(but="1")
+@pytest.mark.slow
 @pytest.mark.parametrize("end", [0, 1])
 def test_at_the_end_of_an_open_path(load_exact_scenario, end):
     """Pushed against the end at 0.4 m/s, which is a wall; the tool turned on the way to it."""

@@ -52,9 +52,16 @@ def _named(item: Block | Command) -> str:
     return item.place if isinstance(item, Block) else str(item)
 
 
-@pytest.mark.slow(but="robot.md:172")
 @pytest.mark.parametrize("block", blocks("yaml"), ids=_named)
-def test_yaml(block: Block, desk: Path) -> None:
+def test_yaml(block: Block) -> None:
+    """It is a scenario, or a part of one."""
+    for text in _alternatives(block):
+        _settings(block, text)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", blocks("yaml"), ids=_named)
+def test_yaml_is_built(block: Block, desk: Path) -> None:
     """A station is built; of alternatives, which stand elsewhere than the robot, the surface."""
     for text in _alternatives(block):
         settings = _settings(block, text)
@@ -84,20 +91,33 @@ def _options(command: Command) -> dict[str, Any]:
         return {"command": name, **context.params}
 
 
-@pytest.mark.parametrize("command", commands(), ids=_named)
-def test_commands(command: Command, desk: Path) -> None:
-    """The command line takes it; what shipped scenarios are given with it is built."""
+def _changed(command: Command) -> Scenario | None:
+    """The shipped scenario of a command with what is given with it, unless nothing is."""
     options = _options(command)
     name, changes = options.get("scenario"), options.get("overrides") or []
     if name not in scenario_names():
-        return
+        return None
     if options["command"] == "sweep":
         vary, draws = options["vary"], options["samples"]
         sweep = define_sweep(name, vary, overrides=changes, samples=draws, seed=0, duration=None)
         changes = [*changes, *sweep.samples[0].overrides]
-    files = [change.partition("=")[2] for change in changes if "=out/" in change]
-    if changes and not files:
-        build_station(load_typed(Scenario, read_scenario(name, changes).data, str(command)), desk)
+    if not changes or any("=out/" in change for change in changes):
+        return None
+    return load_typed(Scenario, read_scenario(name, changes).data, str(command))
+
+
+@pytest.mark.parametrize("command", commands(), ids=_named)
+def test_commands(command: Command) -> None:
+    """The command line takes it, and the scenario what is given with it."""
+    _changed(command)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", commands(), ids=_named)
+def test_what_commands_change_is_built(command: Command, desk: Path) -> None:
+    settings = _changed(command)
+    if settings is not None:
+        build_station(settings, desk)
 
 
 def _guidance_rows() -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -122,7 +122,7 @@ def test_wrong_inputs_end_in_a_fault(elastic):
     assert int(found.stdout.split()[-1]) > 50
 
 
-@pytest.mark.slow(but="inf")
+@pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
 def test_what_is_no_measurement_ends_in_a_fault(elastic, library, bad):

@@ -1,5 +1,6 @@
 """The program ``pfsc``: the same commands from anywhere, and one line where there are none."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -27,10 +28,21 @@ def pfsc(folder: Path, *arguments: str, **variables: str) -> subprocess.Complete
     )
 
 
-def completed(folder: Path, line: str) -> list[str]:
-    """What the shell is offered for the last word of a line."""
-    words = {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)}
-    return pfsc(folder, _PFSC_COMPLETE="complete_bash", **words).stdout.split()
+@pytest.fixture
+def completed(monkeypatch, capsys):
+    """Return a function that tells what the shell is offered for the last word of a line."""
+
+    def offers(folder: Path, line: str) -> list[str]:
+        monkeypatch.chdir(folder)
+        monkeypatch.setenv("_PFSC_COMPLETE", "complete_bash")
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(len(line.split(" ")) - 1))
+        monkeypatch.setattr(sys, "argv", ["pfsc"])
+        with contextlib.suppress(SystemExit):
+            program.main()
+        return capsys.readouterr().out.split()
+
+    return offers
 
 
 def test_it_is_what_is_installed():
@@ -82,12 +94,17 @@ def test_packages_that_are_missing(monkeypatch, capsys):
         ("pfsc drive --qu", ["--quiet"]),
     ],
 )
-def test_completion(tmp_path, line, offered):
+def test_completion(completed, tmp_path, line, offered):
     (tmp_path / "my.yaml").touch()
     (tmp_path / "my.csv").touch()
     (tmp_path / "mystery").mkdir()
     (tmp_path / "mystery" / "other.yml").touch()
     assert completed(tmp_path, line) == offered
+
+
+def test_a_shell_is_offered_words(tmp_path):
+    words = {"_PFSC_COMPLETE": "complete_bash", "COMP_WORDS": "pfsc ru", "COMP_CWORD": "1"}
+    assert pfsc(tmp_path, **words).stdout.split() == ["run"]
 
 
 def test_version(capsys):

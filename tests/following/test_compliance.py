@@ -149,14 +149,21 @@ def test_a_tool_yields_across_a_surface_like_its_spring():
     assert tool.read("manifold_state")[2] == pytest.approx(force / 2500.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_what_yields_can_do_without_a_sensor_before_torques(path):
-    """There is no port for a wrench then; and velocity servos tell no torques."""
+    """There is no port for a wrench then."""
     builder = DiagramBuilder()
     plant = load(builder)
     chosen = FollowerOptions(compliance=ComplianceParameters(source="observed", transversal=SPRING))
     follower = add_path_following(builder, plant, "tool_point", path, "rigid", options=chosen)
     assert not follower.HasInputPort("wrench")
     assert follower.HasOutputPort("manifold_force")
+
+
+def test_velocity_servos_tell_no_torques_that_forces_are_found_from(path):
+    builder = DiagramBuilder()
+    plant = load(builder)
+    chosen = FollowerOptions(compliance=ComplianceParameters(source="observed", transversal=SPRING))
     with pytest.raises(InputError, match=r"compliance.source = observed with .*velocity_servo"):
         add_path_following(builder, plant, "tool_point", path, "velocity_servo", options=chosen)
 

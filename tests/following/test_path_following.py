@@ -94,6 +94,7 @@ def test_a_users_own_plant_follows_a_users_own_path(path, model, law):
     assert eta > 0.1
 
 
+@pytest.mark.slow
 def test_a_stream_of_way_points_is_followed_and_waited_for(path):
     """The tool goes on when a way point comes, rests at the last one, and is on the path always."""
     options = FollowerOptions(stream=StreamLimits(velocity=0.3, acceleration=3.0, bandwidth=40.0))
@@ -334,6 +335,7 @@ def test_links_are_found_where_motors_alone_are_measured(path, state):
     assert eta > 0.03 and np.linalg.norm(tool - point) < 2e-4
 
 
+@pytest.mark.slow
 def test_it_steps_without_drake(path):
     """The same torques as the diagram's, from what the diagram measured."""
     simulator, follower = closed_loop(path, "comau_racer_1_4_elastic", "elastic")

@@ -76,6 +76,7 @@ def test_it_waits_for_one_who_stands_on_its_way_and_goes_on_when_he_has_gone(loo
     assert read(simulator, follower, "manifold_state")[0] == pytest.approx(0.8, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_place_that_is_no_number_stops_it(loop):
     follower, start = loop
     simulator, context = start()

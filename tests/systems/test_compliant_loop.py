@@ -86,7 +86,7 @@ def test_the_rotational_forces_may_depend_on_the_reference(path):
         assert stiffness * phi[i] * 2e-6 == pytest.approx(moment @ way, rel=1e-5)
 
 
-@pytest.mark.slow(but="actual")
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["reference", "actual"])
 def test_a_robot_yields_to_a_force(arm, path, request, start):
     """In the intended wiring, with a sensor that measures a constant force: it yields by f / k."""

@@ -139,6 +139,7 @@ def rms(signal):
     return np.sqrt(np.mean(signal**2))
 
 
+@pytest.mark.slow(but="comau_racer_1_4")
 @pytest.mark.parametrize("model", MODELS)
 def test_at_rest_a_biased_sensor_gives_zero_and_then_noise(model):
     noise = np.repeat([0.1, 0.004], 3)
@@ -156,6 +157,7 @@ def test_at_rest_a_biased_sensor_gives_zero_and_then_noise(model):
     assert np.all(np.abs(rest.mean(axis=0)) < 4.0 * expected / np.sqrt(50))
 
 
+@pytest.mark.slow(but="comau_racer_1_4_elastic")
 @pytest.mark.parametrize("model", MODELS)
 def test_a_known_wrench_is_found_to_the_noise_level(model):
     pulse = ForcePulse(0.1, 0.9, [15.0, -25.0, 10.0], [1.0, 0.5, -0.8], ramp=0.1)
@@ -168,6 +170,7 @@ def test_a_known_wrench_is_found_to_the_noise_level(model):
     assert np.all(np.abs(error.mean(axis=0)) < np.repeat([0.08, 0.012], 3))
 
 
+@pytest.mark.slow(but="200.0-0.002-comau_racer_1_4")
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(("sensor_bandwidth", "share"), [(200.0, 0.002), (100.0, 0.05)])
 def test_inertia_of_a_fast_motion_is_taken_off(model, sensor_bandwidth, share):

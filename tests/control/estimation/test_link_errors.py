@@ -58,6 +58,7 @@ ENCODERS = {
 }
 
 
+@pytest.mark.slow(but=["elastic-differences", "elastic-steps", "mixed-exact", "mixed-filtered"])
 @pytest.mark.parametrize("encoders", ENCODERS)
 @pytest.mark.parametrize("kind", ["elastic", "mixed"])
 def test_noise_of_torques_and_steps_of_encoders(drake_arm, kind, encoders):

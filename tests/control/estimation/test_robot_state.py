@@ -193,6 +193,7 @@ def told(predictor, states, told_torques, **more):
     )
 
 
+@pytest.mark.slow(but=["1-elastic", "2-mixed", "3-rigid"])
 @pytest.mark.parametrize("kind", ["rigid", "elastic", "mixed"])
 @pytest.mark.parametrize("ticks", [1, 2, 3])
 def test_the_state_is_that_of_so_many_ticks_later(drake_arm, kind, ticks):

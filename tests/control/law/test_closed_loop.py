@@ -84,7 +84,7 @@ def test_a_path_on_a_surface(name, load_robot, make_law, virtual_output):
     check(robot, rigid, path, law, virtual_output)
 
 
-@pytest.mark.slow(but="velocity_servo-zyz")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "convention"), [("velocity_servo", "zyx"), ("velocity_servo", "zyz"), ("rigid", "zyx")]
 )

@@ -91,6 +91,7 @@ def test_a_weight_changes_the_joints_alone(weight, load_robot, make_law, positio
     assert np.abs(station.states[-1][:6] - plain.states[-1][:6]).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_a_posture_comes_back_to_its_reference(load_robot, make_law, position_path):
     """What is left of the deviation moves the outputs: its free part has died out."""
     station = Station(load_robot, make_law, position_path, "rigid", weight=np.ones(6))

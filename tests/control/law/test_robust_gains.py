@@ -143,6 +143,21 @@ def test_a_slow_coordinate_asks_no_more_of_the_fast_pole_than_it_converges(arm):
     assert fast == pytest.approx(60.0)
 
 
+class SlowerWithTwoErrors(SampledRobot):
+    """A robot whose modes are half as fast where mass and stiffness are wrong together."""
+
+    def rate(self, gains, error):
+        together = error.mass != 1.0 and error.stiffness != 1.0
+        return -0.05 * gains if together else -0.1 * gains
+
+
+def test_mass_and_stiffness_may_be_wrong_together():
+    """Half of 20 1/s is kept from 200 1/s on; with one error at a time 100 1/s would do."""
+    robot = SlowerWithTwoErrors(None, 1e-3, is_elastic=True)
+    fast = choose_fast_pole(robot, lambda fast: fast, [20.0], 0.1)
+    assert 200.0 <= fast < 250.0
+
+
 def test_rule_of_poles():
     assert rule_of_poles(60.0, 250.0, 4) == [-60.0, -60.0, -250.0, -350.0]
     assert rule_of_poles(60.0, 250.0, 3) == [-60.0, -60.0, -250.0]

@@ -119,6 +119,14 @@ def test_it_stops_and_holds(robot):
     assert np.abs(np.diff(torques[5:], axis=0)).max() < 0.05 * robot.limits.max()
 
 
+@pytest.mark.slow(
+    but=[
+        "comau_racer_1_4_3r-1",
+        "comau_racer_1_4_3r-10",
+        "comau_racer_1_4_elastic_3r-4",
+        "comau_racer_1_4_elastic_3r-7",
+    ]
+)
 @pytest.mark.parametrize("component", [1, 4, 7, 10])
 def test_each_component_may_be_lost(robot, component):
     check(stop(robot, lost=[component])[0])

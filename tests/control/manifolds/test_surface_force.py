@@ -48,12 +48,14 @@ def place(manifold, name, rng):
     return y_t, R_e, surface_point(manifold, geometry, y_t, theta, given=given)
 
 
-def outputs(manifold, point, y_t, R_e, twist):
-    """Return the virtual output and its rate, shape (2, m)."""
-    spin = np.cross(np.eye(3), twist[3:])
-    y, R = Jet([ca.SX(y_t), ca.SX(twist[:3])]), Jet([ca.SX(R_e), ca.SX(spin @ R_e)])
+def outputs_of(manifold, point, y_t, R_e):
+    """Return the virtual output and its rate, shape (2, m), as a function of the twist."""
+    twist = ca.SX.sym("twist", 6)
+    y, R = Jet([ca.SX(y_t), twist[:3]]), Jet([ca.SX(R_e), ca.skew(twist[3:]) @ R_e])
     jets = manifold.virtual_output(y, R, ca.SX(point), [])
-    return np.array([[float(ca.evalf(x.coefficients[k])) for x in jets] for k in (0, 1)])
+    rows = [ca.horzcat(*[x.coefficients[k] for x in jets]) for k in (0, 1)]
+    function = ca.Function("outputs", [twist], [ca.densify(ca.vertcat(*rows))])
+    return lambda twist: function(twist).full()
 
 
 def force(manifold, wrench, point, reference, **keys):
@@ -67,10 +69,11 @@ def test_power_of_random_motions(name, orientation):
     """The rates, which other tests know to be right, times the forces; torques across an axis."""
     rng, manifold = np.random.default_rng(2), SurfaceManifold(1, **ORIENTATIONS[orientation])
     y_t, R_e, point = place(manifold, name, rng)
-    still = outputs(manifold, point, y_t, R_e, np.zeros(6))[0]
+    outputs = outputs_of(manifold, point, y_t, R_e)
+    still = outputs(np.zeros(6))[0]
     for _ in range(3):
         wrench, twist = rng.uniform(-20, 20, 6), rng.uniform(-0.3, 0.3, 6)
-        rates = outputs(manifold, point, y_t, R_e, twist)[1]
+        rates = outputs(twist)[1]
         tau = force(manifold, wrench, point, still, with_turning=True)
         acting = wrench.copy()
         if manifold.tool.tool_axis is not None:
@@ -85,21 +88,20 @@ def test_power_of_random_motions(name, orientation):
             continue
         # without the turning: the power relative to the orientation that moves with the tool
         held = np.append(twist[:3], np.zeros(3))
-        omega_d = frame_velocity(manifold, point, y_t, R_e, held)
+        omega_d = frame_velocity(outputs, len(manifold.coordinates), held)
         relative = acting @ np.append(twist[:3], twist[3:] - omega_d)
         tau = force(manifold, wrench, point, still)
         assert tau @ rates == pytest.approx(relative, abs=1e-11)
 
 
-def frame_velocity(manifold, point, y_t, R_e, twist):
+def frame_velocity(outputs, m, twist):
     """Return the angular velocity of ``R_d``: the turn at which the angles of a tool stand still.
 
     Of an axis, up to a turn about it.
     """
-    m = len(manifold.coordinates)
     turns = [np.append(np.zeros(3), unit) for unit in np.eye(3)]
-    slope = np.array([outputs(manifold, point, y_t, R_e, turn)[1, 3:m] for turn in turns]).T
-    return -np.linalg.pinv(slope) @ outputs(manifold, point, y_t, R_e, twist)[1, 3:m]
+    slope = np.array([outputs(turn)[1, 3:m] for turn in turns]).T
+    return -np.linalg.pinv(slope) @ outputs(twist)[1, 3:m]
 
 
 @pytest.mark.parametrize("orientation", ["normal", "axis", "given"])
@@ -113,7 +115,7 @@ def test_virtual_work_with_the_jacobian_of_a_robot(load_robot, orientation):
     if manifold.tool.tool_axis is not None:
         about = R_e @ manifold.tool.tool_axis
         wrench[3:] -= about * (about @ wrench[3:])
-    still = outputs(manifold, point, y_t, R_e, np.zeros(6))[0]
+    still = outputs_of(manifold, point, y_t, R_e)(np.zeros(6))[0]
     tau = force(manifold, wrench, point, still, with_turning=True)
     A = np.array(decoupling_function(robot.chain, manifold)(q, point))
     joint_torques = robot.jacobian(q).T @ np.concatenate([wrench[3:], wrench[:3]])

@@ -304,19 +304,21 @@ def test_what_was_refused_is_remembered_at_rest():
     np.testing.assert_allclose(run.sigma[-1], w[25], rtol=0, atol=1e-6)
 
 
-@pytest.mark.slow(but="3")
-@pytest.mark.parametrize("seed", range(4))
-def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed):
+@pytest.mark.slow(but="3-40")
+@pytest.mark.parametrize(("seed", "count"), [(3, 40), *((k, 150) for k in range(4))])
+def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed, count):
     random = np.random.default_rng(seed)
     parameters, order = (THROUGH, 1) if seed % 2 else (SMOOTHER, 3)
     heading, points = 0.0, [START]
-    for _ in range(150):
+    for _ in range(count):
         heading += random.normal(0.0, 0.3) + (random.random() < 0.03) * random.uniform(-3.2, 3.2)
         step = random.exponential(0.006) * np.array([np.cos(heading), np.sin(heading), 0.0])
         points.append(points[-1] + step)
-    times = np.cumsum(random.exponential(0.016, 150) + (random.random(150) < 0.015) * 1.5)
+    times = np.cumsum(random.exponential(0.016, count) + (random.random(count) < 0.015) * 1.5)
     stream = make_stream(parameters, points[0], order=order)
-    run = stream.run(sent_at(stream.layout, np.array(points[1:]), times, heard=True), 16000)
+    run = stream.run(
+        sent_at(stream.layout, np.array(points[1:]), times, heard=True), 100 * count + 1000
+    )
     assert np.isfinite(run.points).all()
     assert run.overrun.max() <= 1e-12
     assert np.abs(np.diff(run.eta[:, 1])).max() <= parameters.acceleration * PERIOD * (1 + 1e-6)

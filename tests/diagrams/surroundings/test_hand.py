@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagrams.scenario_task import make_task
 
 from diagrams.builder import build_station
 from diagrams.scenario import (
@@ -14,6 +13,7 @@ from diagrams.scenario import (
     Line,
     Scenario,
 )
+from diagrams.scenario_task import make_task
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
@@ -192,6 +192,7 @@ def test_values_out_of_range(data, part):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_shipped_operator(load_scenario):
     """The first two seconds: led along the path, gently."""
     settings = load_scenario("operator_hand_6r")

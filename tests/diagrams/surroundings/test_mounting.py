@@ -90,6 +90,7 @@ def test_a_plate_that_is_held_is_where_the_tool_is():
     np.testing.assert_allclose(wrench, [*weight, 0, 0, 0], atol=1e-3)  # 1e4 N/m and 1e-8 m
 
 
+@pytest.mark.slow
 def test_the_way_back_starts_where_the_frame_stands():
     station = build(name="plate_return")
     state, root = plate_state(station)

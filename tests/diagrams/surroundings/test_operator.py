@@ -39,6 +39,7 @@ def write(folder, settings, *rows, regions=()):
     settings.operator.inputs = str(file)
 
 
+@pytest.mark.slow
 def test_a_push_leads_the_tool_and_stiffness_decides_how_far(tmp_path, settings):
     """In the plane's normal, which is e_perp; 5,000 N/m, then 2,000 N/m."""
     write(

@@ -76,7 +76,11 @@ def test_the_ball_touches_where_the_tool_point_is_on_the_workpiece(station):
         ("surface.orientation={kind: given}", ["surface.orientation.kind", "normal"]),
         ("compliance.transversal.stiffness.value=100", ["press", "stiffness.value is 0"]),
         ("compliance.press.touching=11", ["touching = 11", "approach = 10"]),
-        ("compliance.transversal.damping.value=0", ["transversal.damping = 0", "positive"]),
+        pytest.param(
+            "compliance.transversal.damping.value=0",
+            ["transversal.damping = 0", "positive"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_refused(change, parts):

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagrams.scenario_task import make_task
 from scipy.spatial.transform import Rotation
 
 from diagrams.builder import build_station
 from diagrams.scenario import HandParameters, HandWaypoint
 from diagrams.scenario.schema import driven
 from diagrams.scenario.teleoperation import TeleoperationParameters
+from diagrams.scenario_task import make_task
 from diagrams.surroundings import leader
 from experiments.results.run_signals import collect_log
 from experiments.results.teleoperation import teleoperation_metrics
@@ -85,6 +85,7 @@ def test_along_a_path_the_follower_moves_farther_by_the_scale():
     np.testing.assert_array_equal(log["leader_force"].values[opened], 0.0)
 
 
+@pytest.mark.slow
 def test_the_tool_turns_as_the_hand_does():
     """A hand that turns by 0.15 rad within half a second, and a wrist that turns twice as far."""
     settings = shipped_scenario("teleop_path")

@@ -73,7 +73,7 @@ def test_a_push_along_the_path_shifts_the_reference(arm, load_scenario, force):
     assert np.abs(log["xi"].values[late]).max() < 1e-3
 
 
-@pytest.mark.slow(but="True")
+@pytest.mark.slow
 @pytest.mark.parametrize("with_turning", [False, True])
 def test_a_torque_pushes_along_a_path_that_turns_if_it_is_to(settings, with_turning):
     """By its power: torque times the turn of the path's orientation per metre."""
@@ -111,7 +111,7 @@ def test_a_torque_turns_the_tool(settings, axis):
     np.testing.assert_allclose(log["phi"].values[-1], zyx, atol=1e-6)
 
 
-@pytest.mark.slow(but="0.001")
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.06, 0.001])
 def test_stiffness_that_changes_on_the_way_moves_nothing_at_once(arm, load_scenario, width):
     """Under a constant force, from 600 to 3000 N/m within ``width`` of the way."""

@@ -194,6 +194,7 @@ def test_velocity_is_as_it_was_unless_given():
     assert ReferenceParameters(velocity=0.3).largest_velocity == 0.3
 
 
+@pytest.mark.slow
 def test_a_joint_that_passes_its_limit_is_named_beforehand(fastest, load_arm, monkeypatch):
     """Of a robot whose first axis ends within the motion."""
     settings = fastest()

@@ -62,6 +62,7 @@ def test_away_from_the_limits_of_joints(run):
     assert deviation(station, log) < 5e-5
 
 
+@pytest.mark.slow
 def test_to_where_the_outputs_are_easy_to_move(run):
     station, fault, log = run(ASIDE, 1.5, dwell=2.0, task="conditioning", damping=5.0)
     assert fault is None
@@ -71,7 +72,7 @@ def test_to_where_the_outputs_are_easy_to_move(run):
     assert deviation(station, log) < 5e-5
 
 
-@pytest.mark.slow(but="posture0")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "posture",
     [
@@ -109,7 +110,7 @@ def test_an_elbow_that_hardly_moves_alone_leaves_the_joints_to_the_tool(run):
     assert 0.5 < shares.max() < 0.85
 
 
-@pytest.mark.slow(but="own0")
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [GainParameters(bandwidth=20.0), GainParameters()])
 def test_poles_are_chosen_for_more_joints_than_outputs(load_scenario, own):
     settings = load_scenario("pfc_elastic_7r")

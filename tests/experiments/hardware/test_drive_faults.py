@@ -10,7 +10,7 @@ from tests.experiments.hardware.test_drive import Loop, changed, elastic, panda
 
 # of a driver that waits no longer than a controller bridges, and damps well: docs/howto/robot.md
 QUICK = {"expiry": 0.02, "damping": 20.0}
-BEGIN, STOPPED = 0.9, 3.0
+BEGIN, STOPPED = 0.6, 3.0
 
 
 def moving(kind):

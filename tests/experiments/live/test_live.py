@@ -279,7 +279,11 @@ def test_strangers_pull_nothing_and_of_two_pages_one_leads(start, tmp_path, fore
         (["vf_soft_circle", "--port", "70000"], ["--port 70000", "allowed: "]),
         (["vf_soft_circle", "--duration", "-1"], ["--duration -1", "positive"]),
         (["vf_soft_circle", "--set", "compliance.tangential=3"], ["compliance.tangential"]),
-        (["vf_soft_circle", "--duration", "1e6"], ["duration = 1e+06 s", "allowed"]),
+        pytest.param(
+            ["vf_soft_circle", "--duration", "1e6"],
+            ["duration = 1e+06 s", "allowed"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_wrong_input_gets_one_line(tmp_path, capfd, arguments, parts):

@@ -66,6 +66,7 @@ def scenario(believed):
 GROUND = half_space((0, 0, -0.03), (0, 0, 1))
 
 
+@pytest.mark.slow(but="0.005")
 @pytest.mark.parametrize("believed", [2e-3, 5e-3, 12e-3])
 def test_the_lag_is_seen_whatever_was_believed(believed):
     """Also with 1 um of noise on the measured place, and where the floor holds the tool."""

@@ -57,6 +57,7 @@ def fault(tmp_path, capfd, mine):
     return check
 
 
+@pytest.mark.slow(but=["0", "11"])
 @pytest.mark.parametrize("component", [0, 5, 6, 11])
 def test_nan_on_the_way(fault, component):
     failure = f"simulation.sensor_failure={{time: 0.0305, component: {component}}}"
@@ -204,6 +205,7 @@ def test_saturation_of_servos(run_scenario, tmp_path, limited):
     assert result.metrics["joint_velocity_share"]["value"] == share.max()
 
 
+@pytest.mark.slow
 def test_a_tool_that_is_turned_away(fault):
     """A torque beyond the drives turns the tool about x, until its angles say little."""
     log, _ = fault(

@@ -21,7 +21,7 @@ def log(request, tmp_path_factory):
         return {name: dataset[:] for name, dataset in file.items()}
 
 
-@pytest.mark.slow(but="rigid")
+@pytest.mark.slow
 def test_the_reference_yields_as_a_spring(log):
     t = log["t"]
     assert log["eta_p"][t > 1.0].min() > log["eta_p"][0] + 0.05  # it moves
@@ -30,11 +30,12 @@ def test_the_reference_yields_as_a_spring(log):
     assert np.abs(log["xi_p"][:, 1]).max() < 1e-4
 
 
-@pytest.mark.slow(but="rigid")
+@pytest.mark.slow
 def test_the_tool_follows_the_yielding_reference(log):
     assert np.abs(log["xi"] - log["xi_p"]).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_nothing_moves_while_taring(log):
     """The scenario's bias of 12 N would deflect by 6 mm."""
     rest = log["t"] < 0.29

@@ -26,7 +26,7 @@ def run(request, tmp_path_factory):
     return request.param, out, log, units
 
 
-@pytest.mark.slow(but="no friction")
+@pytest.mark.slow(but="friction")
 def test_deviation(run):
     friction, out, log, _ = run
     late = log["t"] >= DWELL
@@ -38,7 +38,7 @@ def test_deviation(run):
     assert metrics["saturated_samples"]["value"] == 0
 
 
-@pytest.mark.slow(but="no friction")
+@pytest.mark.slow(but="friction")
 def test_drives_are_slides(run):
     _, out, log, units = run
     assert (units["q_J"], units["v_J"], units["tau_d"]) == ("m", "m/s", "N")
@@ -46,6 +46,7 @@ def test_drives_are_slides(run):
     assert (out / "recording.html").stat().st_size > 100_000
 
 
+@pytest.mark.slow
 def test_deviations_come_from_sticking(run):
     """Sec. 3.8.1: the largest deviations follow drives whose velocity changes its sign."""
     friction, _, log, units = run

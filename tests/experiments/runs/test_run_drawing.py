@@ -54,7 +54,7 @@ def write(folder, looks):
     return scenario
 
 
-@pytest.mark.slow(but="None-None")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("look", "said"),
     [

@@ -172,6 +172,7 @@ def test_a_start_inside_is_moved_out_slowly_where_that_is_chosen(tmp_path):
     assert log["region_distance"][-1, PARABOLOID] > -1e-4
 
 
+@pytest.mark.slow
 def test_a_lost_sensor_stops_the_robot_on_its_fixture(tmp_path):
     """The safe state, and no step of the tool."""
     lost = "simulation.force_sensor_failure={time: 1.9, component: 2}"

@@ -85,6 +85,7 @@ def test_a_surface_has_no_second_coordinate_to_swing(tmp_path, capsys):
     assert "reference.swings[0]: coordinate = 2; there is 1" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_hand_leads_the_tool_along_an_edge(tmp_path):
     """True place of the tool against the equations of paraboloid and cylinder."""
     places = "{time: 0.3, position: [0, 0, 0]}, {time: 1.2, position: [0.15, 0.05, 0]}"

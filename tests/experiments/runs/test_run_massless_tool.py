@@ -1,10 +1,12 @@
 """A force sensor in front of a tool without mass reads the force on the tool, and nothing else."""
 
 import numpy as np
+import pytest
 
 from tests.diagrams.robots.test_massless_tool import fixture_massless  # noqa: F401
 
 
+@pytest.mark.slow
 def test_the_sensor_reads_the_force_on_the_tool(massless, tmp_path, run_scenario):
     changes = [
         f"robot.model={massless}",

@@ -77,7 +77,7 @@ def test_height_and_side_step_are_apart(on_surface):
     np.testing.assert_allclose(height[:50], run["xi"][:50, 0], atol=1e-6)
 
 
-@pytest.mark.slow(but="{kind: given, angles_deg: [180, -60, 0]}-3")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("orientation", "angles"),
     [("{kind: given, angles_deg: [180, -60, 0]}", 3), ("{kind: normal, task: tool_axis, "

@@ -48,6 +48,7 @@ def scenario(tmp_path):
     return file
 
 
+@pytest.mark.slow(but="changes1")
 @pytest.mark.parametrize("changes", [(), ELASTIC])
 def test_run(run_scenario, scenario, tmp_path, capfd, changes):
     overrides = [argument for change in changes for argument in ("--set", change)]

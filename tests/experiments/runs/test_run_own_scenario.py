@@ -59,8 +59,10 @@ def test_own_scenario(run_scenario, own_scenario, tmp_path, monkeypatch):
         np.testing.assert_allclose(result["R_e"][k].reshape(3, 3), expected, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_resolved_scenario_still_finds_its_waypoints(run_scenario, own_scenario, tmp_path):
-    arguments = ["--duration", "0.02"]
+    given = ("simulation.integrator=runge_kutta3", "simulation.max_step=1e-3")
+    arguments = ["--duration", "0.02", *(part for key in given for part in ("--set", key))]
     first = run_scenario(tmp_path / "out", own_scenario, *arguments)
     again = run_scenario(tmp_path / "again", first.folder / "scenario.yaml", *arguments)
     assert again.status == 0

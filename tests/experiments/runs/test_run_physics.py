@@ -133,7 +133,7 @@ def test_signals_of_the_tool(three_axes, arm, law):
     np.testing.assert_allclose(result["eta"][rows, 0], eta, atol=1e-9)
 
 
-@pytest.mark.slow(but="rigid")
+@pytest.mark.slow(but="elastic")
 @pytest.mark.parametrize("law", ["elastic", "rigid"])
 def test_orientation_of_the_tool(six_axes, six_axes_rigid, law):
     """The angles away from the path's orientation, from the logged pose and path parameter."""
@@ -147,7 +147,7 @@ def test_orientation_of_the_tool(six_axes, six_axes_rigid, law):
     assert error < 1e-3 * np.abs(result["phi_dot"]).max()
 
 
-@pytest.mark.slow(but="rigid")
+@pytest.mark.slow(but="elastic")
 @pytest.mark.parametrize("law", LAWS)
 def test_rates_are_derivatives(three_axes, law):
     result = three_axes(f"controller.law={law}")
@@ -159,6 +159,7 @@ def test_rates_are_derivatives(three_axes, law):
         assert error < (2e-3 if position == "q_M" else 2e-4) * scale, position
 
 
+@pytest.mark.slow(but="elastic")
 @pytest.mark.parametrize("law", LAWS)
 def test_torques_move_links_and_motors(three_axes, arm, law):
     """Newton's law on both sides of the springs, (2.65), with Drake's rigid links."""
@@ -252,6 +253,7 @@ def test_a_closed_path_counts_laps(three_axes, points, laps):
     np.testing.assert_allclose(result["y_t"][-1], on_first_lap, atol=1e-5)
 
 
+@pytest.mark.slow(but="elastic")
 @pytest.mark.parametrize("law", LAWS)
 def test_a_start_on_a_later_lap(three_axes, law):
     result = three_axes(f"controller.law={law}", "reference.points=[4.0, 4.1]", duration="0.05")

@@ -90,6 +90,7 @@ def test_position_control_presses_harder_and_takes_no_notice(tmp_path):
         assert abs(file["xi"][-1, 0]) < 1e-4
 
 
+@pytest.mark.slow
 def test_a_sensor_whose_bias_jumps_ends_the_run(tmp_path, capsys):
     """It would be pressed on the workpiece by as much more as the sensor reads less."""
     failure = "simulation.force_sensor_failure={time: 0.3, component: 2, kind: jump, size: -127}"

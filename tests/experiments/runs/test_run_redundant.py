@@ -40,7 +40,7 @@ def run_short(tmp_path, run_scenario, name, *changes, duration=None):
     return run_scenario(tmp_path / "out", name, *arguments)
 
 
-@pytest.mark.slow(but="pfc_elbow_7r")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHORT)
 def test_targets_are_met(tmp_path, run_scenario, name):
     run = run_short(tmp_path, run_scenario, name)

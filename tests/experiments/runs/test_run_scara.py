@@ -55,6 +55,7 @@ def test_two_turns_and_one_angle_everywhere(scara):
     np.testing.assert_allclose(run["R_e"][:, 8], -1.0, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_virtual_input_is_what_the_rates_change_by(scara):
     """While the tool comes to the path, before speed along it bends what a sample holds."""
     run = scara(duration="0.4")

@@ -116,7 +116,7 @@ def test_the_normal_is_kept(surface_run):
     np.testing.assert_allclose(turned, np.broadcast_to(turned[-1], turned.shape), atol=1e-4)
 
 
-@pytest.mark.slow(but="True")
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [True, False])
 def test_the_delta_robot_with_and_without_friction(surface_run, friction):
     run = surface_run("sfc_delta_cylinder", *([] if friction else ["drive_friction=false"]))

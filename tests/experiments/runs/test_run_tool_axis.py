@@ -56,6 +56,7 @@ def test_five_axes_follow_a_path_with_an_axis(five_axes):
     assert "about which it may turn as it likes" in page
 
 
+@pytest.mark.slow
 def test_a_point_that_moves_with_time(five_axes):
     run = five_axes("pfc_comau_6r", "controller.manifold=trajectory")
     late = run.after(CONVERGED)

@@ -28,7 +28,7 @@ def settings():
     return settings
 
 
-@pytest.mark.slow(but="19")
+@pytest.mark.slow
 @pytest.mark.parametrize("component", [0, V_M_2])
 def test_the_arm_comes_to_rest(settings, component):
     """Nobody stops the simulation; the arm was moving with up to 0.2 rad/s."""

@@ -39,6 +39,7 @@ def _path(closed: bool) -> Path:
 OPEN, CLOSED = _path(False), _path(True)
 
 
+@pytest.mark.slow(but=["1-closed", "2-open", "3-closed", "4-open"])
 @pytest.mark.parametrize("path", [OPEN, CLOSED], ids=["open", "closed"])
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_fields(path: Path, order: int) -> None:
@@ -119,6 +120,7 @@ def test_agrees_with_the_projector_wherever_the_guess_is(path: Path) -> None:
         np.testing.assert_array_less(np.abs(difference).max(axis=1) / size, 1e-11)
 
 
+@pytest.mark.slow(but=["0.0-open", "0.1-closed", "1.5-circle", "-1.5-closed"])
 @pytest.mark.parametrize("path", [OPEN, CLOSED, CIRCLE], ids=["open", "closed", "circle"])
 @pytest.mark.parametrize("speed", [0.0, 0.1, 1.5, -1.5])
 def test_ticks_of_a_motion_need_no_long_way(

@@ -42,7 +42,7 @@ def _saddle():
     return surface_through_grid(np.stack([x, y, x * y], axis=-1), smoothness=2)
 
 
-@pytest.mark.slow(but="torus")
+@pytest.mark.slow(but=["torus", "saddle"])
 @pytest.mark.parametrize(
     "surface", [torus(0.3, 0.1), _rough(3, 0.02), _saddle()], ids=["torus", "rough", "saddle"]
 )

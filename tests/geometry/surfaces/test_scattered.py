@@ -119,6 +119,7 @@ def roughness(surface):
     return float(np.mean(surface.partials(theta, 4)[:, 10:] ** 2))
 
 
+@pytest.mark.slow(but=["2.0", "6.283185307179586"])
 @pytest.mark.parametrize("span", [2.0, 4.0, 2.0 * np.pi])
 def test_what_bends_over_is_seen_from_its_axis(span):
     fit = fit_scattered(tube(span))

@@ -296,6 +296,7 @@ def test_eta_over_a_far_jump():
     np.testing.assert_allclose(row[2:4], expected, atol=1e-6)
 
 
+@pytest.mark.slow(but=["splines", "cylinder", "sphere"])
 @pytest.mark.parametrize("name", CASES)
 def test_the_nearest_place_of_all_is_found(name):
     surface = CASES[name][0]

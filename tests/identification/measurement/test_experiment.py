@@ -63,7 +63,7 @@ def test_torques_are_those_of_the_parameters(clean):
     np.testing.assert_allclose(motion.v, run.v[-2000:], atol=1e-4)
 
 
-@pytest.mark.slow(but="festo_expt_45")
+@pytest.mark.slow
 def test_the_excitation_is_followed(clean):
     subject, run = clean
     lower, upper = subject.position_limits.T

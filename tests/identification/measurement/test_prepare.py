@@ -15,7 +15,7 @@ from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError
 
-PERIOD = 2.5
+PERIOD = 1.25
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def regressor(comau):
 def lines(comau, tmp_path_factory):
     """The file's lines: period, names, samples."""
     rng = np.random.default_rng(0)
-    a, b = rng.uniform(0.2, 0.5, (2, 6, 2))
+    a, b = rng.uniform(0.1, 0.25, (2, 6, 2))
     trajectory = FourierTrajectory([0.0, 1.0, 0.1, 0.0, 0.0, 0.0], a, b, PERIOD, (1, 3))
     noise = shipped_imperfections("comau_racer_1_4")
     record = run_experiment(comau, trajectory, noise, periods=3).record
@@ -115,17 +115,17 @@ FAULTS = {
     "no time": (lambda f: f.drop("t ["), r"no time; 't \[s\]' is required"),
     "clipped": (clip, "tau of joint_2 is clipped at"),
     "dead channel": (lambda f: f.scale("tau_6", 0.0), "tau of joint_6 is 0 Nm throughout"),
-    "late torques": (lambda f: f.shift("tau_", 8), r"tau lags the motion by [78]\.?\d* ms"),
-    "early torques": (lambda f: f.shift("tau_", -8), r"tau leads the motion by [78]\.?\d* ms"),
+    "late torques": (lambda f: f.shift("tau_", 4), r"tau lags the motion by [34]\.?\d* ms"),
+    "early torques": (lambda f: f.shift("tau_", -4), r"tau leads the motion by [34]\.?\d* ms"),
     "late velocities": (lambda f: f.shift("v_", 6), r"v of joint_1 lags .* by [56]\.?\d* ms"),
     "turned velocity": (lambda f: f.scale("v_3", -1.0), "v of joint_3 is -.* times the derivative"),
     "velocity in deg/s": (lambda f: f.scale("v_", 180.0 / np.pi), "v is .* rad/s in joint"),
     "no period": (lambda f: setattr(f, "period", ""), "period of the motion is not known"),
     "another period": (
-        lambda f: setattr(f, "period", "# period [s] = 2"),
+        lambda f: setattr(f, "period", "# period [s] = 1.2"),
         "differs from period to period",
     ),
-    "cut short": (lambda f: cut(f, slice(4000, None)), "are 1 whole periods of 2.5 s"),
+    "cut short": (lambda f: cut(f, slice(2000, None)), "are 1 whole periods of 1.25 s"),
     "another zero": (
         lambda f: put(f, "q_2", slice(None), f.rows[:, f.column("q_2")] + 2.5),
         "sign, zero, unit or order of the joints",

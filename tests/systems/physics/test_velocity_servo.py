@@ -78,6 +78,7 @@ class Station:
         return v.sample_times(), v.data().T, u.data().T
 
 
+@pytest.mark.slow(but=["0", "4"])
 @pytest.mark.parametrize("axis", range(6))
 def test_step_within_the_bandwidth(axis):
     """63 % after one time constant, no overshoot; the other axes come back to rest."""
@@ -109,6 +110,7 @@ def test_rests_at_the_start():
     assert np.max(np.abs(u[1])) > 50.0
 
 
+@pytest.mark.slow
 def test_saturates_without_windup():
     """Little torque beyond gravity: slow, but no overshoot when it arrives."""
     weight = Station(np.zeros(6)).run(0.01)[2][-1]

@@ -67,7 +67,7 @@ def test_a_fast_joint_is_no_fault():
     assert linearize(loop, root, loop.variables_in_loop([root])) is not None
 
 
-@pytest.mark.slow(but="limits")
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["reference", "limits", "conditioning"])
 def test_a_posture_that_is_pulled_is_in_the_loop(task):
     """What pulls it depends on the joints, and they follow it; a spring to a goal knows neither."""

@@ -73,7 +73,7 @@ def test_the_fast_pair_bears_the_box_and_has_margins():
     assert equal.tightest.smallest < 0.05 < 0.2 < fast.tightest.smallest
 
 
-@pytest.mark.slow(but="pfc_delta-overrides3")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
@@ -201,6 +201,11 @@ def test_margins_along_a_surface():
     assert all(place.modes is not None for place in analysis.nominal.places)
 
 
+@pytest.fixture(scope="module")
+def three():
+    return analysis_of("pfc_elastic_3r")
+
+
 @pytest.mark.parametrize(
     ("delay", "words"),
     [
@@ -209,9 +214,8 @@ def test_margins_along_a_surface():
         (3, "all drives tolerate an extra delay of 3 sampling intervals"),
     ],
 )
-def test_delays_in_words(delay, words, monkeypatch):
-    analysis = analysis_of("pfc_elastic_3r")
+def test_delays_in_words(delay, words, three, monkeypatch):
     monkeypatch.setattr(MarginAnalysis, "delay", delay)
-    assert one_line(analysis).endswith(words)
-    said = next(sentence for sentence in sentences(analysis) if words in sentence)
+    assert one_line(three).endswith(words)
+    said = next(sentence for sentence in sentences(three) if words in sentence)
     assert ("a shorter controller.sampling_time" in said) == (delay == 0)

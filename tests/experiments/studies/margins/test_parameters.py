@@ -54,6 +54,7 @@ def test_a_parametric_loop_is_the_one_built_for_a_belief(name):
     assert np.abs(found - before).max() > 1e-3 * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [

@@ -97,6 +97,7 @@ def test_a_heavy_payload_below_the_sensor_makes_a_light_admittance_chatter(light
     assert found.slowest > 0.0
 
 
+@pytest.mark.slow
 def test_the_shipped_one_bears_three_kilograms_more(shipped):
     loop, section = shipped
     heavy = with_payload(loop, section, 3.0)
