@@ -175,13 +175,8 @@ def test_actuators_of_a_plant_of_ones_own(desk: Path, monkeypatch: pytest.Monkey
     assert limits["pan"] == 330.0 and limits["wrist_3"] == 56.0 and len(limits) == 7
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("number", "port"), [(1, "manifold_force"), (2, "mode")], ids=["compliance", "guidance"]
-)
-def test_doors_of_the_library(
-    number: int, port: str, desk: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def _follower(number: int, desk: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return the controller that a script of docs/howto/own_diagram.md adds."""
     monkeypatch.chdir(desk)
     block = [block for block in blocks("python") if block.place.startswith("own_diagram")][number]
     builder = DiagramBuilder()
@@ -189,10 +184,33 @@ def test_doors_of_the_library(
     read_model(plant, Path("my_arm.urdf"), ModelOptions(fixed_joints={"finger": 0.02}))
     names: dict[str, Any] = {"builder": builder, "plant": plant}
     exec(compile(block.text, block.place, "exec"), names)
-    follower = names["follower"]
+    return names["follower"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "port"), [(1, "manifold_force"), (2, "mode")], ids=["compliance", "guidance"]
+)
+def test_controllers_in_diagrams(
+    number: int, port: str, desk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    follower = _follower(number, desk, monkeypatch)
     assert follower.HasInputPort("wrench") and follower.HasOutputPort(port)
-    told = follower.stepper().step(plant_state=follower.start_state, wrench=np.zeros(6))
-    assert told["fault"][0] == 0.0
+    result = follower.stepper().step(plant_state=follower.start_state, wrench=np.zeros(6))
+    assert result["fault"][0] == 0.0
+
+
+@pytest.mark.slow
+def test_a_block_of_ones_own(desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces across the path count without their first 2 N along each world axis."""
+    follower = _follower(3, desk, monkeypatch)
+    stepper, state = follower.stepper(), follower.start_state
+    for force in (np.array([1.9, -1.9, 1.5]), np.array([7.0, -5.0, 1.0])):
+        wrench = np.concatenate([force, np.zeros(3)])
+        result = stepper.step(plant_state=state, wrench=wrench)
+        axes = follower.task.manifold.axes(result["manifold_point"]).full()[:, 1:3]
+        counted = np.sign(force) * np.maximum(np.abs(force) - 2.0, 0.0)
+        np.testing.assert_allclose(result["manifold_force"][1:3], axes.T @ counted, atol=1e-9)
 
 
 def test_edges_and_corners() -> None:
