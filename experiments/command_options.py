@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from experiments.scenario_file import scenario_names
+from pfsc_drake.checks import is_number
 from pfsc_drake.errors import InputError, shortened, suggestion
-from pfsc_drake.yaml.schema_check import is_number
 
 if TYPE_CHECKING:
     from pydrake.lcm import DrakeLcm

@@ -37,8 +37,8 @@ from experiments.outcomes import (
 )
 from experiments.scenario_file import expand_home, list_scenarios
 from experiments.study_commands import study_command
+from pfsc_drake.checks import is_number
 from pfsc_drake.errors import InputError, shortened
-from pfsc_drake.yaml.schema_check import is_number
 from reporting.progress import ProgressDisplay
 from reporting.registry import as_data, as_text
 from reporting.terminal import interruptible, show_page

@@ -1,5 +1,6 @@
 """Checks of values that people write."""
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -13,7 +14,23 @@ from pfsc_drake.errors import require_positive as require_positive
 LARGEST_ANGLE = 3600.0  # deg; ten turns
 # Text that is a number. Python's float() would take more: underscores, the digits of all scripts.
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+_INFINITY = re.compile(r"[-+]?inf(inity)?", re.IGNORECASE)
 _ROUNDING = 1e-6
+
+
+def is_number(value: float | str) -> bool:
+    """Whether a number, or text that is one, fits a float; infinity does, NaN does not.
+
+    YAML 1.1 reads 1e-3 as text.
+    """
+    if isinstance(value, str) and not NUMBER.fullmatch(value):
+        return bool(_INFINITY.fullmatch(value))
+    try:
+        number = float(value)
+    except OverflowError:
+        return False
+    # text beyond the largest float is read as infinite, which is not what it says
+    return not math.isnan(number) and not (isinstance(value, str) and math.isinf(number))
 
 
 def require_not_negative(key: str, value: float) -> None:

@@ -21,7 +21,7 @@ from pfsc_drake.robot.robot_model import RobotModel, mass_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.brake_torque import BrakeTorque
 from pfsc_drake.systems.physics.joint_friction import JointFriction
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 # integration schemes of fixed step that the bristles of friction are made for
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")

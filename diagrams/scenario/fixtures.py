@@ -30,7 +30,7 @@ from diagrams.scenario.surface_shapes import (
 )
 from pfsc_drake.control.fixtures.guides import MOST_GUIDES, REACH, STIFFNESS
 from pfsc_drake.following.options.follower import FixtureOptions
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
 
 _SIDES, _FACES = ("inside", "outside"), ("above", "below")
 _STIFFNESS = (1.0, 1e6)  # N/m

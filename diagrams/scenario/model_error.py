@@ -8,7 +8,7 @@ import numpy as np
 from diagrams.scenario.checks import require, require_between, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.model_error import ModelError
-from pfsc_drake.yaml.typed import ONE_OR_MANY, equal
+from pfsc_drake.yaml.fields import ONE_OR_MANY, equal
 
 _FACTORS = ("mass", "inertia", "rotor_inertia", "stiffness", "friction", "link_length")
 _LEAST, _MOST = 1e-3, 1e3

@@ -12,7 +12,7 @@ from diagrams.scenario.checks import (
 )
 from pfsc_drake.control.law.swing import Swing
 from pfsc_drake.following.options.motion import MotionLimits
-from pfsc_drake.yaml.typed import NUMBERS_OR_END, ONE_FOR_ALL, equal
+from pfsc_drake.yaml.fields import NUMBERS_OR_END, ONE_FOR_ALL, equal
 
 # beyond, durations have no digits left, or none at all
 _VELOCITIES = (1e-6, 1e3)  # m/s

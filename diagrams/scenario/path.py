@@ -17,8 +17,8 @@ from diagrams.scenario.streamed import Streamed
 from diagrams.scenario.surface import SurfaceShape, require_jacobian
 from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.geometry.files.unit import UNITS
+from pfsc_drake.yaml.fields import equal
 from pfsc_drake.yaml.reading import FILE
-from pfsc_drake.yaml.typed import equal
 
 _SHORTEST_TOLERANCE = 1e-7  # m
 TASKS = ("full", "tool_axis", "yaw", "none")

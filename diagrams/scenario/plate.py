@@ -16,7 +16,7 @@ from diagrams.scenario.workpiece import require_contact_step, require_up_to
 from pfsc_drake.geometry.workpieces import FEWEST_WEDGES
 from pfsc_drake.physics.mounting_hand import MountingHandParameters
 from pfsc_drake.physics.suction import SuctionParameters
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
 
 STARTS = ("magazine", "held", "frame")
 _SMALLEST, _LARGEST = 1e-4, 2.0  # m

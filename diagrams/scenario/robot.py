@@ -21,8 +21,8 @@ from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters
 from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.reading import ModelOptions
+from pfsc_drake.yaml.fields import ONE_FOR_ALL, ONE_OR_MANY, equal
 from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE
-from pfsc_drake.yaml.typed import ONE_FOR_ALL, ONE_OR_MANY, equal
 
 # what moves a DELTA robot
 MULTIBODY, ANALYTIC = "multibody", "analytic"

@@ -24,8 +24,8 @@ from diagrams.scenario.surface_shapes import (
 )
 from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.geometry.files.unit import UNITS
+from pfsc_drake.yaml.fields import equal
 from pfsc_drake.yaml.reading import FILE
-from pfsc_drake.yaml.typed import equal
 
 _BASES = ("auto", "plane", "cylinder")
 _SHORTEST_TOLERANCE = 1e-7  # m

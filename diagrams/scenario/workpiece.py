@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from diagrams.scenario.checks import require, require_between, require_numbers
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
 
 SMALLEST, LARGEST = 1e-4, 10.0  # m, of workpiece and ball
 _MODULUS = 1e3, 1e12  # Pa: softer than any foam, harder than any stone

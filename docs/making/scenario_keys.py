@@ -12,8 +12,9 @@ import numpy as np
 
 from diagrams.scenario import Scenario
 from docs.making.text import attribute, cell, description, table
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED
 from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE
-from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED, typed_data
+from pfsc_drake.yaml.typed import typed_data
 
 _PLAIN = {bool: "true or false", int: "whole number", float: "number", str: "text"}
 _SEVERAL = {

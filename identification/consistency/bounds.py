@@ -11,7 +11,8 @@ from identification.model.parameters import LINK_PARAMETERS, PER_LINK
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.parameter_checks import check_vector, require
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.typed import load_file
 
 FILE_NAME = "physical_bounds.yaml"
 _INTERVAL = 2

@@ -32,7 +32,8 @@ from pfsc_drake.robot.models.reading import read_model
 from pfsc_drake.robot.models.visuals import Shape, check_shape
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.typed import load_file
 
 
 @dataclass

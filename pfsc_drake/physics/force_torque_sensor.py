@@ -13,7 +13,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad, predicted_load
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
 
 # ticks whose noise is known at once
 NOISE_TICKS = 128

@@ -11,7 +11,7 @@ from pfsc_drake.blocks.rotations import rotation_vector
 from pfsc_drake.errors import InputError, require, suggestion
 from pfsc_drake.physics.hand_way import HandWay, OrientationTarget, Place
 from pfsc_drake.physics.scripted_force import FRAMES, smooth_step
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
 
 
 @dataclass

@@ -12,7 +12,7 @@ from pfsc_drake.checks import require_between, require_not_negative
 from pfsc_drake.errors import InputError, require_one_of
 from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS, noise_at
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.yaml.typed import ONE_OR_MANY
+from pfsc_drake.yaml.fields import ONE_OR_MANY
 
 
 @dataclass

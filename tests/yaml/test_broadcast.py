@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.broadcast import (
+from pfsc_drake.yaml.fields import (
     AUTO_OR_MANY,
     NUMBERS_OR_END,
     ONE_FOR_ALL,

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pfsc_drake import InputError
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED, load_file, load_typed
+from pfsc_drake.yaml.typed import load_file, load_typed
 
 
 @dataclass

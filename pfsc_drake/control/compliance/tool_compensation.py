@@ -24,7 +24,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad, dead_band, predicted_load
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
 
 _INERTIA = ("none", "differentiated", "given")
 # rad/s or m/s, of a joint, with which no load on a sensor stays the same

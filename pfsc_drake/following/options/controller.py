@@ -16,8 +16,8 @@ from pfsc_drake.control.estimation.link_deviation import StateUncertainty
 from pfsc_drake.control.law.following_law import BEYOND_END_RANGE, MAX_BEYOND_END
 from pfsc_drake.control.law.laws import LAWS, Law
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, ONE_FOR_ALL
 from pfsc_drake.yaml.reading import NAME_OR_FILE
-from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_FOR_ALL
 
 POSTURE_TASKS = ("reference", "limits", "conditioning", "elbow")
 _WEIGHTS = ("identity", "inertia", "range")

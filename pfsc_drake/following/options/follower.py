@@ -14,7 +14,7 @@ from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.motion import MotionLimits
-from pfsc_drake.yaml.typed import ONE_OR_MANY
+from pfsc_drake.yaml.fields import ONE_OR_MANY
 
 
 @dc.dataclass

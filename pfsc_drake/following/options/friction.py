@@ -6,8 +6,8 @@ import numpy as np
 
 from pfsc_drake.checks import require, require_not_negative, require_one_of, require_positive
 from pfsc_drake.physics.friction import FrictionDrift
+from pfsc_drake.yaml.fields import ONE_FOR_ALL, ONE_OR_MANY
 from pfsc_drake.yaml.reading import NAME_OR_FILE
-from pfsc_drake.yaml.typed import ONE_FOR_ALL, ONE_OR_MANY
 
 _SOURCES = ("none", "model", "observer")
 _OBSERVERS = ("disturbance", "kalman")

@@ -14,7 +14,8 @@ from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.parameters import FrictionParameters
 from pfsc_drake.robot.parameter_checks import check_vector, require
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.typed import load_file
 
 NUM_ARMS = 3
 SHIPPED_ROBOTS = ("festo_expt_45",)

@@ -16,8 +16,9 @@ from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.serial.denavit_hartenberg import DenavitHartenberg
+from pfsc_drake.yaml.fields import REQUIRED
 from pfsc_drake.yaml.reading import read_text
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.typed import load_file
 
 # Placeholders of required keys make a robot with one joint: a schema's defaults must be valid.
 _PLACEHOLDER_NAME = "unnamed"

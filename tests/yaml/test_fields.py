@@ -1,17 +1,19 @@
-"""Bounds of numbers by units, and by what fields say."""
+"""Bounds of numbers by units, and by what fields say; single numbers and words for lists."""
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import pytest
 
 from pfsc_drake.errors import InputError, require
-from pfsc_drake.yaml.bounds import Bounds, bounded, bounds_of
+from pfsc_drake.yaml.fields import fields_of
+from pfsc_drake.yaml.rules import Parameters, Range
 from pfsc_drake.yaml.typed import load_typed
 
 
 @dataclass
-class Parent:
+class Parent(Parameters):
     """A parent.
 
     Attributes:
@@ -40,7 +42,7 @@ class Block(Parent):
     lengths: list[float] = field(default_factory=lambda: [1.0, 2.0])
     stiffness: float = 0.0
     turn_deg: float = 0.0
-    own: float = field(default=0.1, metadata=bounded(0.0, 5.0, "m"))
+    own: Annotated[float, Range(0.0, 5.0, "m")] = 0.1
     checked: float = 1.0
     share: float = 0.0
     never: float = math.inf
@@ -48,6 +50,7 @@ class Block(Parent):
     untold: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         require(0.0 < self.checked <= 2.0, "checked", self.checked, "above 0, at most 2 s")
         require(round(self.share) < 10, "share", self.share, "below 10")
 
@@ -66,19 +69,19 @@ class Whole:
 @pytest.mark.parametrize(
     ("name", "bounds"),
     [
-        ("inherited", Bounds(-1e3, 1e3, "m/s")),
-        ("lengths", Bounds(-1e4, 1e4, "m")),
-        ("stiffness", Bounds(-1e10, 1e10, "Nm/rad or N/m", True)),
-        ("turn_deg", Bounds(-1e5, 1e5, "deg")),
-        ("own", Bounds(0.0, 5.0, "m")),
-        ("share", Bounds(-1e9, 1e9)),
-        ("never", Bounds(-1e6, 1e6, "s", True)),
-        ("lowest", Bounds(-math.inf, 1e4, "m")),
-        ("untold", Bounds(-math.inf, math.inf)),
+        ("inherited", Range(-1e3, 1e3, "m/s")),
+        ("lengths", Range(-1e4, 1e4, "m")),
+        ("stiffness", Range(-1e10, 1e10, "Nm/rad or N/m", infinite=True)),
+        ("turn_deg", Range(-1e5, 1e5, "deg")),
+        ("own", None),
+        ("share", Range(-1e9, 1e9)),
+        ("never", Range(-1e6, 1e6, "s", infinite=True)),
+        ("lowest", Range(-math.inf, 1e4, "m")),
+        ("untold", None),
     ],
 )
 def test_bounds(name, bounds):
-    assert bounds_of(Block, name) == bounds
+    assert fields_of(Block)[name].bounds == bounds
 
 
 def said_of(**data):
@@ -90,8 +93,8 @@ def said_of(**data):
 def test_what_is_beyond_is_refused_by_its_key():
     key = "a.yaml: key 'block.lengths[1]' is -20000: expected a number from -10000 to 10000 m"
     assert said_of(lengths=[1.0, -2e4]) == key
-    assert said_of(own=5.1).endswith("'block.own' is 5.1: expected a number from 0 to 5 m")
-    assert said_of(own=-1e-3).endswith("expected a number from 0 to 5 m")
+    assert said_of(own=5.1).endswith("key 'block': own = 5.1; allowed: 0 to 5 m")
+    assert said_of(own=-1e-3).endswith("own = -0.001; allowed: 0 to 5 m")
     assert said_of(never=-math.inf).endswith("expected a number from -1e+06 to 1e+06 s, or .inf")
 
 
