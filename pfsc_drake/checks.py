@@ -43,10 +43,10 @@ def require_between(key: str, value: float, least: float, most: float, unit: str
     require(least <= value <= most, key, value, f"{least:g} to {most:g} {unit}")
 
 
-def require_numbers(key: str, values: Sequence[float], count: int) -> None:
-    """Refuse a list of another length, or with values that are not finite."""
-    valid = len(values) == count and bool(np.isfinite(values).all())
-    require(valid, key, list(values), f"{count} finite numbers")
+def require_numbers(key: str, values: Sequence[float] | np.ndarray, count: int) -> None:
+    """Refuse a list or an array of another length, or with values that are not finite."""
+    valid = np.shape(values) == (count,) and bool(np.isfinite(values).all())
+    require(valid, key, values, f"{count} finite numbers")
 
 
 def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:

@@ -1,6 +1,7 @@
-"""Checks of scenario values."""
+"""Checks of scenario values, and types with rules that several blocks have."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 from pfsc_drake.checks import LARGEST_ANGLE as LARGEST_ANGLE
 from pfsc_drake.checks import require as require
@@ -12,6 +13,12 @@ from pfsc_drake.checks import require_positive as require_positive
 from pfsc_drake.checks import require_whole_fraction as require_whole_fraction
 from pfsc_drake.checks import require_whole_ticks as require_whole_ticks
 from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
+from pfsc_drake.yaml.rules import Numbers, Range
+
+Length = Annotated[float, Range(SHORTEST, FARTHEST, "m")]
+Point = Annotated[list[float], Numbers(3, Range(-FARTHEST, FARTHEST, "m"))]
+Direction = Annotated[list[float], Numbers(3, some=True)]
+Pair = Annotated[list[float], Numbers(2)]
 
 
 def require_length(key: str, value: float) -> None:

@@ -1,20 +1,14 @@
 """Virtual fixtures of a scenario: regions that a tool led by hand may not enter."""
 
 import dataclasses as dc
-from typing import Union
-
-import numpy as np
+from typing import Annotated, Union
 
 from diagrams.scenario.checks import (
+    Direction,
+    Point,
     require,
-    require_between,
-    require_direction,
     require_length,
-    require_not_negative,
     require_numbers,
-    require_one_of,
-    require_place,
-    require_positive,
 )
 from diagrams.scenario.path import BentLemniscate, Circle, Intersection, Line, Waypoints
 from diagrams.scenario.surface import Extruded, Fitted, Revolved, SurfaceOrientationParameters
@@ -31,6 +25,7 @@ from diagrams.scenario.surface_shapes import (
 from pfsc_drake.control.fixtures.guides import MOST_GUIDES, REACH, STIFFNESS
 from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import Count, NotNegative, Numbers, OneOf, Parameters, Positive, Range
 
 _SIDES, _FACES = ("inside", "outside"), ("above", "below")
 _STIFFNESS = (1.0, 1e6)  # N/m
@@ -56,7 +51,7 @@ class Box(Placed):
 
 
 @dc.dataclass
-class Visiting:
+class Visiting(Parameters):
     """A way that comes to rest at every one of several points.
 
     Attributes:
@@ -67,18 +62,16 @@ class Visiting:
         repeat: Whether it begins again at the end; the last point is then the first.
     """
 
-    points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1, 0.0])
-    velocity: float = 0.05
-    acceleration: float = 0.5
-    dwell: float = 0.5
+    points: Annotated[list[float], Numbers(fewest=2, words="two or more finite numbers")] = (
+        dc.field(default_factory=lambda: [0.0, 0.1, 0.0])
+    )
+    velocity: Positive = 0.05
+    acceleration: Positive = 0.5
+    dwell: NotNegative = 0.5
     repeat: bool = True
 
     def __post_init__(self) -> None:
-        enough = len(self.points) >= 2 and bool(np.isfinite(self.points).all())
-        require(enough, "points", self.points, "two or more finite numbers")
-        for key in ("velocity", "acceleration"):
-            require_positive(key, getattr(self, key))
-        require_not_negative("dwell", self.dwell)
+        super().__post_init__()
         back = not self.repeat or self.points[-1] == self.points[0]
         require(back, "points", self.points, "the last as the first, with repeat: true")
 
@@ -89,7 +82,7 @@ class Visiting:
 
 
 @dc.dataclass
-class Swinging:
+class Swinging(Parameters):
     """A way ``amplitude sin(2 pi frequency (t - begin))`` that begins smoothly.
 
     Attributes:
@@ -99,16 +92,10 @@ class Swinging:
         ramp: Time in which it comes to its full amplitude [s].
     """
 
-    amplitude: float = 0.02
-    frequency: float = 0.2
-    begin: float = 0.5
-    ramp: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_positive("amplitude", self.amplitude)
-        require_between("frequency", self.frequency, 1e-4, 100.0, "Hz")
-        require_not_negative("begin", self.begin)
-        require_between("ramp", self.ramp, 1e-3, 1e3, "s")
+    amplitude: Positive = 0.02
+    frequency: Annotated[float, Range(1e-4, 100.0, "Hz")] = 0.2
+    begin: NotNegative = 0.5
+    ramp: Annotated[float, Range(1e-3, 1e3, "s")] = 1.0
 
     @property
     def extent(self) -> float:
@@ -117,7 +104,7 @@ class Swinging:
 
 
 @dc.dataclass
-class Shift:
+class Shift(Parameters):
     """A region that moves along a direction.
 
     Attributes:
@@ -125,17 +112,17 @@ class Shift:
         way: ``!Visiting`` or ``!Swinging`` [m].
     """
 
-    direction: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    direction: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
     way: Visiting | Swinging = dc.field(default_factory=Visiting)
 
     def __post_init__(self) -> None:
-        require_direction("direction", self.direction)
+        super().__post_init__()
         far = self.way.extent <= _LARGEST
         require(far, "way", self.way.extent, f"no further than {_LARGEST:g} m")
 
 
 @dc.dataclass
-class Turn:
+class Turn(Parameters):
     """A region that turns about an axis.
 
     Attributes:
@@ -144,13 +131,12 @@ class Turn:
         way: ``!Visiting`` or ``!Swinging`` [deg].
     """
 
-    axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    point: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    point: Point = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     way: Visiting | Swinging = dc.field(default_factory=Visiting)
 
     def __post_init__(self) -> None:
-        require_direction("axis", self.axis)
-        require_place("point", self.point)
+        super().__post_init__()
         far = self.way.extent <= _LARGEST_DEG
         require(far, "way", self.way.extent, f"no further than {_LARGEST_DEG:g} deg")
 
@@ -162,7 +148,7 @@ RegionShape = Union[  # noqa: UP007
 
 
 @dc.dataclass
-class RegionParameters:
+class RegionParameters(Parameters):
     """A surface that the tool must not cross, and the side on which it may be.
 
     Planes, cylinders, cones and paraboloids have no ends, whatever part of them the shape tells;
@@ -184,9 +170,10 @@ class RegionParameters:
     shape: RegionShape = dc.field(default_factory=Plane)
     admissible: str = ""
     motion: Shift | Turn | None = None
-    stiffness: float | None = None
+    stiffness: Annotated[float, Range(*_STIFFNESS, "N/m, or null")] | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         kind = type(self.shape).__name__
         sides = _SIDES if encloses(self.shape) else _FACES
         if isinstance(self.shape, Box):
@@ -198,8 +185,6 @@ class RegionParameters:
             whole = not self.shape.angles_deg
             allowed = "empty: a region goes all the way round"
             require(whole, "shape.angles_deg", self.shape.angles_deg, allowed)
-        if self.stiffness is not None:
-            require_between("stiffness", self.stiffness, *_STIFFNESS, "N/m, or null")
 
     @property
     def inside(self) -> bool:
@@ -221,7 +206,7 @@ GuideShape = Union[Waypoints, BentLemniscate, Circle, Line, Intersection]  # noq
 
 
 @dc.dataclass
-class GuideParameters:
+class GuideParameters(Parameters):
     """A path that attracts the tool, next to it like a spring and from its reach on not at all.
 
     See :class:`~pfsc_drake.control.fixtures.guides.Guide`.
@@ -233,12 +218,8 @@ class GuideParameters:
     """
 
     shape: GuideShape = dc.field(default_factory=Line)
-    stiffness: float = 2000.0
-    reach: float = 0.06
-
-    def __post_init__(self) -> None:
-        require_between("stiffness", self.stiffness, *STIFFNESS, "N/m")
-        require_between("reach", self.reach, *REACH, "m")
+    stiffness: Annotated[float, Range(*STIFFNESS, "N/m")] = 2000.0
+    reach: Annotated[float, Range(*REACH, "m")] = 0.06
 
 
 _START = ("refuse", "move_out")
@@ -264,13 +245,15 @@ class FixtureParameters(FixtureOptions):
     """
 
     regions: list[RegionParameters] = dc.field(default_factory=list)
-    guides: list[GuideParameters] = dc.field(default_factory=list)
+    guides: Annotated[
+        list[GuideParameters], Count(0, MOST_GUIDES, words=f"{MOST_GUIDES} or fewer")
+    ] = dc.field(default_factory=list)
     orientation: SurfaceOrientationParameters = dc.field(
         default_factory=SurfaceOrientationParameters
     )
-    start_inside: str = "refuse"
-    servo_lag: float = -1.0
-    bound: float = 0.5e-3
+    start_inside: Annotated[str, OneOf(_START)] = "refuse"
+    servo_lag: Annotated[float, Range(most=0.1, unit="s", below=True)] = -1.0
+    bound: Annotated[float, Range(1e-6, 0.1, "m")] = 0.5e-3
 
     @property
     def names(self) -> list[str]:
@@ -294,10 +277,5 @@ class FixtureParameters(FixtureOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        most = f"{MOST_GUIDES} or fewer"
-        require(len(self.guides) <= MOST_GUIDES, "guides", f"{len(self.guides)} given", most)
-        require_one_of("start_inside", self.start_inside, _START)
         kind = self.orientation.kind
         require(kind != "normal", "orientation.kind", kind, "none, given")
-        require(self.servo_lag < 0.1, "servo_lag", self.servo_lag, "below 0.1 s")
-        require_between("bound", self.bound, 1e-6, 0.1, "m")

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from diagrams.station import Station
-from pfsc_drake.checks import require_positive
 from pfsc_drake.drivers.messages import ControlMode
+from pfsc_drake.yaml.rules import Parameters, Positive
 
 # after which a robot that is to stop is left alone, and how long it rests before [s]
 LONGEST_STOP, RESTED = 2.0, 0.2
@@ -19,7 +19,7 @@ PACE = "reference_generator.pace"
 
 
 @dataclass(frozen=True)
-class DriveOptions:
+class DriveOptions(Parameters):
     """What a controller allows itself on a robot.
 
     Attributes:
@@ -29,15 +29,10 @@ class DriveOptions:
         effort_share: Largest share of a joint's effort limit.
     """
 
-    silence: float = 0.1
+    silence: Positive = 0.1
     bridged: int = 10
-    torque_rate: float = 1000.0
-    effort_share: float = 0.95
-
-    def __post_init__(self) -> None:
-        require_positive("silence", self.silence)
-        require_positive("torque_rate", self.torque_rate)
-        require_positive("effort_share", self.effort_share)
+    torque_rate: Positive = 1000.0
+    effort_share: Positive = 0.95
 
 
 def command_mode(station: Station) -> ControlMode:

@@ -33,9 +33,9 @@ from identification.model.parameters import (
     parameter_units,
 )
 from identification.model.subject import Subject
+from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount
 from pfsc_drake.yaml.fields import REQUIRED
@@ -220,9 +220,9 @@ class PrintedBase:
     source: str = ""
 
     def __post_init__(self) -> None:
-        check_vector("mean", self.mean, SIZE)
+        require_numbers("mean", self.mean, SIZE)
         key, deviation = "relative_deviation_percent", self.relative_deviation_percent
-        check_vector(key, deviation, SIZE)
+        require_numbers(key, deviation, SIZE)
         require(bool(np.all(deviation > 0.0)), key, deviation, "positive")
 
     @property
@@ -254,7 +254,7 @@ class PrintedTorque:
     def __post_init__(self) -> None:
         for key in ("error_rms", "noise_level", "variance"):
             value = getattr(self, key)
-            check_vector(key, value, AXES)
+            require_numbers(key, value, AXES)
             require(bool(np.all(value > 0.0)), key, value, "positive")
 
 

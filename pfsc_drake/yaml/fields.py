@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pfsc_drake.yaml.rules import Numbers, Range, Rule, field_rules
+from pfsc_drake.yaml.rules import Numbers, Range, rules_of
 
 # a key that may not be left out
 REQUIRED = {"required": True}
@@ -77,16 +77,16 @@ class Field(NamedTuple):
     Attributes:
         name: Its key.
         kind: Its type, without rules.
-        rules: What its value must be.
+        hint: Its type with its rules.
         form: How a file may write it, metadata as above.
         default: What makes its default; None of one that has none.
-        bounds: What its numbers may be in a file, by their unit; None of a field that no docstring
-            describes, or whose rules say it.
+        bounds: What its numbers may be in a file beside its rules, by their unit; None of a field
+            that no docstring describes.
     """
 
     name: str
     kind: Any
-    rules: tuple[Rule, ...]
+    hint: Any
     form: typing.Mapping[str, Any]
     default: typing.Callable[[], Any] | None
     bounds: Range | None
@@ -114,15 +114,16 @@ class Field(NamedTuple):
 @cache
 def fields_of(owner: type) -> dict[str, Field]:
     """Return the fields of a dataclass by name."""
-    hints, rules = typing.get_type_hints(owner), field_rules(owner)
+    kinds = typing.get_type_hints(owner)
+    hints = typing.get_type_hints(owner, include_extras=True)
     return {
         field.name: Field(
             field.name,
+            kinds[field.name],
             hints[field.name],
-            rules.get(field.name, ()),
             field.metadata,
             _maker(field),
-            _bounds(owner, field, rules.get(field.name, ())),
+            _bounds(owner, field, hints[field.name]),
         )
         for field in dataclasses.fields(owner)
     }
@@ -145,21 +146,29 @@ def _maker(field: "dataclasses.Field[Any]") -> typing.Callable[[], Any] | None:
     return None if value is dataclasses.MISSING else lambda: value
 
 
-def _bounds(owner: type, field: "dataclasses.Field[Any]", rules: tuple[Rule, ...]) -> Range | None:
-    """Return the bounds of a field by its unit, unless its rules bound it on both sides."""
-    ranges = [rule.each if isinstance(rule, Numbers) else rule for rule in rules]
-    text = attribute_text(owner, field.name)
-    closed = any(isinstance(r, Range) and r.least > -math.inf and r.most < math.inf for r in ranges)
-    if text is None or closed:
+def _bounds(owner: type, field: "dataclasses.Field[Any]", hint: Any) -> Range | None:
+    """Return the bounds of a field by the unit that its docstring has, or else its rules."""
+    text, rules = attribute_text(owner, field.name), list(ranges_of(hint))
+    if text is None:
         return None
     # what is literal are lists
-    brackets = _BRACKETS.findall(_LITERAL.sub("", text))
+    brackets = _BRACKETS.findall(_LITERAL.sub("", text)) + [rule.unit for rule in rules]
     known = (unit for unit in brackets if _largest(unit) is not None)
     unit = next(known, "deg" if field.name.endswith("_deg") else "")
     largest = _largest(unit) or _OTHERS
     least = -math.inf if field.default == -math.inf else -largest
-    no_limit = field.default == math.inf or bool(re.search(r"\binf(inite)?\b", text))
+    no_limit = field.default == math.inf or any(rule.infinite for rule in rules)
+    no_limit = no_limit or bool(re.search(r"\binf(inite)?\b", text))
     return Range(least, largest, unit, infinite=no_limit)
+
+
+def ranges_of(hint: Any) -> Iterator[Range]:
+    """Yield the ranges that the rules of a type, or of those within, allow its numbers."""
+    for rule in rules_of(hint):
+        if isinstance(rule, (Range, Numbers)):
+            yield rule.each if isinstance(rule, Numbers) else rule
+    for argument in typing.get_args(hint):
+        yield from ranges_of(argument)
 
 
 def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:

@@ -19,7 +19,7 @@ import dataclasses
 import math
 import types
 import typing
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any
 
@@ -49,8 +49,7 @@ class Rule:
             good = bool(self.allows(value))
         except (TypeError, ValueError):  # text where there must be a number
             good = False
-        shown = value.tolist() if isinstance(value, np.ndarray) else value
-        require(good, key, shown, str(self))
+        require(good, key, value, str(self))
 
     def json(self) -> dict[str, Any]:
         """Return what a JSON schema says of a value."""
@@ -83,7 +82,8 @@ class Range(Rule):
 
     def allows(self, value: Any) -> bool:
         """Return whether a number is within the range."""
-        if value == self.besides or (self.infinite and value == math.inf):
+        besides = self.besides is not None and value == self.besides
+        if besides or (self.infinite and value == math.inf):
             return True
         above = self.least < value if self.open else self.least <= value
         return (
@@ -95,28 +95,29 @@ class Range(Rule):
         if self.words:
             return self.words
         besides = "" if self.besides is None else f"{self.besides:g}, or "
+        if self.besides == 0.0 and self.least > 0.0:
+            besides = "zero or a positive number, "
         unit = f" {self.unit}" if self.unit else ""
         return f"{besides}{self._numbers()}{unit}{', or .inf' if self.infinite else ''}"
 
     def _numbers(self) -> str:
-        least, most = f"{self.least:g}", f"{self.most:g}"
-        if self.least == -math.inf and self.most == math.inf:
-            return "a finite number"
+        """Return both ends in words."""
+        least, most = f"{self.least:g}", f"{'below ' if self.below else ''}{self.most:g}"
         if self.most == math.inf:
-            positive = "a positive number" if self.open else "zero or a positive number"
-            return (
-                positive
-                if self.least == 0.0
-                else f"above {least}"
-                if self.open
-                else f"{least} or more"
-            )
-        end = "below" if self.below else "at most"
+            return self._one_end()
         if self.least == -math.inf:
-            return f"{end} {most}"
-        if self.open or self.below:
-            return f"{'above' if self.open else 'from'} {least}, {end} {most}"
+            return most if self.below else f"at most {most}"
+        if self.open:
+            return f"above {least}, {most if self.below else f'at most {most}'}"
         return f"{least} to {most}"
+
+    def _one_end(self) -> str:
+        """Return the lower end in words, where there is no upper one."""
+        if self.least == -math.inf:
+            return "a finite number"
+        if self.least == 0.0:
+            return "a positive number" if self.open else "zero or a positive number"
+        return f"above {self.least:g}" if self.open else f"{self.least:g} or more"
 
     def json(self) -> dict[str, Any]:
         """Return the range as a JSON schema has it."""
@@ -136,35 +137,26 @@ class Numbers(Rule):
 
     Attributes:
         count: How many they are; None for any number of them.
-        most: Largest magnitude.
-        unit: Unit, empty for none.
-        least: Smallest number, if not the largest magnitude bounds both sides.
-        open: Whether ``least`` itself is refused.
-        empty: Whether there may be none.
+        each: What each of them may be.
+        fewest: How many there must be, where their number is free.
+        empty: Whether there may be none, where it is not.
         some: Whether one must not be zero.
         words: What is allowed, where it is not to be said as numbers.
     """
 
     count: int | None = None
-    most: float = math.inf
-    unit: str = ""
-    least: float | None = None
-    open: bool = False
+    each: Range = Range()
+    fewest: int = 0
     empty: bool = False
     some: bool = False
     words: str = ""
-
-    @property
-    def each(self) -> Range:
-        """What each of them may be."""
-        least = -self.most if self.least is None else self.least
-        return Range(least, self.most, self.unit, self.open)
 
     def allows(self, value: Any) -> bool:
         """Return whether numbers are as many as is said, and each is allowed."""
         if self.empty and len(value) == 0:
             return True
-        fits = self.count is None or np.shape(value) == (self.count,)
+        shape = np.shape(value)
+        fits = len(shape) == 1 and shape[0] >= self.fewest and self.count in (None, *shape)
         return fits and all(map(self.each.allows, value)) and (not self.some or any(value))
 
     def __str__(self) -> str:
@@ -172,29 +164,26 @@ class Numbers(Rule):
         if self.words:
             return self.words
         count = "" if self.count is None else f"{self.count} "
-        size = f" of at most {self.most:g} {self.unit}".rstrip() if self.most < math.inf else ""
-        if self.some:
-            said = f"{count}numbers, not all zero"
-        elif self.least is None:
-            said = f"{count}finite numbers{size}"
-        elif self.least == 0.0:
-            at_most = f", at most {self.most:g} {self.unit}".rstrip() if size else ""
-            said = (
-                f"{count}positive numbers{at_most}"
-                if self.open
-                else f"{count}finite numbers, none negative{at_most}"
-            )
-        else:
-            said = f"{count}numbers from {self.least:g} to {self.most:g} {self.unit}".rstrip()
+        said = f"{count}numbers, not all zero" if self.some else f"{count}{self._each()}"
         return f"empty, or {said}" if self.empty else said
+
+    def _each(self) -> str:
+        """Return what each may be in words, of them all."""
+        each = self.each
+        most = f" at most {each.most:g} {each.unit}".rstrip() if each.most < math.inf else ""
+        if each.least == -each.most:
+            return f"finite numbers{most and ' of'}{most}"
+        if each.least == 0.0:
+            kind = "positive numbers" if each.open else "finite numbers, none negative"
+            return f"{kind}{most and ','}{most}"
+        return f"numbers from {each}"
 
     def json(self) -> dict[str, Any]:
         """Return what a JSON schema says of the list."""
-        said: dict[str, Any] = {}
+        said: dict[str, Any] = {"minItems": self.fewest} if self.fewest else {}
         if self.count is not None:
             said = {"minItems": 0 if self.empty else self.count, "maxItems": self.count}
-        each = self.each.json()
-        return {**said, "items": {"type": "number", **each}} if each else said
+        return {**said, "items": {"type": "number", **self.each.json()}}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -204,21 +193,25 @@ class Count(Rule):
     Attributes:
         least: Fewest items.
         most: Most items; None for any number.
-        words: What is allowed.
+        empty: Whether there may be none, too.
+        words: What is allowed, where it is not to be said as numbers.
     """
 
     least: int
     most: int | None = None
+    empty: bool = False
     words: str = ""
 
     def allows(self, value: Any) -> bool:
         """Return whether there are as many items as is said."""
+        if self.empty and len(value) == 0:
+            return True
         return self.least <= len(value) and (self.most is None or len(value) <= self.most)
 
     def check(self, key: str, value: Any) -> None:
         """Refuse too few or too many; see :meth:`Rule.check`."""
-        shown = "none" if len(value) == 0 else f"{len(value)} given"
-        require(self.allows(value), key, shown, str(self))
+        blocks = any(map(dataclasses.is_dataclass, value))
+        require(self.allows(value), key, f"{len(value)} given" if blocks else value, str(self))
 
     def __str__(self) -> str:
         """Return what is allowed in words."""
@@ -228,7 +221,9 @@ class Count(Rule):
 
     def json(self) -> dict[str, Any]:
         """Return what a JSON schema says of the list."""
-        return {"minItems": self.least} | ({"maxItems": self.most} if self.most else {})
+        return {"minItems": 0 if self.empty else self.least} | (
+            {"maxItems": self.most} if self.most else {}
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -258,9 +253,13 @@ class OneOf(Rule):
         return {"enum": list(self.allowed)}
 
 
+Finite = Annotated[float, Range()]
 Positive = Annotated[float, Range(0.0, open=True)]
 NotNegative = Annotated[float, Range(0.0)]
 Seed = Annotated[int, Range(0, words="zero or a positive integer")]
+Name = Annotated[str, Count(1, words="a name")]
+NotNegatives = Annotated[list[float], Numbers(each=Range(0.0))]
+Positives = Annotated[list[float], Numbers(each=Range(0.0, open=True))]
 
 
 class Parameters:
@@ -276,37 +275,63 @@ class Parameters:
             InputError: If one has a value that its rules refuse.
         """
         owner: Any = type(self)
-        for name, rules in field_rules(owner).items():
-            check_rules(rules, name, getattr(self, name))
+        for name, hint in ruled_fields(owner).items():
+            check_value(hint, name, getattr(self, name))
 
 
-def check_rules(rules: Sequence[Rule], key: str, value: Any) -> None:
-    """Refuse a value that one of its rules refuses; null, where a type has it, has none.
+def check_value(hint: Any, key: str, value: Any) -> None:
+    """Refuse a value that a rule of its type refuses, or of the types within.
+
+    Args:
+        hint: Its type, with rules; null, where the type has it, has none.
+        key: Its key, for the message.
+        value: The value.
 
     Raises:
         InputError: As :func:`pfsc_drake.errors.require`.
     """
-    for rule in rules if value is not None else ():
-        rule.check(key, value)
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if value is None:
+        return
+    if origin is Annotated:
+        for rule in rules_of(hint):
+            rule.check(key, value)
+        check_value(arguments[0], key, value)
+    elif origin in (typing.Union, types.UnionType):
+        for member in arguments:
+            # what is a word is none of the numbers that may stand in its place
+            if isinstance(value, str) == (_bare(member) is str):
+                check_value(member, key, value)
+    elif origin is list and isinstance(value, list) and has_rules(arguments[0]):
+        for index, item in enumerate(value):
+            check_value(arguments[0], f"{key}[{index}]", item)
+    elif origin is dict and isinstance(value, dict) and has_rules(arguments[1]):
+        for name, item in value.items():
+            check_value(arguments[1], f"{key}.{name}", item)
+
+
+def rules_of(hint: Any) -> list[Rule]:
+    """Return the rules of an annotated type."""
+    metadata = hint.__metadata__ if typing.get_origin(hint) is Annotated else ()
+    return [entry for entry in metadata if isinstance(entry, Rule)]
+
+
+def has_rules(hint: Any) -> bool:
+    """Return whether a type, or one within, has a rule."""
+    return bool(rules_of(hint)) or any(map(has_rules, typing.get_args(hint)))
 
 
 @cache
-def field_rules(owner: type) -> dict[str, tuple[Rule, ...]]:
-    """Return the rules of the fields of a dataclass, of those that have any."""
+def ruled_fields(owner: type) -> dict[str, Any]:
+    """Return the types, with rules, of those fields of a dataclass that have some."""
     hints = typing.get_type_hints(owner, include_extras=True)
-    found = {name: tuple(_rules_of(hint)) for name, hint in hints.items()}
-    names = {field.name for field in dataclasses.fields(owner)}
-    return {name: rules for name, rules in found.items() if rules and name in names}
+    names = [field.name for field in dataclasses.fields(owner)]
+    return {name: hints[name] for name in names if has_rules(hints[name])}
 
 
-def _rules_of(hint: Any) -> Iterator[Rule]:
-    """Yield the rules of an annotated type, or of those that a union is made of."""
-    origin = typing.get_origin(hint)
-    if origin is Annotated:
-        yield from (entry for entry in hint.__metadata__ if isinstance(entry, Rule))
-    elif origin in (typing.Union, types.UnionType):
-        for member in typing.get_args(hint):
-            yield from _rules_of(member)
+def _bare(hint: Any) -> Any:
+    """Return a type without its rules."""
+    return typing.get_args(hint)[0] if typing.get_origin(hint) is Annotated else hint
 
 
 def _finite(value: Any) -> bool:

@@ -22,7 +22,7 @@ from pfsc_drake.checks import NUMBER, is_number
 from pfsc_drake.errors import InputError, did_you_mean, gathered_refusals, in_one_line, shortened
 from pfsc_drake.yaml.fields import Field, OneForAll, fields_of
 from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml, read_yaml
-from pfsc_drake.yaml.rules import check_rules
+from pfsc_drake.yaml.rules import check_value
 
 Schema = TypeVar("Schema")
 Place = tuple[Any, ...]  # keys and indices, e.g. ("controller", "gains", "eta", 1)
@@ -140,7 +140,7 @@ class _Reader:
         with suppress(*ignored), np.errstate(all="ignore"), gathered_refusals() as said:
             if len(good) < len(values):
                 for name, value in good.items():
-                    check_rules(fields[name].rules, name, value)
+                    check_value(fields[name].hint, name, value)
             else:
                 result = schema(**good) if base is None else dataclasses.replace(base, **good)
         told = " ".join(said)

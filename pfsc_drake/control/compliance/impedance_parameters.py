@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Union
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
@@ -13,7 +13,7 @@ from pfsc_drake.blocks.cases import first_of, where
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.yaml.fields import REQUIRED
-from pfsc_drake.yaml.rules import Numbers, Parameters, Range
+from pfsc_drake.yaml.rules import NotNegative, Numbers, Parameters, Positive, Range
 
 # relative; what misses the length of a lap by less is a lap
 _ROUNDING = 1e-6
@@ -41,7 +41,7 @@ class Profile(Parameters):
     value: Annotated[float, Range(0.0, _LARGEST, _UNIT, infinite=True)] = 0.0
     over: str = "eta"
     at: list[float] = field(default_factory=list)
-    values: Annotated[list[float], Numbers(least=0.0, most=_LARGEST, unit=_UNIT)] = field(
+    values: Annotated[list[float], Numbers(each=Range(0.0, _LARGEST, _UNIT))] = field(
         default_factory=list
     )
 
@@ -118,7 +118,7 @@ class Profile(Parameters):
 
 
 @dataclass
-class SlowEnds:
+class SlowEnds(Parameters):
     """Damping over the arc length, large next to the ends of a path (5.4), as printed.
 
     ::
@@ -138,18 +138,14 @@ class SlowEnds:
         length: ``eta_max`` [m]; 0 for the length of the path.
     """
 
-    least: float = 90.0
+    least: NotNegative = 90.0
     most: float = 3000.0
-    start_rate: float = 40.0
-    end_rate: float = 80.0
-    length: float = 0.0
+    start_rate: Positive = 40.0
+    end_rate: Positive = 80.0
+    length: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        for key in ("start_rate", "end_rate"):
-            require(0.0 < getattr(self, key) < math.inf, key, getattr(self, key), "positive")
-        for key in ("least", "length"):
-            good = 0.0 <= getattr(self, key) < math.inf
-            require(good, key, getattr(self, key), "zero or positive")
+        super().__post_init__()
         require(self.least <= self.most < math.inf, "most", self.most, f"{self.least:g} or more")
 
     @property
@@ -186,7 +182,7 @@ class SlowEnds:
 
 
 # the first is what one without a tag means
-Damping = Union[Profile, SlowEnds]  # noqa: UP007 (Drake's YAML needs it)
+Damping = Profile | SlowEnds
 
 
 @dataclass

@@ -12,7 +12,7 @@ import pytest
 from diagrams.scenario import Scenario
 from docs.making.scenario_keys import blocks
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.fields import fields_of
+from pfsc_drake.yaml.fields import fields_of, ranges_of
 from pfsc_drake.yaml.typed import load_typed, typed_data
 
 OWNERS = [Scenario, *blocks()]
@@ -64,7 +64,8 @@ def test_every_number_is_bounded(owner):
         warnings.simplefilter("error")
         for name in numbers_of(owner):
             entry = fields_of(owner)[name]
-            infinite = any(getattr(b, "infinite", False) for b in (entry.bounds, *entry.rules))
+            ranges = [*ranges_of(entry.hint), *([entry.bounds] if entry.bounds else [])]
+            infinite = any(each.infinite for each in ranges)
             for number in (1e300, -1e300, math.nan, math.inf, -math.inf):
                 said = refusal(owner, name, number)
                 place = f"{owner.__module__}.{owner.__name__}.{name} = {number}"
