@@ -18,7 +18,6 @@ from diagrams.robots.delta import DeltaPart
 from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import require
 from diagrams.scenario.pair import check_carrier
 from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import add_log
@@ -43,6 +42,7 @@ from diagrams.surroundings.mounting_parts import payload_of
 from diagrams.tasks.task_drawing import drawing_of
 from diagrams.turntable_station import Turntable
 from diagrams.warnings.uncovered_links import uncovered_links
+from pfsc_drake.checks import require
 from pfsc_drake.following.extension import Extension
 from pfsc_drake.following.options.follower import (
     FollowerOptions,

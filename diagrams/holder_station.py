@@ -19,13 +19,13 @@ from diagrams.robots.friction import add_friction
 from diagrams.robots.held_workpiece import holding
 from diagrams.robots.model import is_delta
 from diagrams.scenario import DriverParameters, HolderParameters, Scenario
-from diagrams.scenario.checks import require
 from diagrams.scenario.pair import holder_scenario
 from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import SignalLog
 from diagrams.station_options import belief_source, following_options, friction_options
 from diagrams.station_start import find_start
 from diagrams.surroundings.held_reaction import add_held_reaction
+from pfsc_drake.checks import require
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError

@@ -15,7 +15,6 @@ from diagrams.robots.joint_state import add_joint_state, add_torque_sensor
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import DriverParameters, Scenario, Streamed
-from diagrams.scenario.checks import require
 from diagrams.scenario_task import check_joints, make_task
 from diagrams.station_options import (
     add_robot,
@@ -26,6 +25,7 @@ from diagrams.station_options import (
 )
 from diagrams.station_start import find_start
 from diagrams.surroundings.forces import Surroundings
+from pfsc_drake.checks import require
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.drivers.messages import ControlMode
 from pfsc_drake.following.assembly import acts_on_motors

@@ -6,7 +6,6 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from diagrams.scenario import OrientationParameters, ReferenceParameters, Scenario, Streamed
-from diagrams.scenario.checks import require, require_numbers
 from diagrams.scenario.virtual_fixtures import FixtureParameters
 from diagrams.tasks.regions_and_guides import make_fixtures, make_guides
 from diagrams.tasks.streaming import stream_task
@@ -20,6 +19,7 @@ from diagrams.tasks.task_geometry import (
     require_orientation,
     surface_of_path,
 )
+from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest, straight_lines, together

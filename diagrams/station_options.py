@@ -14,12 +14,12 @@ from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import add_remote_arm
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.massless import check_massless
 from diagrams.surroundings.forces import Outside
 from diagrams.surroundings.mounting import Mounting, make_mounting
 from diagrams.surroundings.teleoperation import teleoperated
 from diagrams.surroundings.workpieces import NotchedWorkpiece, PressedWorkpiece
+from pfsc_drake.checks import require, require_whole_fraction
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.compliance import ComplianceParameters

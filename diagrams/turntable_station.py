@@ -9,8 +9,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario.checks import require_whole_ticks
 from diagrams.scenario.turntable import TurntableParameters
+from pfsc_drake.checks import require_whole_ticks
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.turntable import TurntableAxes, turntable_motion_function

@@ -23,6 +23,7 @@ from experiments.run_commands import (
     list_command,
     live_command,
     run_command,
+    schema_command,
     sweep_command,
 )
 from experiments.study_commands import (
@@ -37,6 +38,7 @@ from reporting.terminal import run_app
 
 _COMMANDS: dict[str, Callable[..., None]] = {
     "list": list_command,
+    "schema": schema_command,
     "run": run_command,
     "live": live_command,
     "compare": compare_command,

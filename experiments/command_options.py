@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from experiments.scenario_file import ScenarioFile, expand_home, read_scenario, scenario_names
+from pfsc_drake.checks import is_number
 from pfsc_drake.errors import InputError, shortened, suggestion
-from pfsc_drake.yaml.schema_check import is_number
 
 if TYPE_CHECKING:
     from pydrake.lcm import DrakeLcm

@@ -10,11 +10,11 @@ from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import require
 from diagrams.station import Station
 from experiments.integration import choose_integration
 from experiments.results.requirements import check_targets
 from experiments.scenario_file import ScenarioFile
+from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError, nearest_file, shortened
 from pfsc_drake.yaml.reading import resolve_files
 from pfsc_drake.yaml.typed import dump_typed, load_typed

@@ -1,4 +1,4 @@
-"""Commands that run scenarios: ``list``, ``run``, ``live``, ``compare``, ``sweep``."""
+"""Commands that run scenarios: ``list``, ``schema``, ``run``, ``live``, ``compare``, ``sweep``."""
 
 import dataclasses
 import json
@@ -36,8 +36,8 @@ from experiments.outcomes import (
 )
 from experiments.scenario_file import expand_home, list_scenarios
 from experiments.study_commands import study_command
+from pfsc_drake.checks import is_number
 from pfsc_drake.errors import InputError, shortened
-from pfsc_drake.yaml.schema_check import is_number
 from reporting.progress import ProgressDisplay
 from reporting.registry import as_data, as_text
 from reporting.terminal import interruptible, show_page
@@ -66,6 +66,20 @@ def list_command(
     for entry in entries:
         table.add_row(entry.name, escape(entry.section), escape(entry.description))
     Console().print(table)
+
+
+def schema_command(
+    tags: Annotated[
+        bool, typer.Option("--tags", help="Settings of VS Code for the tags of scenarios instead.")
+    ] = False,
+) -> None:
+    """Print the JSON schema of scenario files, for completion and checks in an editor."""
+    from diagrams.scenario import Scenario
+    from pfsc_drake.yaml.json_schema import json_schema, tags_of
+
+    mappings = {"yaml.customTags": [f"{tag} mapping" for tag in tags_of(Scenario)]}
+    said = mappings if tags else json_schema(Scenario, "Scenario of pfsc_drake")
+    typer.echo(json.dumps(said, indent=1, ensure_ascii=False))
 
 
 def run_command(

@@ -1,8 +1,8 @@
 """Checks of values that people write."""
 
+import math
 import re
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -16,21 +16,23 @@ LARGEST_ANGLE = 3600.0  # deg; ten turns
 SHORTEST, FARTHEST = 1e-4, 1e4
 # Text that is a number. Python's float() would take more: underscores, the digits of all scripts.
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+_INFINITY = re.compile(r"[-+]?inf(inity)?", re.IGNORECASE)
 _ROUNDING = 1e-6
 
-# metadata of a dataclass's text, or mapping to text, that names a file, or a folder
-FILE = {"file": True}
 
+def is_number(value: float | str) -> bool:
+    """Whether a number, or text that is one, fits a float; infinity does, NaN does not.
 
-def equal(count: int, parts: int = 1) -> dict[str, Any]:
-    """Return metadata of a list of a fixed length, for which fewer numbers may stand.
-
-    Args:
-        count: Length of the list.
-        parts: How many parts it has; one number stands for equal ones in all of the list, so many
-            numbers for equal ones in each part.
+    YAML 1.1 reads 1e-3 as text.
     """
-    return {"equal": count, "parts": parts}
+    if isinstance(value, str) and not NUMBER.fullmatch(value):
+        return bool(_INFINITY.fullmatch(value))
+    try:
+        number = float(value)
+    except OverflowError:
+        return False
+    # text beyond the largest float is read as infinite, which is not what it says
+    return not math.isnan(number) and not (isinstance(value, str) and math.isinf(number))
 
 
 def require_not_negative(key: str, value: float) -> None:
@@ -43,10 +45,10 @@ def require_between(key: str, value: float, least: float, most: float, unit: str
     require(least <= value <= most, key, value, f"{least:g} to {most:g} {unit}")
 
 
-def require_numbers(key: str, values: Sequence[float], count: int) -> None:
-    """Refuse a list of another length, or with values that are not finite."""
-    valid = len(values) == count and bool(np.isfinite(values).all())
-    require(valid, key, list(values), f"{count} finite numbers")
+def require_numbers(key: str, values: Sequence[float] | np.ndarray, count: int) -> None:
+    """Refuse a list or an array of another length, or with values that are not finite."""
+    valid = np.shape(values) == (count,) and bool(np.isfinite(values).all())
+    require(valid, key, values, f"{count} finite numbers")
 
 
 def require_length(key: str, value: float) -> None:

@@ -138,7 +138,8 @@ def require(condition: bool, key: str, value: object, allowed: str) -> None:
         InputError: If it is not; within :func:`gathered_refusals` not at once.
     """
     if not condition:
-        _refuse(key, f"{key} = {value}; allowed: {allowed}")
+        shown = value.tolist() if hasattr(value, "tolist") else value
+        _refuse(key, f"{key} = {shown if shown != '' else repr(shown)}; allowed: {allowed}")
 
 
 def require_one_of(key: str, value: object, allowed: Iterable[str]) -> None:

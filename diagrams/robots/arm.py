@@ -29,8 +29,8 @@ from diagrams.robots.plant_wiring import (
 from diagrams.robots.start_posture import posture_warnings, start_posture, tilt_warnings
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import StartParameters
-from diagrams.scenario.checks import require
 from diagrams.scenario.robot import MULTIBODY
+from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.models.parameters import load_parameters

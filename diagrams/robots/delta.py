@@ -29,8 +29,8 @@ from diagrams.scenario import (
     RobotParameters,
     StartParameters,
 )
-from diagrams.scenario.checks import require
 from diagrams.scenario.robot import ANALYTIC, MULTIBODY
+from pfsc_drake.checks import require
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot, believed_delta
 from pfsc_drake.robot.delta.multibody import (
     DeltaModel,

@@ -11,8 +11,8 @@ from diagrams.scenario import (
     DriverParameters,
     ServoParameters,
 )
-from diagrams.scenario.checks import require, require_whole_fraction
 from pfsc_drake.blocks.wiring_blocks import Hold
+from pfsc_drake.checks import require, require_whole_fraction
 from pfsc_drake.following.law import safe_state, supervision
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters

@@ -4,8 +4,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.part import RobotPart, SensorMount
 from diagrams.scenario import SensorFailureParameters, SensorParameters
-from diagrams.scenario.checks import require_whole_ticks
 from pfsc_drake.blocks.wiring_blocks import Hold
+from pfsc_drake.checks import require_whole_ticks
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_torque_sensor import (
     ForceTorqueParameters,

@@ -10,8 +10,8 @@ from pydrake.systems.primitives import Adder
 
 from diagrams.robots.part import Drives, RobotPart
 from diagrams.scenario import BrakeParameters, JointFrictionParameters, SimulationParameters
-from diagrams.scenario.checks import require
 from diagrams.scenario.simulation import AUTO
+from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.holding_brakes import HoldingBrakes
@@ -21,7 +21,7 @@ from pfsc_drake.robot.robot_model import RobotModel, mass_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.brake_torque import BrakeTorque
 from pfsc_drake.systems.physics.joint_friction import JointFriction
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 # integration schemes of fixed step that the bristles of friction are made for
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import SensorFailureParameters
-from diagrams.scenario.checks import require
+from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.physics.force_torque_sensor import SensorFailure

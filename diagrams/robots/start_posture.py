@@ -7,7 +7,7 @@ from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.inverse_kinematics import ToolTarget, middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 # from where on a posture that was found is another one than the posture given
 _FAR_DEG = 60.0

@@ -1,29 +1,26 @@
 """A second robot that holds the workpiece, on which the path of the first one is."""
 
 import dataclasses as dc
+from typing import Annotated
 
-from diagrams.scenario.checks import (
-    require,
-    require_between,
-    require_numbers,
-    require_one_of,
-)
 from diagrams.scenario.manifolds import PathParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.robot import PoseParameters, RobotParameters
 from diagrams.scenario.simulation import SensorFailureParameters
+from pfsc_drake.checks import require
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.physics.joint_sensors import EncoderOptions
+from pfsc_drake.yaml.rules import Numbers, OneOf, Parameters, Range
 
 _SMALLEST, _LARGEST, _HEAVIEST = 1e-4, 10.0, 1e3  # m, m, kg
 DERIVATIVES = ("known", "planned", "differenced", "none")
 
 
 @dc.dataclass
-class SolidParameters:
+class SolidParameters(Parameters):
     """A solid that a workpiece consists of: a box, or a cylinder.
 
     Attributes:
@@ -33,20 +30,14 @@ class SolidParameters:
         mass: Its mass, evenly spread [kg].
     """
 
-    box: list[float] = dc.field(default_factory=list)
-    cylinder: list[float] = dc.field(default_factory=list)
+    box: Annotated[list[float], Numbers(3, Range(_SMALLEST, _LARGEST, "m"), empty=True)] = dc.field(
+        default_factory=list
+    )
+    cylinder: Annotated[list[float], Numbers(2, Range(_SMALLEST, _LARGEST, "m"), empty=True)] = (
+        dc.field(default_factory=list)
+    )
     pose: PoseParameters = dc.field(default_factory=PoseParameters)
-    mass: float = 1.0
-
-    def __post_init__(self) -> None:
-        for key, count in (("box", 3), ("cylinder", 2)):
-            values = getattr(self, key)
-            if not values:
-                continue
-            require_numbers(key, values, count)
-            good = all(_SMALLEST <= value <= _LARGEST for value in values)
-            require(good, key, values, f"{count} numbers from {_SMALLEST:g} to {_LARGEST:g} m")
-        require_between("mass", self.mass, 0.0, _HEAVIEST, "kg")
+    mass: Annotated[float, Range(0.0, _HEAVIEST, "kg")] = 1.0
 
 
 @dc.dataclass
@@ -77,7 +68,7 @@ class HeldWorkpieceParameters:
 
 
 @dc.dataclass
-class HolderParameters:
+class HolderParameters(Parameters):
     """A robot that holds the workpiece and moves it along a path of its own.
 
     The scenario's ``path`` or ``surface`` is then one of the workpiece, in the workpiece's frame,
@@ -116,12 +107,11 @@ class HolderParameters:
     encoders: EncoderOptions = dc.field(default_factory=EncoderOptions)
     faults: FaultParameters = dc.field(default_factory=FaultParameters)
     sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
-    derivatives: str = "known"
-    highest: int = 4
+    derivatives: Annotated[str, OneOf(DERIVATIVES)] = "known"
+    highest: Annotated[int, Range(0, 4)] = 4
 
     def __post_init__(self) -> None:
-        require_one_of("derivatives", self.derivatives, DERIVATIVES)
-        require(0 <= self.highest <= 4, "highest", self.highest, "0 to 4")
+        super().__post_init__()
         manifold = self.controller.manifold
         require(manifold == "path", "controller.manifold", manifold, "path, of a robot that holds")
         law = self.controller.law

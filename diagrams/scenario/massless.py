@@ -1,8 +1,8 @@
 """Blocks of a scenario that need a robot with masses."""
 
-from diagrams.scenario.checks import require
 from diagrams.scenario.schema import Scenario
 from diagrams.scenario.simulation import HoldBackParameters
+from pfsc_drake.checks import require
 
 _ALLOWED = "left out; links of the robot move without mass, so that kinematics alone are simulated"
 _BLOCKS = ("hand", "operator", "teleoperation", "notch", "workpiece", "plate", "holder")

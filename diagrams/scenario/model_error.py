@@ -2,19 +2,37 @@
 
 import dataclasses as dc
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
-from diagrams.scenario.checks import require, require_between, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.model_error import ModelError
-from pfsc_drake.yaml.typed import ONE_OR_MANY, equal
+from pfsc_drake.yaml.fields import ONE_OR_MANY, equal
+from pfsc_drake.yaml.rules import Numbers, Parameters, Range, Seed
 
 _FACTORS = ("mass", "inertia", "rotor_inertia", "stiffness", "friction", "link_length")
 _LEAST, _MOST = 1e-3, 1e3
 _LARGEST_OFFSET_DEG, _FARTHEST, _HEAVIEST = 90.0, 10.0, 1e3  # deg, m, kg
 _DOUBTED = 0.5, 2.0
-_MOST_RANDOM = {"center": (1.0, "m"), "joint_offset_deg": (30.0, "deg"), "tool_mass": (100.0, "kg")}
+
+_Factors = Annotated[
+    list[float],
+    Numbers(
+        each=Range(_LEAST, _MOST),
+        fewest=1,
+        words=f"factors from {_LEAST:g} to {_MOST:g}, one or one per link",
+    ),
+]
+_Offsets = Annotated[
+    list[float],
+    Numbers(
+        each=Range(-_LARGEST_OFFSET_DEG, _LARGEST_OFFSET_DEG),
+        fewest=1,
+        words=f"numbers of at most {_LARGEST_OFFSET_DEG:g} deg, one or one per joint",
+    ),
+]
+_Share = Annotated[float, Range(0.0, 1.0, "as a fraction")]
 
 
 def _one() -> list[float]:
@@ -22,7 +40,7 @@ def _one() -> list[float]:
 
 
 @dc.dataclass
-class RandomModelError:
+class RandomModelError(Parameters):
     """Standard deviations of errors that are drawn for every link anew; none by default.
 
     Attributes:
@@ -38,22 +56,16 @@ class RandomModelError:
         tool_mass: [kg].
     """
 
-    seed: int = 0
-    mass: float = 0.0
-    inertia: float = 0.0
-    center: float = 0.0
-    rotor_inertia: float = 0.0
-    stiffness: float = 0.0
-    friction: float = 0.0
-    link_length: float = 0.0
-    joint_offset_deg: float = 0.0
-    tool_mass: float = 0.0
-
-    def __post_init__(self) -> None:
-        require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")
-        for key in self._kinds():
-            most, unit = _MOST_RANDOM.get(key, (1.0, "as a fraction"))
-            require_between(key, getattr(self, key), 0.0, most, unit)
+    seed: Seed = 0
+    mass: _Share = 0.0
+    inertia: _Share = 0.0
+    center: Annotated[float, Range(0.0, 1.0, "m")] = 0.0
+    rotor_inertia: _Share = 0.0
+    stiffness: _Share = 0.0
+    friction: _Share = 0.0
+    link_length: _Share = 0.0
+    joint_offset_deg: Annotated[float, Range(0.0, 30.0, "deg")] = 0.0
+    tool_mass: Annotated[float, Range(0.0, 100.0, "kg")] = 0.0
 
     @classmethod
     def _kinds(cls) -> list[str]:
@@ -71,7 +83,7 @@ class RandomModelError:
 
 
 @dc.dataclass
-class ModelErrorParameters:
+class ModelErrorParameters(Parameters):
     """What the controller believes of the robot, beside what is true of the plant.
 
     Factors are what is believed in units of what is true: 0.95 is 5 % too low. They are one
@@ -92,32 +104,18 @@ class ModelErrorParameters:
         random: Random errors in addition.
     """
 
-    mass: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
-    inertia: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
-    rotor_inertia: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
-    stiffness: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
-    friction: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
-    link_length: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
-    joint_offset_deg: list[float] = dc.field(default_factory=lambda: [0.0], metadata=ONE_OR_MANY)
-    tool_mass: float = 0.0
-    tool_center: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    mass: _Factors = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    inertia: _Factors = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    rotor_inertia: _Factors = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    stiffness: _Factors = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    friction: _Factors = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    link_length: _Factors = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    joint_offset_deg: _Offsets = dc.field(default_factory=lambda: [0.0], metadata=ONE_OR_MANY)
+    tool_mass: Annotated[float, Range(-_HEAVIEST, _HEAVIEST, "kg")] = 0.0
+    tool_center: Annotated[list[float], Numbers(3, Range(-_FARTHEST, _FARTHEST, "m"))] = dc.field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3)
+    )
     random: RandomModelError = dc.field(default_factory=RandomModelError)
-
-    def __post_init__(self) -> None:
-        for key in _FACTORS:
-            values = getattr(self, key)
-            good = len(values) > 0 and all(_LEAST <= value <= _MOST for value in values)
-            allowed = f"factors from {_LEAST:g} to {_MOST:g}, one or one per link"
-            require(good, key, values, allowed)
-        offsets = self.joint_offset_deg
-        good = len(offsets) > 0 and all(abs(value) <= _LARGEST_OFFSET_DEG for value in offsets)
-        allowed = f"numbers of at most {_LARGEST_OFFSET_DEG:g} deg, one or one per joint"
-        require(good, "joint_offset_deg", offsets, allowed)
-        light = abs(self.tool_mass) <= _HEAVIEST
-        require(light, "tool_mass", self.tool_mass, f"numbers of at most {_HEAVIEST:g} kg")
-        require_numbers("tool_center", self.tool_center, 3)
-        near = all(abs(value) <= _FARTHEST for value in self.tool_center)
-        require(near, "tool_center", self.tool_center, f"up to {_FARTHEST:g} m")
 
     @property
     def warnings(self) -> list[str]:

@@ -1,30 +1,25 @@
 """Where a scenario starts and how it moves along."""
 
 import dataclasses as dc
+from typing import Annotated
 
-import numpy as np
-
-from diagrams.scenario.checks import (
-    LARGEST_ANGLE,
-    require,
-    require_between,
-    require_numbers,
-)
+from pfsc_drake.checks import LARGEST_ANGLE, require
 from pfsc_drake.control.law.swing import Swing
-from pfsc_drake.following.options.motion import MotionLimits
-from pfsc_drake.yaml.typed import NUMBERS_OR_END, ONE_FOR_ALL, equal
+from pfsc_drake.following.options.motion import ACCELERATION, VELOCITY, MotionLimits
+from pfsc_drake.yaml.fields import NUMBERS_OR_END, ONE_FOR_ALL, equal
+from pfsc_drake.yaml.rules import Count, Numbers, Parameters, Range
 
-# beyond, durations have no digits left, or none at all
-_VELOCITIES = (1e-6, 1e3)  # m/s
-_ACCELERATIONS = (1e-6, 1e6)  # m/s^2
 _FARTHEST = 1e6  # m, many rounds of a closed path
-_LONGEST_REST = 1e6  # s
-_SHORTEST_REST = 1e-6  # s
+_SEVERAL = Count(2, words="two or more finite numbers")
 _TRANSITIONS = (1e-3, 1e3)  # s
 
 
+_Way = Annotated[list[float], Numbers(each=Range(-_FARTHEST, _FARTHEST, "m")), _SEVERAL]
+_Place = Annotated[list[float], Numbers(2, Range(-_FARTHEST, _FARTHEST, "m"))]
+
+
 @dc.dataclass
-class SecondReference:
+class SecondReference(Parameters):
     """Motion along the second tangential coordinate of a surface, at its own pace.
 
     Attributes:
@@ -33,12 +28,9 @@ class SecondReference:
         acceleration: Largest acceleration [m/s^2].
     """
 
-    points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1])
-    velocity: float = 0.1
-    acceleration: float = 1.0
-
-    def __post_init__(self) -> None:
-        _check_motion(self)
+    points: _Way = dc.field(default_factory=lambda: [0.0, 0.1])
+    velocity: Annotated[float, VELOCITY] = 0.1
+    acceleration: Annotated[float, ACCELERATION] = 1.0
 
 
 @dc.dataclass
@@ -68,26 +60,19 @@ class ReferenceParameters(MotionLimits):
             strong ones ten times their largest torque in a second; ``.inf`` for any.
     """
 
-    points: list[float | str] = dc.field(
-        default_factory=lambda: [0.0, 0.1], metadata=NUMBERS_OR_END
+    points: Annotated[list[Annotated[float, Range(-_FARTHEST, _FARTHEST, "m")] | str], _SEVERAL] = (
+        dc.field(default_factory=lambda: [0.0, 0.1], metadata=NUMBERS_OR_END)
     )
     swings: list[Swing] = dc.field(default_factory=list)
-    places: list[list[float]] = dc.field(default_factory=list)
+    places: Annotated[list[_Place], Count(2, empty=True, words="two or more pairs, or none")] = (
+        dc.field(default_factory=list)
+    )
     second: SecondReference | None = None
 
     def __post_init__(self) -> None:
-        _check_motion(self)
-        for i, place in enumerate(self.places):
-            require_numbers(f"places[{i}]", place, 2)
-            near = max(map(abs, place)) <= _FARTHEST
-            require(near, f"places[{i}]", place, f"numbers of at most {_FARTHEST:g} m")
-        require(len(self.places) != 1, "places", self.places, "two or more pairs, or none")
+        super().__post_init__()
         one = not (self.places and self.second)
         require(one, "second", "given", "null where places are given")
-        good = self.dwell == 0.0 or _SHORTEST_REST <= self.dwell <= _LONGEST_REST
-        allowed = f"zero or a positive number, {_SHORTEST_REST:g} to {_LONGEST_REST:g} s"
-        require(good, "dwell", self.dwell, allowed)
-        super().__post_init__()
         if self.speed == "fastest":
             self._check_fastest()
 
@@ -112,21 +97,8 @@ class ReferenceParameters(MotionLimits):
         return [length or 0.0 if isinstance(point, str) else point for point in self.points]
 
 
-def _check_motion(motion: SecondReference | ReferenceParameters) -> None:
-    points = [point for point in motion.points if not isinstance(point, str)]
-    enough = len(motion.points) >= 2 and bool(np.isfinite(points).all())
-    require(enough, "points", motion.points, "two or more finite numbers")
-    near = all(abs(point) <= _FARTHEST for point in points)
-    require(near, "points", motion.points, f"numbers of at most {_FARTHEST:g} m")
-    if motion.velocity is not None:
-        require_between("velocity", motion.velocity, *_VELOCITIES, "m/s, a positive number")
-    require_between(
-        "acceleration", motion.acceleration, *_ACCELERATIONS, "m/s^2, a positive number"
-    )
-
-
 @dc.dataclass
-class StartParameters:
+class StartParameters(Parameters):
     """Where the tool is at the start, at rest.
 
     Attributes:
@@ -142,25 +114,15 @@ class StartParameters:
             0 for a reference that is on the path from the start.
     """
 
-    offset: list[float] = dc.field(default_factory=lambda: [0.0, 0.0], metadata=equal(2))
-    theta: list[float] = dc.field(default_factory=list)
-    position: list[float] = dc.field(default_factory=list)
-    rotation_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-    posture_deg: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
-    transition: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_numbers("offset", self.offset, 2)
-        if self.theta:
-            require_numbers("theta", self.theta, 2)
-        if self.position:
-            require_numbers("position", self.position, 3)
-        good = self.transition == 0.0 or _TRANSITIONS[0] <= self.transition <= _TRANSITIONS[1]
-        allowed = f"zero or a positive number, {_TRANSITIONS[0]:g} to {_TRANSITIONS[1]:g} s"
-        require(good, "transition", self.transition, allowed)
-        require_numbers("rotation_deg", self.rotation_deg, 3)
-        allowed = f"numbers of at most {LARGEST_ANGLE:g} deg"
-        for key in ("rotation_deg", "posture_deg"):
-            values = getattr(self, key)
-            good = all(abs(value) <= LARGEST_ANGLE for value in values)
-            require(good, key, values, f"finite {allowed}")
+    offset: Annotated[list[float], Numbers(2)] = dc.field(
+        default_factory=lambda: [0.0, 0.0], metadata=equal(2)
+    )
+    theta: Annotated[list[float], Numbers(2, empty=True)] = dc.field(default_factory=list)
+    position: Annotated[list[float], Numbers(3, empty=True)] = dc.field(default_factory=list)
+    rotation_deg: Annotated[
+        list[float], Numbers(3, Range(-LARGEST_ANGLE, LARGEST_ANGLE, "deg"))
+    ] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    posture_deg: Annotated[
+        list[float], Numbers(each=Range(-LARGEST_ANGLE, LARGEST_ANGLE, "deg"))
+    ] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
+    transition: Annotated[float, Range(*_TRANSITIONS, "s", besides=0.0)] = 0.0

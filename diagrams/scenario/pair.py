@@ -2,9 +2,9 @@
 
 import dataclasses as dc
 
-from diagrams.scenario.checks import require
 from diagrams.scenario.schema import Scenario
 from diagrams.scenario.streamed import Streamed
+from pfsc_drake.checks import require
 
 
 def holder_scenario(scenario: Scenario) -> Scenario:

@@ -1,22 +1,27 @@
 """The plate that is taken from a magazine and mounted into a frame (Sec. 5.3)."""
 
 import dataclasses as dc
+from typing import Annotated
 
 import numpy as np
 
-from diagrams.scenario.checks import (
-    require,
-    require_between,
-    require_not_negative,
-    require_numbers,
-    require_one_of,
-    require_positive,
-)
-from diagrams.scenario.workpiece import require_contact_step, require_up_to
+from diagrams.scenario.workpiece import ContactStep
+from pfsc_drake.checks import require
 from pfsc_drake.geometry.workpiece_bodies import FEWEST_WEDGES
 from pfsc_drake.physics.mounting_hand import MountingHandParameters
 from pfsc_drake.physics.suction import SuctionParameters
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import (
+    Count,
+    NotNegative,
+    Numbers,
+    OneOf,
+    Pair,
+    Parameters,
+    Positive,
+    Range,
+    Seed,
+)
 
 STARTS = ("magazine", "held", "frame")
 _SMALLEST, _LARGEST = 1e-4, 2.0  # m
@@ -30,7 +35,7 @@ def _corners(x: float, y: float) -> list[list[float]]:
 
 
 @dc.dataclass
-class PinParameters:
+class PinParameters(Parameters):
     """Pins of the plate, cylinders with round tips.
 
     Attributes:
@@ -39,21 +44,19 @@ class PinParameters:
         length: From the plate's underside to the tip [m], more than the radius.
     """
 
-    positions: list[list[float]] = dc.field(default_factory=lambda: _corners(0.10, 0.06))
-    radius: float = 4e-3
-    length: float = 12e-3
+    positions: Annotated[list[Pair], Count(2, words="two pins or more")] = dc.field(
+        default_factory=lambda: _corners(0.10, 0.06)
+    )
+    radius: Annotated[float, Range(_SMALLEST, _LARGEST, "m, a positive number")] = 4e-3
+    length: Annotated[float, Range(_SMALLEST, _LARGEST, "m, a positive number")] = 12e-3
 
     def __post_init__(self) -> None:
-        require(len(self.positions) >= 2, "positions", self.positions, "two pins or more")
-        for i, position in enumerate(self.positions):
-            require_numbers(f"positions[{i}]", position, 2)
-        require_between("radius", self.radius, _SMALLEST, _LARGEST, "m, a positive number")
-        require_between("length", self.length, _SMALLEST, _LARGEST, "m, a positive number")
+        super().__post_init__()
         require(self.length > self.radius, "length", self.length, "more than the radius")
 
 
 @dc.dataclass
-class RandomMisplacement:
+class RandomMisplacement(Parameters):
     """A misplacement that is drawn, in addition; uniform in two balls. None by default.
 
     Attributes:
@@ -62,14 +65,9 @@ class RandomMisplacement:
         turn: Radius of the ball of rotation vectors [rad].
     """
 
-    seed: int = 0
-    shift: float = 0.0
-    turn: float = 0.0
-
-    def __post_init__(self) -> None:
-        require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")
-        require_up_to("shift", self.shift, _FARTHEST)
-        require_up_to("turn", self.turn, _LARGEST_TURN)
+    seed: Seed = 0
+    shift: Annotated[float, Range(0.0, _FARTHEST, "m")] = 0.0
+    turn: Annotated[float, Range(0.0, _LARGEST_TURN, "rad")] = 0.0
 
     def draw(self) -> tuple[np.ndarray, np.ndarray]:
         """Return shift [m] and rotation vector [rad], shape (3,) each."""
@@ -80,7 +78,7 @@ class RandomMisplacement:
 
 
 @dc.dataclass
-class CarrierParameters:
+class CarrierParameters(Parameters):
     """Where a plate lies: a magazine or a frame.
 
     The path was taught with the tool in its pose at the arc length ``at`` when a gripped plate lies
@@ -94,16 +92,19 @@ class CarrierParameters:
         random: What is drawn in addition.
     """
 
-    at: float = 0.0
-    shift: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-    turn: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    at: NotNegative = 0.0
+    shift: Annotated[list[float], Numbers(3)] = dc.field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3)
+    )
+    turn: Annotated[list[float], Numbers(3)] = dc.field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3)
+    )
     random: RandomMisplacement = dc.field(default_factory=RandomMisplacement)
 
     def __post_init__(self) -> None:
-        require_not_negative("at", self.at)
+        super().__post_init__()
         for key, most, unit in (("shift", _FARTHEST, "m"), ("turn", _LARGEST_TURN, "rad")):
             values = getattr(self, key)
-            require_numbers(key, values, 3)
             small = float(np.linalg.norm(values)) <= most
             require(small, key, values, f"a vector of at most {most:g} {unit}")
 
@@ -126,25 +127,17 @@ class FrameParameters(CarrierParameters):
         wedges: Number of convex pieces that a bore is made of, see :func:`bore_wedges`.
     """
 
-    size: list[float] = dc.field(default_factory=lambda: [0.30, 0.20], metadata=equal(2))
-    clearance: float = 3e-4
-    ring: float = 0.016
-    depth: float = 0.015
-    wedges: int = 24
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_numbers("size", self.size, 2)
-        require(min(self.size) > 0.0, "size", self.size, "2 positive numbers")
-        require_positive("clearance", self.clearance)
-        for key in ("ring", "depth"):
-            require_between(key, getattr(self, key), _SMALLEST, _LARGEST, "m, a positive number")
-        good = FEWEST_WEDGES <= self.wedges <= _MOST_WEDGES
-        require(good, "wedges", self.wedges, f"{FEWEST_WEDGES} to {_MOST_WEDGES}")
+    size: Annotated[list[float], Numbers(2, Range(0.0, open=True))] = dc.field(
+        default_factory=lambda: [0.30, 0.20], metadata=equal(2)
+    )
+    clearance: Positive = 3e-4
+    ring: Annotated[float, Range(_SMALLEST, _LARGEST, "m, a positive number")] = 0.016
+    depth: Annotated[float, Range(_SMALLEST, _LARGEST, "m, a positive number")] = 0.015
+    wedges: Annotated[int, Range(FEWEST_WEDGES, _MOST_WEDGES)] = 24
 
 
 @dc.dataclass
-class PlateContactParameters:
+class PlateContactParameters(Parameters):
     """What happens where plate, magazine and frame touch.
 
     Attributes:
@@ -155,20 +148,14 @@ class PlateContactParameters:
             time [s].
     """
 
-    stiffness: float = 1e6
-    dissipation: float = 1.0
-    friction: float = 0.15
-    time_step: float = 1e-3
-
-    def __post_init__(self) -> None:
-        require_between("stiffness", self.stiffness, 1.0, 1e9, "N/m")
-        require_up_to("dissipation", self.dissipation, 1e6)
-        require_up_to("friction", self.friction, 1e3)
-        require_contact_step(self.time_step)
+    stiffness: Annotated[float, Range(1.0, 1000000000.0, "N/m")] = 1e6
+    dissipation: Annotated[float, Range(0.0, 1e6, "s/m")] = 1.0
+    friction: Annotated[float, Range(0.0, 1e3)] = 0.15
+    time_step: ContactStep = 1e-3
 
 
 @dc.dataclass
-class PlateParameters:
+class PlateParameters(Parameters):
     """A plate with pins, where it lies and where it is to go, and the gripper that takes it there.
 
     A gripped plate has the frame of the tool: origin in the middle of its upper face, z into it.
@@ -191,30 +178,26 @@ class PlateParameters:
             from the start.
     """
 
-    size: list[float] = dc.field(default_factory=lambda: [0.24, 0.16, 0.008])
-    mass: float = 0.83
-    believed_mass: float = 0.8
+    size: Annotated[list[float], Numbers(3, Range(_SMALLEST, _LARGEST, "m"))] = dc.field(
+        default_factory=lambda: [0.24, 0.16, 0.008]
+    )
+    mass: Annotated[float, Range(_LIGHTEST, _HEAVIEST, "kg")] = 0.83
+    believed_mass: Annotated[float, Range(0.0, _HEAVIEST, "kg")] = 0.8
     pins: PinParameters = dc.field(default_factory=PinParameters)
-    rests: list[list[float]] = dc.field(default_factory=lambda: _corners(0.06, 0.065))
+    rests: Annotated[list[Pair], Count(3, words="three [x, y] or more")] = dc.field(
+        default_factory=lambda: _corners(0.06, 0.065)
+    )
     magazine: CarrierParameters = dc.field(default_factory=CarrierParameters)
     frame: FrameParameters = dc.field(default_factory=FrameParameters)
     contact: PlateContactParameters = dc.field(default_factory=PlateContactParameters)
     suction: SuctionParameters = dc.field(default_factory=SuctionParameters)
-    start: str = "magazine"
-    release: float = np.inf
+    start: Annotated[str, OneOf(STARTS)] = "magazine"
+    release: Annotated[float, Range(0.0, open=True, infinite=True)] = np.inf
     operator: MountingHandParameters | None = None
 
     def __post_init__(self) -> None:
-        require_numbers("size", self.size, 3)
-        good = all(_SMALLEST <= length <= _LARGEST for length in self.size)
-        require(good, "size", self.size, f"3 numbers of {_SMALLEST:g} to {_LARGEST:g} m")
-        require_between("mass", self.mass, _LIGHTEST, _HEAVIEST, "kg")
-        require_between("believed_mass", self.believed_mass, 0.0, _HEAVIEST, "kg")
-        require_one_of("start", self.start, STARTS)
-        require(self.release > 0.0, "release", self.release, "a positive number of seconds")
-        require(len(self.rests) >= 3, "rests", self.rests, "three [x, y] or more")
+        super().__post_init__()
         for i, rest in enumerate(self.rests):
-            require_numbers(f"rests[{i}]", rest, 2)
             self._require_on_plate(f"rests[{i}]", rest, 0.0)
         self._check_pins()
 

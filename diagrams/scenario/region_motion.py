@@ -2,17 +2,9 @@
 
 import dataclasses as dc
 import math
+from typing import Annotated
 
-import numpy as np
-
-from pfsc_drake.checks import (
-    require,
-    require_between,
-    require_direction,
-    require_not_negative,
-    require_place,
-    require_positive,
-)
+from pfsc_drake.checks import require
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.swing import SwingingCourse
 from pfsc_drake.geometry.regions.moving import (
@@ -23,13 +15,22 @@ from pfsc_drake.geometry.regions.moving import (
     TurningRegion,
 )
 from pfsc_drake.geometry.regions.region import Region
+from pfsc_drake.yaml.rules import (
+    Direction,
+    NotNegative,
+    Numbers,
+    Parameters,
+    Point,
+    Positive,
+    Range,
+)
 
 _LARGEST = 10.0  # m: how far a region may move
 _LARGEST_DEG = 360.0
 
 
 @dc.dataclass
-class Visiting:
+class Visiting(Parameters):
     """A way that comes to rest at every one of several points.
 
     Attributes:
@@ -40,18 +41,16 @@ class Visiting:
         repeat: Whether it begins again at the end; the last point is then the first.
     """
 
-    points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1, 0.0])
-    velocity: float = 0.05
-    acceleration: float = 0.5
-    dwell: float = 0.5
+    points: Annotated[list[float], Numbers(fewest=2, words="two or more finite numbers")] = (
+        dc.field(default_factory=lambda: [0.0, 0.1, 0.0])
+    )
+    velocity: Positive = 0.05
+    acceleration: Positive = 0.5
+    dwell: NotNegative = 0.5
     repeat: bool = True
 
     def __post_init__(self) -> None:
-        enough = len(self.points) >= 2 and bool(np.isfinite(self.points).all())
-        require(enough, "points", self.points, "two or more finite numbers")
-        for key in ("velocity", "acceleration"):
-            require_positive(key, getattr(self, key))
-        require_not_negative("dwell", self.dwell)
+        super().__post_init__()
         back = not self.repeat or self.points[-1] == self.points[0]
         require(back, "points", self.points, "the last as the first, with repeat: true")
 
@@ -76,7 +75,7 @@ class Visiting:
 
 
 @dc.dataclass
-class Swinging:
+class Swinging(Parameters):
     """A way ``amplitude sin(2 pi frequency (t - begin))`` that begins smoothly.
 
     Attributes:
@@ -86,16 +85,10 @@ class Swinging:
         ramp: Time in which it comes to its full amplitude [s].
     """
 
-    amplitude: float = 0.02
-    frequency: float = 0.2
-    begin: float = 0.5
-    ramp: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_positive("amplitude", self.amplitude)
-        require_between("frequency", self.frequency, 1e-4, 100.0, "Hz")
-        require_not_negative("begin", self.begin)
-        require_between("ramp", self.ramp, 1e-3, 1e3, "s")
+    amplitude: Positive = 0.02
+    frequency: Annotated[float, Range(1e-4, 100.0, "Hz")] = 0.2
+    begin: NotNegative = 0.5
+    ramp: Annotated[float, Range(1e-3, 1e3, "s")] = 1.0
 
     @property
     def extent(self) -> float:
@@ -114,7 +107,7 @@ class Swinging:
 
 
 @dc.dataclass
-class Shift:
+class Shift(Parameters):
     """A region that moves along a direction.
 
     Attributes:
@@ -122,11 +115,11 @@ class Shift:
         way: ``!Visiting`` or ``!Swinging`` [m].
     """
 
-    direction: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    direction: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
     way: Visiting | Swinging = dc.field(default_factory=Visiting)
 
     def __post_init__(self) -> None:
-        require_direction("direction", self.direction)
+        super().__post_init__()
         far = self.way.extent <= _LARGEST
         require(far, "way", self.way.extent, f"no further than {_LARGEST:g} m")
 
@@ -140,7 +133,7 @@ class Shift:
 
 
 @dc.dataclass
-class Turn:
+class Turn(Parameters):
     """A region that turns about an axis.
 
     Attributes:
@@ -149,13 +142,12 @@ class Turn:
         way: ``!Visiting`` or ``!Swinging`` [deg].
     """
 
-    axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    point: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    point: Point = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     way: Visiting | Swinging = dc.field(default_factory=Visiting)
 
     def __post_init__(self) -> None:
-        require_direction("axis", self.axis)
-        require_place("point", self.point)
+        super().__post_init__()
         far = self.way.extent <= _LARGEST_DEG
         require(far, "way", self.way.extent, f"no further than {_LARGEST_DEG:g} deg")
 

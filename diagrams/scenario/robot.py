@@ -2,27 +2,29 @@
 
 import dataclasses as dc
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from diagrams.scenario.checks import (
-    LARGEST_ANGLE,
-    require,
-    require_not_negative,
-    require_numbers,
-    require_one_of,
-    require_positive,
-    require_whole_ticks,
-)
+from pfsc_drake.checks import LARGEST_ANGLE, require, require_whole_ticks
 from pfsc_drake.control.compliance.measured_wrench import STILL_TIME
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensationParameters
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters
 from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.reading import ModelOptions
-from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE
-from pfsc_drake.yaml.typed import ONE_FOR_ALL, ONE_OR_MANY, equal
+from pfsc_drake.yaml.fields import FILE, NAME_OR_FILE, ONE_FOR_ALL, ONE_OR_MANY, equal
+from pfsc_drake.yaml.rules import (
+    Finite,
+    NotNegative,
+    NotNegatives,
+    Numbers,
+    OneOf,
+    Parameters,
+    Positive,
+    Range,
+)
 
 # what moves a DELTA robot
 MULTIBODY, ANALYTIC = "multibody", "analytic"
@@ -31,7 +33,7 @@ _STRONGEST = 1e6  # m/s^2
 
 
 @dc.dataclass
-class PoseParameters:
+class PoseParameters(Parameters):
     """A pose in the world.
 
     Attributes:
@@ -40,16 +42,12 @@ class PoseParameters:
             ``R = Rz(a) Ry(b) Rx(c)``. Upside down is ``[0, 0, 180]``.
     """
 
-    position: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-    zyx_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-
-    def __post_init__(self) -> None:
-        require_numbers("position", self.position, 3)
-        near = all(abs(coordinate) <= _FARTHEST for coordinate in self.position)
-        require(near, "position", self.position, f"up to {_FARTHEST:g} m")
-        require_numbers("zyx_deg", self.zyx_deg, 3)
-        good = max(map(abs, self.zyx_deg)) <= LARGEST_ANGLE
-        require(good, "zyx_deg", self.zyx_deg, f"3 numbers of at most {LARGEST_ANGLE:g} deg")
+    position: Annotated[list[float], Numbers(3, Range(-_FARTHEST, _FARTHEST, "m"))] = dc.field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3)
+    )
+    zyx_deg: Annotated[list[float], Numbers(3, Range(-LARGEST_ANGLE, LARGEST_ANGLE, "deg"))] = (
+        dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    )
 
     def transform(self) -> RigidTransform:
         """Return the pose."""
@@ -85,7 +83,7 @@ class ElasticParameters:
 
 
 @dc.dataclass
-class RobotParameters:
+class RobotParameters(Parameters):
     """Which robot.
 
     Attributes:
@@ -117,24 +115,15 @@ class RobotParameters:
     tool_frame: str = "tool_point"
     base: str = ""
     base_pose: PoseParameters = dc.field(default_factory=PoseParameters)
-    gravity: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, -9.81])
-    fixed_joints: dict[str, float] = dc.field(default_factory=dict)
+    gravity: Annotated[list[float], Numbers(3, Range(-_STRONGEST, _STRONGEST, "m/s^2"))] = dc.field(
+        default_factory=lambda: [0.0, 0.0, -9.81]
+    )
+    fixed_joints: dict[str, Finite] = dc.field(default_factory=dict)
     packages: dict[str, str] = dc.field(default_factory=dict, metadata=FILE)
     elastic: ElasticParameters = dc.field(default_factory=ElasticParameters)
-    joint_damping: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
+    joint_damping: NotNegatives = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     rotor_coupling: str = dc.field(default="", metadata=NAME_OR_FILE)
-    plant: str = MULTIBODY
-
-    def __post_init__(self) -> None:
-        require_one_of("plant", self.plant, (MULTIBODY, ANALYTIC))
-        require_numbers("gravity", self.gravity, 3)
-        bearable = all(abs(component) <= _STRONGEST for component in self.gravity)
-        require(bearable, "gravity", self.gravity, f"up to {_STRONGEST:g} m/s^2")
-        for name, value in self.fixed_joints.items():
-            require(bool(np.isfinite(value)), f"fixed_joints.{name}", value, "a finite number")
-        damping = self.joint_damping
-        valid = all(np.isfinite(K_d) and K_d >= 0.0 for K_d in damping)
-        require(valid, "joint_damping", damping, "finite numbers, none negative")
+    plant: Annotated[str, OneOf((MULTIBODY, ANALYTIC))] = MULTIBODY
 
     def options(self, folder: Path) -> ModelOptions:
         """Return what is to be made of the model.
@@ -174,7 +163,7 @@ class LostFrames:
 
 
 @dc.dataclass
-class ServoParameters:
+class ServoParameters(Parameters):
     """Velocity controllers of the joints, behind the law ``velocity_servo``.
 
     Attributes:
@@ -190,26 +179,17 @@ class ServoParameters:
             themselves [s]; 0 for ever.
     """
 
-    bandwidth: float = 200.0
-    integral_rate: float = -1.0
-    period: float = 0.0
-    bus_delay: float = 0.0
+    bandwidth: Positive = 200.0
+    integral_rate: Finite = -1.0
+    period: Annotated[float, Range(_SHORTEST_PERIOD, 0.1, "s, a positive number", besides=0.0)] = (
+        0.0
+    )
+    bus_delay: NotNegative = 0.0
     lost: LostFrames = dc.field(default_factory=LostFrames)
-    watchdog: float = 0.01
+    watchdog: NotNegative = 0.01
 
     def __post_init__(self) -> None:
-        require_positive("bandwidth", self.bandwidth)
-        require(
-            bool(np.isfinite(self.integral_rate)),
-            "integral_rate",
-            self.integral_rate,
-            "a finite number",
-        )
-        good = self.period == 0.0 or _SHORTEST_PERIOD <= self.period <= 0.1
-        allowed = f"zero or a positive number, {_SHORTEST_PERIOD:g} to 0.1 s"
-        require(good, "period", self.period, allowed)
-        require_not_negative("bus_delay", self.bus_delay)
-        require_not_negative("watchdog", self.watchdog)
+        super().__post_init__()
         loses = self.lost.end > self.lost.begin
         require(not loses or self.bus_delay > 0.0, "lost", self.lost, "only with a bus_delay")
 
@@ -218,7 +198,7 @@ _LONGEST_DELAY = 1000  # ticks
 
 
 @dc.dataclass
-class DriverParameters:
+class DriverParameters(Parameters):
     """What is between a law that commands torques and the robot's drives.
 
     Attributes:
@@ -227,12 +207,8 @@ class DriverParameters:
         low_pass: Cut-off frequency of the low pass that torques go through [Hz]; 0 for none.
     """
 
-    delay: float = 0.0
-    low_pass: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_not_negative("delay", self.delay)
-        require_not_negative("low_pass", self.low_pass)
+    delay: NotNegative = 0.0
+    low_pass: NotNegative = 0.0
 
     def ticks(self, period: float) -> int:
         """Return the delay in ticks.
@@ -268,14 +244,12 @@ class SensorParameters(ForceTorqueParameters, ToolCompensationParameters):
 
     joint: str = ""
     delay: float = 0.0
-    unknown_mass: float = 0.0
+    unknown_mass: NotNegative = 0.0
+    # accelerations are known to no component of the station
+    inertia: Annotated[str, OneOf(("differentiated", "none"))] = "differentiated"
 
     def __post_init__(self) -> None:
-        # accelerations are known to no component of the station
-        require_one_of("inertia", self.inertia, ("differentiated", "none"))
-        require_not_negative("unknown_mass", self.unknown_mass)
-        ForceTorqueParameters.__post_init__(self)
-        ToolCompensationParameters.__post_init__(self)
+        super().__post_init__()
         # until something comes there is nothing to tare, and a sensor that says nothing is lost
         longest = min(STILL_TIME, self.taring_time)
         allowed = f"at least 0 and below {longest:g} s"

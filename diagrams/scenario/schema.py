@@ -6,12 +6,6 @@ Lengths in m, angles in rad unless a name ends in ``_deg``, times in s.
 import dataclasses as dc
 from copy import deepcopy
 
-from diagrams.scenario.checks import (
-    require,
-    require_not_negative,
-    require_one_of,
-    require_positive,
-)
 from diagrams.scenario.holder import HolderParameters
 from diagrams.scenario.manifolds import PathParameters, SurfaceParameters
 from diagrams.scenario.model_error import ModelErrorParameters
@@ -34,6 +28,7 @@ from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.scenario.turntable import TurntableParameters
 from diagrams.scenario.virtual_fixtures import FixtureParameters
 from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
+from pfsc_drake.checks import require, require_one_of
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
@@ -43,6 +38,7 @@ from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.physics.link_forces import LinkHandParameters
 from pfsc_drake.physics.scripted_force import ForcePulse
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 
 @dc.dataclass
@@ -59,7 +55,7 @@ class Target:
 
 
 @dc.dataclass
-class Scenario:
+class Scenario(Parameters):
     """A run: a robot, a task and surroundings.
 
     Attributes:
@@ -142,17 +138,15 @@ class Scenario:
     turntable: TurntableParameters | None = None
     plate: PlateParameters | None = None
     obstacles: CrossingParameters | None = None
-    duration: float = 0.0
-    judged_after: float = 0.0
-    settling_tolerance: float = 1e-4
+    duration: NotNegative = 0.0
+    judged_after: NotNegative = 0.0
+    settling_tolerance: Positive = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         plain = not set(self.name) & set("/\\:") and self.name not in (".", "..")
         require(plain, "name", self.name, "a name without slashes and colons")
-        for key in ("duration", "judged_after"):
-            require_not_negative(key, getattr(self, key))
-        require_positive("settling_tolerance", self.settling_tolerance)
         for law in self.targets:
             require_one_of("targets", law, RELATIVE_DEGREE)
 

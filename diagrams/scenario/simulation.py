@@ -1,22 +1,24 @@
 """How a scenario is simulated, what pushes the tool, who leads it."""
 
 import dataclasses as dc
+from typing import Annotated
 
-import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes
 
-from diagrams.scenario.checks import require, require_between, require_one_of, require_positive
+from pfsc_drake.checks import require
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.physics.force_torque_sensor import KINDS
 from pfsc_drake.physics.operator_hand import LiveHandParameters
-from pfsc_drake.yaml.reading import FILE
+from pfsc_drake.yaml.fields import FILE
+from pfsc_drake.yaml.rules import Finite, OneOf, Parameters, Positive, Range
 
 # the integrator that is chosen for a robot before it runs
 AUTO = "auto"
+_SCHEMES = (AUTO, *GetIntegrationSchemes())
 
 
 @dc.dataclass
-class SensorFailureParameters:
+class SensorFailureParameters(Parameters):
     """A component of the measured joint state that fails.
 
     Attributes:
@@ -31,17 +33,13 @@ class SensorFailureParameters:
 
     time: float = -1.0
     component: int = 0
-    kind: str = "nan"
-    size: float = 0.0
+    kind: Annotated[str, OneOf(KINDS)] = "nan"
+    size: Finite = 0.0
     whole_joint: bool = False
-
-    def __post_init__(self) -> None:
-        require_one_of("kind", self.kind, KINDS)
-        require(bool(np.isfinite(self.size)), "size", self.size, "a finite number")
 
 
 @dc.dataclass
-class SimulationParameters:
+class SimulationParameters(Parameters):
     """How the plant is integrated.
 
     Attributes:
@@ -58,10 +56,10 @@ class SimulationParameters:
             give the same log.
     """
 
-    integrator: str = AUTO
-    max_step: float = 1e-3
-    accuracy: float = 0.0
-    frame_period: float = 0.032
+    integrator: Annotated[str, OneOf(_SCHEMES)] = AUTO
+    max_step: Annotated[float, Range(1e-06, 0.1, "s")] = 1e-3
+    accuracy: Annotated[float, Range(1e-10, 0.1, besides=0.0)] = 0.0
+    frame_period: Annotated[float, Range(0.001, 1000.0, "s, a positive number")] = 0.032
     sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
     force_sensor_failure: SensorFailureParameters = dc.field(
         default_factory=SensorFailureParameters
@@ -69,12 +67,7 @@ class SimulationParameters:
     fused: bool = True
 
     def __post_init__(self) -> None:
-        schemes = [AUTO, *GetIntegrationSchemes()]
-        require_one_of("integrator", self.integrator, schemes)
-        require(1e-6 <= self.max_step <= 0.1, "max_step", self.max_step, "1e-6 to 0.1 s")
-        require_between("frame_period", self.frame_period, 1e-3, 1e3, "s, a positive number")
-        good = self.accuracy == 0.0 or 1e-10 <= self.accuracy <= 0.1
-        require(good, "accuracy", self.accuracy, "0, or a positive number from 1e-10 to 0.1")
+        super().__post_init__()
         # their error control works on stale values after a rejected step
         stale = ("runge_kutta5", "bogacki_shampine3")
         require(
@@ -86,7 +79,7 @@ class SimulationParameters:
 
 
 @dc.dataclass
-class HoldBackParameters:
+class HoldBackParameters(Parameters):
     """A wrench that holds the robot back along its path and has no other effect (Sec. 3.8.4).
 
     Attributes:
@@ -98,12 +91,11 @@ class HoldBackParameters:
 
     begin: float = 0.0
     end: float = 1.0
-    force: float = 0.0
-    ramp: float = 0.05
+    force: Finite = 0.0
+    ramp: Positive = 0.05
 
     def __post_init__(self) -> None:
-        require(np.isfinite(self.force), "force", self.force, "a finite number")
-        require_positive("ramp", self.ramp)
+        super().__post_init__()
         long_enough = 2.0 * self.ramp <= (self.end - self.begin) * (1.0 + 1e-9)
         require(long_enough, "end", self.end, "begin + 2 ramp or later")
 

@@ -1,24 +1,19 @@
 """A path whose way points come while the tool moves. Lengths in m, angles in degrees."""
 
 import dataclasses as dc
+from typing import Annotated
 
-from diagrams.scenario.checks import (
-    require,
-    require_between,
-    require_direction,
-    require_not_negative,
-    require_numbers,
-    require_place,
-)
+from pfsc_drake.checks import require
 from pfsc_drake.control.streams.parameters import StreamParameters
-from pfsc_drake.yaml.reading import FILE
+from pfsc_drake.yaml.fields import FILE
+from pfsc_drake.yaml.rules import Direction, NotNegative, Numbers, Parameters, Point, Range
 
 _RATES = (0.01, 1000.0)  # 1/s
 _MOST_TOLD = 1024
 
 
 @dc.dataclass
-class NewPath:
+class NewPath(Parameters):
     """A new path to go over to while the tool moves.
 
     Attributes:
@@ -27,14 +22,11 @@ class NewPath:
     """
 
     file: str = dc.field(default="", metadata=FILE)
-    at: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_not_negative("at", self.at)
+    at: NotNegative = 1.0
 
 
 @dc.dataclass
-class DrawnPlane:
+class DrawnPlane(Parameters):
     """A rectangle in space in which a person draws, in a browser.
 
     Attributes:
@@ -47,25 +39,16 @@ class DrawnPlane:
         zyx_deg: ZYX angles [deg] of the orientation that the tool keeps; empty for none.
     """
 
-    origin: list[float] = dc.field(default_factory=lambda: [0.9, 0.0, 1.0])
-    right: list[float] = dc.field(default_factory=lambda: [0.0, -1.0, 0.0])
-    up: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    width: float = 0.6
-    height: float = 0.4
-    zyx_deg: list[float] = dc.field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        require_place("origin", self.origin)
-        for key in ("right", "up"):
-            require_direction(key, getattr(self, key))
-        for key in ("width", "height"):
-            require_between(key, getattr(self, key), 1e-2, 1e2, "m")
-        if self.zyx_deg:
-            require_numbers("zyx_deg", self.zyx_deg, 3)
+    origin: Point = dc.field(default_factory=lambda: [0.9, 0.0, 1.0])
+    right: Direction = dc.field(default_factory=lambda: [0.0, -1.0, 0.0])
+    up: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    width: Annotated[float, Range(0.01, 100.0, "m")] = 0.6
+    height: Annotated[float, Range(0.01, 100.0, "m")] = 0.4
+    zyx_deg: Annotated[list[float], Numbers(3, empty=True)] = dc.field(default_factory=list)
 
 
 @dc.dataclass
-class Streamed:
+class Streamed(Parameters):
     """A path whose way points come one after the other while the tool moves.
 
     Attributes:
@@ -86,24 +69,17 @@ class Streamed:
     """
 
     file: str = dc.field(default="", metadata=FILE)
-    rate: float = 10.0
-    begin: float = 0.5
-    delay: float = 0.0
-    jitter: float = 0.0
-    noise: float = 0.0
-    seed: int = 1
+    rate: Annotated[float, Range(*_RATES, "1/s")] = 10.0
+    begin: NotNegative = 0.5
+    delay: NotNegative = 0.0
+    jitter: NotNegative = 0.0
+    noise: NotNegative = 0.0
+    seed: Annotated[int, Range(0)] = 1
     new_paths: list[NewPath] = dc.field(default_factory=list)
     plane: DrawnPlane | None = None
     inputs: str = dc.field(default="", metadata=FILE)
-    length: int = 32
+    length: Annotated[int, Range(1, _MOST_TOLD)] = 32
     follow: StreamParameters = dc.field(default_factory=StreamParameters)
-
-    def __post_init__(self) -> None:
-        require_between("rate", self.rate, *_RATES, "1/s")
-        for key in ("begin", "delay", "jitter", "noise", "seed"):
-            require_not_negative(key, getattr(self, key))
-        good = 1 <= self.length <= _MOST_TOLD
-        require(good, "length", self.length, f"1 to {_MOST_TOLD}")
 
     def check(self) -> None:
         """Refuse what does not go together.

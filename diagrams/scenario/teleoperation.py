@@ -2,11 +2,12 @@
 
 import dataclasses as dc
 
-from diagrams.scenario.checks import require, require_positive
+from pfsc_drake.checks import require
 from pfsc_drake.control.teleoperation.parameters import CouplingParameters
 from pfsc_drake.physics.channel import ChannelParameters
 from pfsc_drake.physics.leader_clutch import ClutchParameters
 from pfsc_drake.physics.leader_device import LeaderParameters
+from pfsc_drake.yaml.rules import Positive
 
 # the way back draws its own delays and losses
 _OTHER_SEED = 1000
@@ -38,18 +39,14 @@ class TeleoperationParameters(CouplingParameters):
     leader: LeaderParameters = dc.field(default_factory=LeaderParameters)
     clutch: list[ClutchParameters] = dc.field(default_factory=list)
     lcm: str = ""
-    silence: float = 0.5
-    follower_force: float = 60.0
-    follower_speed: float = 1.0
-    follower_moment: float = 10.0
-    follower_turning: float = 2.0
+    silence: Positive = 0.5
+    follower_force: Positive = 60.0
+    follower_speed: Positive = 1.0
+    follower_moment: Positive = 10.0
+    follower_turning: Positive = 2.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in ("force", "speed", "moment", "turning"):
-            name = f"follower_{key}"
-            require_positive(name, getattr(self, name))
-        require_positive("silence", self.silence)
         known = not self.lcm or self.lcm.partition("://")[0] in _BUSES
         require(known, "lcm", self.lcm, f"empty, or a bus: {', '.join(_BUSES)}://..")
         ends = [time for at in self.clutch for time in (at.begin, at.end)]

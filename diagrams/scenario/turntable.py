@@ -1,19 +1,22 @@
 """A turntable that carries the workpiece, on which the path of the robot is."""
 
 import dataclasses as dc
+from typing import Annotated
 
 import numpy as np
 
-from diagrams.scenario.checks import (
-    require,
-    require_between,
-    require_not_negative,
-    require_numbers,
-    require_one_of,
-    require_positive,
-)
 from diagrams.scenario.holder import HeldWorkpieceParameters
 from diagrams.scenario.robot import PoseParameters
+from pfsc_drake.checks import require, require_between, require_numbers
+from pfsc_drake.yaml.rules import (
+    Direction,
+    NotNegative,
+    Numbers,
+    OneOf,
+    Parameters,
+    Positive,
+    Range,
+)
 
 DERIVATIVES = ("known", "differenced", "none")
 # deg, that an axis may turn; s, by which what it tells may be late
@@ -21,7 +24,7 @@ _FARTHEST, _LATEST = 1e5, 0.1
 
 
 @dc.dataclass
-class TurntableAxisParameters:
+class TurntableAxisParameters(Parameters):
     """An axis of a turntable, in the axes of its base while all angles are zero.
 
     Attributes:
@@ -29,18 +32,17 @@ class TurntableAxisParameters:
         point: A point of it, from the base [m], shape (3,).
     """
 
-    direction: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    point: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    direction: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    point: Annotated[list[float], Numbers(3)] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def __post_init__(self) -> None:
-        for key in ("direction", "point"):
-            require_numbers(key, getattr(self, key), 3)
+        super().__post_init__()
         good = 1e-6 < float(np.linalg.norm(self.direction)) < 1e6
         require(good, "direction", self.direction, "3 numbers that are not all zero")
 
 
 @dc.dataclass
-class TurntableParameters:
+class TurntableParameters(Parameters):
     """A turntable with one axis or more, which turns the workpiece from stop to stop.
 
     Its drives follow their command ``lag`` late. Its controller tells the angles of its encoders,
@@ -69,26 +71,16 @@ class TurntableParameters:
     axes: list[TurntableAxisParameters] = dc.field(default_factory=list)
     workpiece: HeldWorkpieceParameters = dc.field(default_factory=HeldWorkpieceParameters)
     stops_deg: list[list[float]] = dc.field(default_factory=list)
-    velocity_deg: float = 90.0
-    acceleration_deg: float = 180.0
-    dwell: float = 0.0
-    increments: float = 0.0
-    lag: float = 0.0
-    delay: float = 0.0
+    velocity_deg: Positive = 90.0
+    acceleration_deg: Positive = 180.0
+    dwell: NotNegative = 0.0
+    increments: NotNegative = 0.0
+    lag: Annotated[float, Range(0.0, _LATEST, "s")] = 0.0
+    delay: Annotated[float, Range(0.0, _LATEST, "s")] = 0.0
     believed_delay: float | None = None
     placement_error: PoseParameters = dc.field(default_factory=PoseParameters)
-    derivatives: str = "known"
-    highest: int = 4
-
-    def __post_init__(self) -> None:
-        require_one_of("derivatives", self.derivatives, DERIVATIVES)
-        require(0 <= self.highest <= 4, "highest", self.highest, "0 to 4")
-        for key in ("velocity_deg", "acceleration_deg"):
-            require_positive(key, getattr(self, key))
-        for key in ("dwell", "increments"):
-            require_not_negative(key, getattr(self, key))
-        for key in ("lag", "delay"):
-            require_between(key, getattr(self, key), 0.0, _LATEST, "s")
+    derivatives: Annotated[str, OneOf(DERIVATIVES)] = "known"
+    highest: Annotated[int, Range(0, 4)] = 4
 
     def check(self) -> None:
         """Refuse a table that has no axes, nowhere to go, or is believed to be too late.

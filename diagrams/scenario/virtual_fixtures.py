@@ -1,22 +1,24 @@
 """Virtual fixtures of a scenario: regions that a tool led by hand may not enter."""
 
 import dataclasses as dc
+from typing import Annotated
 
 from diagrams.scenario.manifolds import GuideShape
 from diagrams.scenario.region_motion import RegionMotion
-from pfsc_drake.checks import require, require_between, require_one_of
+from pfsc_drake.checks import require
 from pfsc_drake.control.fixtures.guides import MOST_GUIDES, REACH, STIFFNESS
 from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.geometry.shapes.path_shapes import Line
 from pfsc_drake.geometry.shapes.plane import Plane
 from pfsc_drake.geometry.shapes.surface_list import RegionShape
 from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
+from pfsc_drake.yaml.rules import Count, OneOf, Parameters, Range
 
 _STIFFNESS = (1.0, 1e6)  # N/m
 
 
 @dc.dataclass
-class RegionParameters:
+class RegionParameters(Parameters):
     """A surface that the tool must not cross, and the side on which it may be.
 
     Planes, cylinders, cones and paraboloids have no ends, whatever part of them the shape tells;
@@ -36,12 +38,11 @@ class RegionParameters:
     shape: RegionShape = dc.field(default_factory=Plane)
     admissible: str = ""
     motion: RegionMotion | None = None
-    stiffness: float | None = None
+    stiffness: Annotated[float, Range(*_STIFFNESS, "N/m, or null")] | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.shape.check_side(self.admissible)
-        if self.stiffness is not None:
-            require_between("stiffness", self.stiffness, *_STIFFNESS, "N/m, or null")
 
     @property
     def inside(self) -> bool:
@@ -50,7 +51,7 @@ class RegionParameters:
 
 
 @dc.dataclass
-class GuideParameters:
+class GuideParameters(Parameters):
     """A path that attracts the tool, next to it like a spring and from its reach on not at all.
 
     See :class:`~pfsc_drake.control.fixtures.guides.Guide`.
@@ -62,12 +63,8 @@ class GuideParameters:
     """
 
     shape: GuideShape = dc.field(default_factory=Line)
-    stiffness: float = 2000.0
-    reach: float = 0.06
-
-    def __post_init__(self) -> None:
-        require_between("stiffness", self.stiffness, *STIFFNESS, "N/m")
-        require_between("reach", self.reach, *REACH, "m")
+    stiffness: Annotated[float, Range(*STIFFNESS, "N/m")] = 2000.0
+    reach: Annotated[float, Range(*REACH, "m")] = 0.06
 
 
 _START = ("refuse", "move_out")
@@ -93,13 +90,15 @@ class FixtureParameters(FixtureOptions):
     """
 
     regions: list[RegionParameters] = dc.field(default_factory=list)
-    guides: list[GuideParameters] = dc.field(default_factory=list)
+    guides: Annotated[
+        list[GuideParameters], Count(0, MOST_GUIDES, words=f"{MOST_GUIDES} or fewer")
+    ] = dc.field(default_factory=list)
     orientation: SurfaceOrientationParameters = dc.field(
         default_factory=SurfaceOrientationParameters
     )
-    start_inside: str = "refuse"
-    servo_lag: float = -1.0
-    bound: float = 0.5e-3
+    start_inside: Annotated[str, OneOf(_START)] = "refuse"
+    servo_lag: Annotated[float, Range(most=0.1, unit="s", below=True)] = -1.0
+    bound: Annotated[float, Range(1e-6, 0.1, "m")] = 0.5e-3
 
     @property
     def names(self) -> list[str]:
@@ -123,10 +122,5 @@ class FixtureParameters(FixtureOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        most = f"{MOST_GUIDES} or fewer"
-        require(len(self.guides) <= MOST_GUIDES, "guides", f"{len(self.guides)} given", most)
-        require_one_of("start_inside", self.start_inside, _START)
         kind = self.orientation.kind
         require(kind != "normal", "orientation.kind", kind, "none, given")
-        require(self.servo_lag < 0.1, "servo_lag", self.servo_lag, "below 0.1 s")
-        require_between("bound", self.bound, 1e-6, 0.1, "m")

@@ -1,20 +1,24 @@
 """What a tool presses on or runs in, and the ball that it touches with."""
 
 import dataclasses as dc
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
 
-from diagrams.scenario.checks import require, require_between, require_numbers
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.checks import require
+from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import Numbers, Parameters, Range
 
 SMALLEST, LARGEST = 1e-4, 10.0  # m, of workpiece and ball
 _MODULUS = 1e3, 1e12  # Pa: softer than any foam, harder than any stone
-STEPS = (1e-5, 1e-3)  # s, of a plant with contact
+
+# time step of a plant with contact
+ContactStep = Annotated[float, Range(1e-5, 1e-3, "s")]
 
 
 @dc.dataclass
-class SoftBall:
+class SoftBall(Parameters):
     """A ball with a soft shell.
 
     Attributes:
@@ -25,18 +29,11 @@ class SoftBall:
         resolution: Edge length of the mesh that contact is computed with, 1e-4 m or more.
     """
 
-    radius: float = 0.02
-    modulus: float = 1e6
-    dissipation: float = 1.0
-    friction: float = 0.2
-    resolution: float = 6e-3
-
-    def __post_init__(self) -> None:
-        for key in ("radius", "resolution"):
-            require_between(key, getattr(self, key), SMALLEST, LARGEST, "m, a positive number")
-        require_between("modulus", self.modulus, *_MODULUS, "Pa; 4 MPa are 4e+06")
-        for key, most in {"dissipation": 1e6, "friction": 1e3}.items():
-            require_up_to(key, getattr(self, key), most)
+    radius: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 0.02
+    modulus: Annotated[float, Range(*_MODULUS, "Pa; 4 MPa are 4e+06")] = 1e6
+    dissipation: Annotated[float, Range(0.0, 1e6, "s/m")] = 1.0
+    friction: Annotated[float, Range(0.0, 1e3)] = 0.2
+    resolution: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 6e-3
 
     def stiffness(self, force: float) -> float:
         """Return by how much the force on a flat rigid body grows with the depth [N/m].
@@ -59,31 +56,6 @@ class SoftBall:
         return float(2.0 * np.pi * E * d * (1.0 - d / R))
 
 
-def require_up_to(key: str, value: float, most: float) -> None:
-    """Refuse what is negative or too large.
-
-    Args:
-        key: Name, for the message.
-        value: What was given.
-        most: Largest number that is allowed.
-
-    Raises:
-        InputError: If so.
-    """
-    require(0.0 <= value <= most, key, value, f"zero or a positive number, at most {most:g}")
-
-
-def require_contact_step(time_step: float) -> None:
-    """Refuse the step of a plant with contact [s].
-
-    Raises:
-        InputError: If contact cannot be computed with it.
-    """
-    shortest, longest = STEPS
-    allowed = f"{shortest:g} to {longest:g} s"
-    require(shortest <= time_step <= longest, "time_step", time_step, allowed)
-
-
 @dc.dataclass
 class BallParameters(SoftBall):
     """A ball with a soft shell on the tool.
@@ -96,15 +68,11 @@ class BallParameters(SoftBall):
             their tool.
     """
 
-    distance: float = 0.12
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_up_to("distance", self.distance, LARGEST)
+    distance: Annotated[float, Range(0.0, LARGEST, "m")] = 0.12
 
 
 @dc.dataclass
-class NotchParameters:
+class NotchParameters(Parameters):
     """A rigid workpiece with a round-bottomed notch, and the ball that runs in it.
 
     The path is where the tool point is when the ball lies on the bottom of the notch of a
@@ -121,22 +89,19 @@ class NotchParameters:
     """
 
     ball: BallParameters = dc.field(default_factory=BallParameters)
-    displacement: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-    radius: float = 0.022
-    depth: float = 0.025
-    width: float = 0.07
-    time_step: float = 5e-4
+    displacement: Annotated[list[float], Numbers(3, Range(-LARGEST, LARGEST, "m"))] = dc.field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3)
+    )
+    radius: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 0.022
+    depth: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 0.025
+    width: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 0.07
+    time_step: ContactStep = 5e-4
 
     def __post_init__(self) -> None:
-        require_numbers("displacement", self.displacement, 3)
-        near = max(map(abs, self.displacement)) <= LARGEST
-        require(near, "displacement", self.displacement, f"3 numbers of at most {LARGEST:g} m")
-        for key in ("radius", "depth", "width"):
-            require_between(key, getattr(self, key), SMALLEST, LARGEST, "m, a positive number")
+        super().__post_init__()
         require(self.radius > self.ball.radius, "radius", self.radius, "more than ball.radius")
         require(self.depth >= self.radius, "depth", self.depth, "radius or more")
         require(self.width > 2.0 * self.radius, "width", self.width, "more than twice the radius")
-        require_contact_step(self.time_step)
 
     @property
     def clearance(self) -> float:
@@ -148,7 +113,7 @@ _LARGEST_TURN = 45.0  # deg
 
 
 @dc.dataclass
-class WorkpieceParameters:
+class WorkpieceParameters(Parameters):
     """A rigid workpiece under the scenario's surface, and the soft ball on the tool.
 
     The surface was taught with the tool point, where the ball is nearest to the workpiece, on it;
@@ -163,18 +128,11 @@ class WorkpieceParameters:
     """
 
     ball: SoftBall = dc.field(default_factory=SoftBall)
-    shift: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-    turn_zyx_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-    spacing: float = 4e-3
-    time_step: float = 5e-4
-
-    def __post_init__(self) -> None:
-        for key in ("shift", "turn_zyx_deg"):
-            require_numbers(key, getattr(self, key), 3)
-        near = max(map(abs, self.shift)) <= LARGEST
-        require(near, "shift", self.shift, f"3 numbers of at most {LARGEST:g} m")
-        small = max(map(abs, self.turn_zyx_deg)) <= _LARGEST_TURN
-        allowed = f"3 numbers of at most {_LARGEST_TURN:g} deg"
-        require(small, "turn_zyx_deg", self.turn_zyx_deg, allowed)
-        require_between("spacing", self.spacing, SMALLEST, LARGEST, "m, a positive number")
-        require_contact_step(self.time_step)
+    shift: Annotated[list[float], Numbers(3, Range(-LARGEST, LARGEST, "m"))] = dc.field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3)
+    )
+    turn_zyx_deg: Annotated[
+        list[float], Numbers(3, Range(-_LARGEST_TURN, _LARGEST_TURN, "deg"))
+    ] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    spacing: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 4e-3
+    time_step: ContactStep = 5e-4

@@ -9,11 +9,11 @@ from pydrake.systems.primitives import Adder
 from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import ForcePulse, HandParameters, HoldBackParameters
-from diagrams.scenario.checks import require
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_parts import add_hand, add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows, Sum
+from pfsc_drake.checks import require
 from pfsc_drake.control.manifolds.manifold import Manifold, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError

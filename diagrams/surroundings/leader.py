@@ -6,11 +6,11 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import HandParameters
-from diagrams.scenario.checks import require
 from diagrams.scenario.teleoperation import TeleoperationParameters
 from diagrams.surroundings.operator import Operator
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Linear
+from pfsc_drake.checks import require
 from pfsc_drake.control.teleoperation.parameters import PortLimits
 from pfsc_drake.control.teleoperation.port import SIDES, TeleoperationPort
 from pfsc_drake.errors import InputError

@@ -26,8 +26,8 @@ from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.plate import CarrierParameters, PlateContactParameters, PlateParameters
+from pfsc_drake.checks import require, require_whole_fraction
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.tasks.path_task import PathTask
 from pfsc_drake.following.tasks.task import StartPoint, Task

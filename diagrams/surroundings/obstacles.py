@@ -4,8 +4,8 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
-from diagrams.scenario.checks import require_whole_ticks
 from diagrams.scenario.obstacles import CrossingParameters
+from pfsc_drake.checks import require_whole_ticks
 from pfsc_drake.physics.moving_obstacle import MovingObstacles, ObstacleSensor
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise

@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import DiagramBuilder, InputPort
 
-from diagrams.scenario.checks import require
 from diagrams.scenario.streamed import DrawnPlane
+from pfsc_drake.checks import require
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.systems.drawing.manifold_visualizer import LineVisualizer
 

@@ -7,11 +7,11 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import ControllerParameters, PathParameters, StartParameters, Streamed
-from diagrams.scenario.checks import require
 from diagrams.scenario.streamed import DrawnPlane
 from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, strokes, told_messages
 from diagrams.tasks.drawn_plane import SIDE, border
 from diagrams.tasks.task_geometry import followed_angles
+from pfsc_drake.checks import require
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.control.streams.course import POSE, POSITION

@@ -12,8 +12,9 @@ import numpy as np
 
 from diagrams.scenario import Scenario
 from docs.making.text import attribute, cell, description, table
-from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE
-from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED, typed_data
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, FILE, NAME_OR_FILE, ONE_OR_MANY, Field, fields_of
+from pfsc_drake.yaml.rules import OneOf, rules_of
+from pfsc_drake.yaml.typed import typed_data
 
 _PLAIN = {bool: "true or false", int: "whole number", float: "number", str: "text"}
 _SEVERAL = {
@@ -136,12 +137,11 @@ def _section(block: _Block, level: str) -> list[str]:
 
 
 def _own_table(owner: type) -> str:
-    hints, plain, rows = typing.get_type_hints(owner), owner(), []
-    for field in dc.fields(owner):
-        unit, meaning = unit_and_meaning(attribute(owner, field.name), field.name)
-        kind = _kind(hints[field.name], field)
-        default = _default(getattr(plain, field.name), hints[field.name], field)
-        rows.append([f"`{field.name}`", kind, cell(unit), default, cell(meaning)])
+    plain, rows = owner(), []
+    for name, field in fields_of(owner).items():
+        unit, meaning = unit_and_meaning(attribute(owner, name), name)
+        default = _default(getattr(plain, name), field)
+        rows.append([f"`{name}`", _kind(field), cell(unit), default, cell(meaning)])
     return table(_HEAD, rows, "keys")
 
 
@@ -149,16 +149,19 @@ def _anchor(owner: type) -> str:
     return f"keys-{owner.__name__.lower()}"
 
 
-def _kind(hint: Any, field: dc.Field[Any]) -> str:
+def _kind(field: Field) -> str:
     """Return a field's type in words, blocks as links."""
-    said = _words(hint)
-    if field.metadata == FILE:
+    said = _words(field.kind)
+    choices = [rule.allowed for rule in rules_of(field.hint) if isinstance(rule, OneOf)]
+    for words in choices:
+        said = said.replace("text", " or ".join(f"`{word}`" for word in words), 1)
+    if field.form == FILE:
         return said.replace("text", "file", 1)
-    if field.metadata == NAME_OR_FILE:
+    if field.form == NAME_OR_FILE:
         return said.replace("text", "name or file", 1)
-    if field.metadata == ONE_OR_MANY:
+    if field.form == ONE_OR_MANY:
         return f"number, or {said}"
-    return f"`auto`, or {said}" if field.metadata == AUTO_OR_MANY else said
+    return f"`auto`, or {said}" if field.form == AUTO_OR_MANY else said
 
 
 def _words(hint: Any) -> str:
@@ -188,14 +191,14 @@ def _tag(owner: type) -> str:
     return f"[`!{owner.__name__}`](#{_anchor(owner)})"
 
 
-def _default(value: Any, hint: Any, field: dc.Field[Any]) -> str:
-    if field.metadata == REQUIRED:
+def _default(value: Any, field: Field) -> str:
+    if field.required:
         return "*must be given*"
-    if field.metadata == AUTO_OR_MANY and not value:
+    if field.form == AUTO_OR_MANY and not value:
         return "`auto`"
     if dc.is_dataclass(value):
         owner = type(value)
-        tag = f"`!{owner.__name__}`" if len(list(_members(hint))) > 1 else ""
+        tag = f"`!{owner.__name__}`" if len(list(_members(field.kind))) > 1 else ""
         given, plain = typed_data(value), typed_data(owner())
         changed = {key: item for key, item in given.items() if item != plain[key]}
         return " ".join(part for part in (tag, f"`{_yaml(changed)}`" if changed else "") if part)

@@ -3,7 +3,7 @@
 import inspect
 import re
 
-from pfsc_drake.yaml.bounds import attribute_text
+from pfsc_drake.yaml.fields import attribute_text
 
 _ROLE = re.compile(r":\w+(?::\w+)*:`~?([^`]+)`")
 _LITERAL = re.compile(r"``([^`]+)``")

@@ -9,7 +9,6 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import require
 from diagrams.scenario_task import make_task
 from diagrams.signal_log import add_log
 from diagrams.surroundings.channel_end import ChannelEnd
@@ -17,6 +16,7 @@ from diagrams.surroundings.leader import Leading, add_leader
 from experiments.finished_run import steady_clock
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
+from pfsc_drake.checks import require
 from pfsc_drake.control.teleoperation.port import RECORD
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
 from pfsc_drake.systems.fuse import fuse_blocks

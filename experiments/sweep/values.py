@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from pfsc_drake.checks import is_number
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.schema_check import is_number
 
 MAX_VALUES = 100_000  # of one key
 MAX_LENGTH = 1000  # of a list that is drawn

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import require_between
 from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.checks import require_between
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError

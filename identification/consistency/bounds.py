@@ -8,10 +8,12 @@ import numpy as np
 from identification.consistency.pseudo_inertia import Layout, linear_terms
 from identification.model.parameters import LINK_PARAMETERS, PER_LINK
 from identification.model.subject import Subject
+from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.robot.parameter_checks import check_vector, require
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.rules import Name, Parameters, Positive
+from pfsc_drake.yaml.typed import load_file
 
 FILE_NAME = "physical_bounds.yaml"
 _INTERVAL = 2
@@ -34,8 +36,8 @@ class FrameBox:
     upper: np.ndarray = field(default_factory=lambda: np.ones(3), metadata=REQUIRED)
 
     def __post_init__(self) -> None:
-        check_vector("lower", self.lower, 3)
-        check_vector("upper", self.upper, 3)
+        require_numbers("lower", self.lower, 3)
+        require_numbers("upper", self.upper, 3)
         ordered = bool(np.all(self.lower < self.upper))
         require(ordered, "lower", self.lower, f"below upper = {self.upper.tolist()}")
 
@@ -51,7 +53,7 @@ class FrameBox:
 
 
 @dataclass
-class LinkBounds:
+class LinkBounds(Parameters):
     """What is known of one link, in the link frame of the robot's chain.
 
     Attributes:
@@ -67,12 +69,11 @@ class LinkBounds:
     mass: np.ndarray = field(default_factory=_unit_interval, metadata=REQUIRED)
     center_of_mass: FrameBox = field(default_factory=FrameBox, metadata=REQUIRED)
     body: FrameBox | None = None
-    least_extent: float = field(default=1.0, metadata=REQUIRED)
+    least_extent: Positive = field(default=1.0, metadata=REQUIRED)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_interval("mass", self.mass)
-        extent = self.least_extent
-        require(0.0 < extent < np.inf, "least_extent", extent, "positive and finite")
 
 
 @dataclass
@@ -96,7 +97,7 @@ class DeltaMassBounds:
 
 
 @dataclass
-class PhysicalBounds:
+class PhysicalBounds(Parameters):
     """What is known of a robot; either links, or the masses of a DELTA robot.
 
     Attributes:
@@ -109,7 +110,7 @@ class PhysicalBounds:
         source: Where the numbers are from.
     """
 
-    name: str = field(default="unnamed", metadata=REQUIRED)
+    name: Name = field(default="unnamed", metadata=REQUIRED)
     links: list[LinkBounds] = field(default_factory=lambda: [LinkBounds()])
     rotor_inertia: list[list[float]] = field(default_factory=list)
     total_mass: list[float] = field(default_factory=list)
@@ -117,7 +118,7 @@ class PhysicalBounds:
     source: str = ""
 
     def __post_init__(self) -> None:
-        require(bool(self.name), "name", self.name, "a name")
+        super().__post_init__()
         many = len(self.links)
         if self.total_mass:
             check_interval("total_mass", np.array(self.total_mass))
@@ -182,7 +183,7 @@ def check_interval(key: str, value: np.ndarray) -> None:
     Raises:
         InputError: If it is none.
     """
-    check_vector(key, value, _INTERVAL)
+    require_numbers(key, value, _INTERVAL)
     require(bool(0.0 < value[0] <= value[1]), key, value, "[least, largest], both positive")
 
 

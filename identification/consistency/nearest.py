@@ -1,6 +1,7 @@
 """Physically consistent parameters: nearest to identified ones, or straight from measurements."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -8,8 +9,9 @@ from identification.consistency.bounds import PhysicalBounds
 from identification.consistency.program import PRIOR_WEIGHT, least_squares
 from identification.estimation.least_squares import Estimate
 from identification.model.base import BaseParameters
+from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.parameter_checks import check_vector, require
+from pfsc_drake.yaml.rules import Parameters, Range
 
 # of a covariance matrix scaled to ones on its diagonal; below, it is singular but for rounding
 _SINGULAR = 1e-13
@@ -19,7 +21,7 @@ _FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class Prediction(Parameters):
     """Torques that are to be predicted as by the identified base parameters.
 
     Tables of standard deviations leave out the correlations, and with them how parameters may
@@ -36,18 +38,18 @@ class Prediction:
 
     matrices: np.ndarray
     standard_deviation: np.ndarray
-    weight: float
+    weight: Annotated[float, Range(0.0, words="finite and not negative")]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         sigma, shape = np.asarray(self.standard_deviation), np.shape(self.matrices)
         if len(shape) != 3 or sigma.shape != shape[1:2] or not np.all(np.isfinite(self.matrices)):
             raise InputError(
                 f"prediction: matrices {shape}, deviations {sigma.shape}; must be (K, N, n_b) and "
                 "(N,), all finite"
             )
-        check_vector("standard_deviation", sigma, shape[1])
+        require_numbers("standard_deviation", sigma, shape[1])
         require(bool(np.all(sigma > 0.0)), "standard_deviation", sigma, "positive")
-        require(0.0 <= self.weight < np.inf, "weight", self.weight, "finite and not negative")
 
     def factor(self) -> np.ndarray:
         """Return R with ``|R d|^2`` the weighted squares of torques for ``d``, shape (r, n_b)."""

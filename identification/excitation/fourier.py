@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike
 from identification.options import write_text
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.robot.models.files import models_directory
+from pfsc_drake.yaml.fields import REQUIRED
 from pfsc_drake.yaml.reading import dump_yaml
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.typed import load_file
 
 # of a number of samples from being an integer
 _ROUNDING = 1e-6

@@ -6,6 +6,7 @@ as their convex hulls.
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydrake.geometry import (
@@ -32,7 +33,9 @@ from pfsc_drake.robot.models.reading import read_model
 from pfsc_drake.robot.models.visuals import Shape, check_shape
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.rules import Count, NotNegative, Parameters
+from pfsc_drake.yaml.typed import load_file
 
 
 @dataclass
@@ -50,7 +53,7 @@ class Obstacle(Shape):
 
 
 @dataclass
-class Cell:
+class Cell(Parameters):
     """What a motion must keep clear of.
 
     Attributes:
@@ -65,20 +68,18 @@ class Cell:
 
     obstacles: list[Obstacle] = field(default_factory=list)
     tool_above: float = -np.inf
-    clearance: float = 0.02
+    clearance: NotNegative = 0.02
     self_collision: bool = True
-    joined: list[list[str]] = field(default_factory=list)
+    joined: list[Annotated[list[str], Count(2, 2, words="pairs of names of links")]] = field(
+        default_factory=list
+    )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for i, obstacle in enumerate(self.obstacles):
             check_shape(f"obstacles[{i}]", obstacle)
         if np.isnan(self.tool_above) or self.tool_above == np.inf:
             raise InputError(f"tool_above = {self.tool_above}; must be a number [m]")
-        for pair in self.joined:
-            if len(pair) != 2:
-                raise InputError(f"joined: {pair}; must be pairs of names of links")
-        if not 0.0 <= self.clearance < np.inf:
-            raise InputError(f"clearance = {self.clearance}; must be zero or positive [m]")
 
 
 def load_cell(cell: str | Path | None, robot: str | Path) -> Cell:

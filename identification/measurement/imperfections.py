@@ -9,7 +9,8 @@ from scipy.signal import lfilter
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import FrictionDrift
 from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.typed import load_file
 
 
 @dataclass

@@ -1,6 +1,7 @@
 """What a robot's driver makes of commands: age, mode, rate of torques, low pass."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -8,10 +9,11 @@ from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.driver import low_pass_share, torque_rates
+from pfsc_drake.yaml.rules import Parameters, Range
 
 
 @dataclass(frozen=True)
-class DriverOptions:
+class DriverOptions(Parameters):
     """How a driver treats commands, as drake-franka-driver does unless it is told otherwise.
 
     Attributes:
@@ -24,13 +26,13 @@ class DriverOptions:
 
     expiry: float = 0.1
     low_pass: float = 30.0
-    torque_rate: float = 1000.0
+    torque_rate: Annotated[float, Range(0.001, 1000000000.0, "Nm/s")] = 1000.0
     damping: float = 10.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         require_between("--expire", self.expiry, 1e-3, 60.0, "s")
         require_between("--low-pass", self.low_pass, 0.0, 1e5, "Hz")
-        require_between("torque_rate", self.torque_rate, 1e-3, 1e9, "Nm/s")
         require_between("--damping", self.damping, 0.0, 1e4, "1/s")
 
 

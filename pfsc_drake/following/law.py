@@ -31,7 +31,7 @@ from pfsc_drake.following.options.controller import ControllerParameters, GainPa
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.posture import make_posture
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 _DIGITS = 3
 

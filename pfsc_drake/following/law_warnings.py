@@ -22,7 +22,7 @@ from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.robot_model import RobotModel, joint_resonances
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 # relative, of masses and of stiffnesses, which gains should bear
 _BORNE_ERROR = 0.05

@@ -21,7 +21,7 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.swivel import swivel_angle, upward_direction
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 _KEY = "controller.posture"
 # of the largest speed of a joint, what a posture may make of it together with the outputs

@@ -1,13 +1,13 @@
 """A channel between two places: what is told arrives later, unevenly, or not at all."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.errors import require
+from pfsc_drake.yaml.rules import Parameters, Range, Seed
 
 # ticks after which the draws of delays and losses begin again
 _DRAWN = 8192
@@ -15,7 +15,7 @@ _LONGEST, _MOST_LOST = 2.0, 0.9
 
 
 @dataclass
-class ChannelParameters:
+class ChannelParameters(Parameters):
     """What a channel does to messages, one way; in whole ticks, one at least.
 
     Attributes:
@@ -26,17 +26,10 @@ class ChannelParameters:
         seed: Another one draws others.
     """
 
-    delay: float = 0.1
-    jitter: float = 0.0
-    loss: float = 0.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for key in ("delay", "jitter"):
-            value = getattr(self, key)
-            require(0.0 <= value <= _LONGEST, key, value, f"0 to {_LONGEST:g} s")
-        require(0.0 <= self.loss <= _MOST_LOST, "loss", self.loss, f"0 to {_MOST_LOST:g}")
-        require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")
+    delay: Annotated[float, Range(0.0, _LONGEST, "s")] = 0.1
+    jitter: Annotated[float, Range(0.0, _LONGEST, "s")] = 0.0
+    loss: Annotated[float, Range(0.0, _MOST_LOST)] = 0.0
+    seed: Seed = 0
 
 
 def message_ages(parameters: ChannelParameters, period: float) -> np.ndarray:

@@ -1,7 +1,7 @@
 """A six-axis force/torque sensor in a fixed joint between flange and tool, and how it fails."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -13,14 +13,15 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad, predicted_load
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import Numbers, Parameters, Range, Seed
 
 # ticks whose noise is known at once
 NOISE_TICKS = 128
 
 
 @dataclass
-class ForceTorqueParameters:
+class ForceTorqueParameters(Parameters):
     """Properties of a sensor; the first three entries are forces [N], the others torques [Nm].
 
     In YAML two numbers stand for equal forces and equal torques, one for six equal entries. The
@@ -35,22 +36,17 @@ class ForceTorqueParameters:
         seed: Seed of the noise.
     """
 
-    measurement_range: np.ndarray = field(
+    measurement_range: Annotated[np.ndarray, Numbers(6, Range(0.0, open=True))] = field(
         default_factory=lambda: np.repeat([500.0, 20.0], 3), metadata=equal(6, parts=2)
     )
-    bias: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=equal(6, parts=2))
-    noise: np.ndarray = field(
+    bias: Annotated[np.ndarray, Numbers(6)] = field(
+        default_factory=lambda: np.zeros(6), metadata=equal(6, parts=2)
+    )
+    noise: Annotated[np.ndarray, Numbers(6, Range(0.0))] = field(
         default_factory=lambda: np.repeat([0.1, 0.004], 3), metadata=equal(6, parts=2)
     )
     bandwidth: float = 200.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        _check("measurement_range", self.measurement_range, positive=True)
-        _check("bias", np.abs(self.bias), positive=False)
-        _check("noise", self.noise, positive=False)
-        if self.seed < 0:
-            raise InputError(f"seed = {self.seed}: must be zero or positive")
+    seed: Seed = 0
 
 
 class ForceTorqueSensor(Block):
@@ -134,14 +130,6 @@ def noise_at(noise: Any | None, size: int, t: Any) -> Any:
     if noise is None:
         return 0.0
     return ca.reshape(noise, size, NOISE_TICKS)[:, ca.fmod(t, NOISE_TICKS)]
-
-
-def _check(key: str, value: np.ndarray, *, positive: bool) -> None:
-    value = np.asarray(value, dtype=float)
-    fits = value.shape == (6,) and np.all(np.isfinite(value))
-    if not (fits and np.all(value > 0.0 if positive else value >= 0.0)):
-        allowed = "positive" if positive else "finite, not negative"
-        raise InputError(f"{key} = {value.tolist()}: must be 6 {allowed} numbers")
 
 
 FailureKind = Literal["nan", "frozen", "jump"]

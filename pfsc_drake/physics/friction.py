@@ -9,6 +9,7 @@ import numpy as np
 from pfsc_drake.checks import checked_vector
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,7 @@ class BristleFriction:
 
 
 @dataclass
-class FrictionDrift:
+class FrictionDrift(Parameters):
     """Friction that changes during a run, as that of a gear that becomes warm, evenly.
 
     Attributes:
@@ -147,13 +148,12 @@ class FrictionDrift:
         InputError: If a number is out of range.
     """
 
-    factor: float = 1.0
-    begin: float = 0.0
+    factor: Positive = 1.0
+    begin: NotNegative = 0.0
     end: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.factor < np.inf:
-            raise InputError(f"factor = {self.factor}; must be positive and finite")
+        super().__post_init__()
         if not 0.0 <= self.begin < self.end < np.inf:
             raise InputError(
                 f"begin = {self.begin} s, end = {self.end} s; must be 0 <= begin < end, finite"

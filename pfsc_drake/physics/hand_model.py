@@ -1,17 +1,18 @@
 """A human hand on the tool: a spring-damper towards a moving target that wanders."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.blocks.rotations import rotation_vector
-from pfsc_drake.errors import InputError, require, suggestion
+from pfsc_drake.errors import require
 from pfsc_drake.physics.hand_way import HandWay, OrientationTarget, Place
 from pfsc_drake.physics.scripted_force import FRAMES, smooth_step
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import Numbers, OneOf, Parameters, Range, Seed
 
 
 @dataclass
@@ -67,7 +68,7 @@ _TREMOR_LINES = 16
 
 
 @dataclass
-class HandWaypoint:
+class HandWaypoint(Parameters):
     """Where the hand wants the tool point to be, and how turned.
 
     Attributes:
@@ -78,27 +79,25 @@ class HandWaypoint:
     """
 
     time: float = 0.0
-    position: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    position: Annotated[np.ndarray, Numbers(3, Range(-_FARTHEST, _FARTHEST, "m"))] = field(
+        default_factory=lambda: np.zeros(3)
+    )
+    zyx_deg: Annotated[
+        np.ndarray, Numbers(3, Range(-_LARGEST_ANGLE, _LARGEST_ANGLE, "deg"), empty=True)
+    ] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.position = np.asarray(self.position, dtype=float)
         self.zyx_deg = np.asarray(self.zyx_deg, dtype=float)
-        if self.position.shape != (3,) or not np.all(np.abs(self.position) <= _FARTHEST):
-            raise InputError(
-                f"position = {self.position.tolist()}: must be 3 finite numbers of at most "
-                f"{_FARTHEST:g} m"
-            )
-        good = self.zyx_deg.shape == (3,) and bool(np.all(np.abs(self.zyx_deg) <= _LARGEST_ANGLE))
-        if not (good or self.zyx_deg.shape == (0,)):
-            raise InputError(
-                f"zyx_deg = {self.zyx_deg.tolist()}: must be empty or 3 finite numbers of at most "
-                f"{_LARGEST_ANGLE:g} deg"
-            )
+
+
+_Strength = Annotated[float, Range(0.0, _LARGEST, open=True)]
+_Weak = Annotated[float, Range(0.0, _LARGEST)]
 
 
 @dataclass
-class HandParameters:
+class HandParameters(Parameters):
     """Properties of a hand; stiffness and damping are of the order of a relaxed human arm's.
 
     Attributes:
@@ -125,33 +124,24 @@ class HandParameters:
     """
 
     waypoints: list[HandWaypoint] = field(default_factory=lambda: [HandWaypoint()])
-    frame: str = "world"
-    stiffness: float = 300.0
-    damping: float = 30.0
-    rotational_stiffness: float = 0.0
-    rotational_damping: float = 0.0
-    force_limit: float = 45.0
-    torque_limit: float = 3.0
-    reaction_delay: float = 0.0
-    tremor: float = 0.0
+    frame: Annotated[str, OneOf(FRAMES)] = "world"
+    stiffness: _Strength = 300.0
+    damping: _Weak = 30.0
+    rotational_stiffness: _Weak = 0.0
+    rotational_damping: _Weak = 0.0
+    force_limit: _Strength = 45.0
+    torque_limit: _Strength = 3.0
+    reaction_delay: _Weak = 0.0
+    tremor: _Weak = 0.0
     tremor_band: np.ndarray = field(default_factory=lambda: np.array([8.0, 12.0]))
-    grip_ramp: float = 0.2
+    grip_ramp: _Strength = 0.2
     release: float = np.inf
-    seed: int = 0
+    seed: Seed = 0
     source: str = "assumed"
     wander: Wander | None = None
 
     def __post_init__(self) -> None:
-        for key in ("stiffness", "force_limit", "torque_limit", "grip_ramp"):
-            value, allowed = getattr(self, key), f"positive, at most {_LARGEST:g}"
-            require(0.0 < value <= _LARGEST, key, value, allowed)
-        weak = ("damping", "rotational_stiffness", "rotational_damping", "reaction_delay", "tremor")
-        for key in weak:
-            value, allowed = getattr(self, key), f"zero or positive, at most {_LARGEST:g}"
-            require(0.0 <= value <= _LARGEST, key, value, allowed)
-        require(self.seed >= 0, "seed", self.seed, "zero or positive")
-        allowed = f"one of {', '.join(FRAMES)}{suggestion(self.frame, FRAMES)}"
-        require(self.frame in FRAMES, "frame", self.frame, allowed)
+        super().__post_init__()
         band = np.asarray(self.tremor_band, dtype=float)
         fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)
         require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")

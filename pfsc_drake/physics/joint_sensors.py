@@ -1,22 +1,22 @@
 """Sensors of joints: position encoders, and torque sensors of elastic joints."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.checks import require_between, require_not_negative
-from pfsc_drake.errors import InputError, require_one_of
+from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS, noise_at
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.yaml.typed import ONE_OR_MANY
+from pfsc_drake.yaml.fields import ONE_OR_MANY
+from pfsc_drake.yaml.rules import NotNegative, OneOf, Parameters, Range
 
 
 @dataclass
-class TorqueSensorOptions:
+class TorqueSensorOptions(Parameters):
     """What joint torque sensors do to the true torques.
 
     Attributes:
@@ -26,13 +26,9 @@ class TorqueSensorOptions:
         seed: Seed of the noise.
     """
 
-    scale: float = 0.0
-    noise: float = 0.0
+    scale: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    noise: NotNegative = 0.0
     seed: int = 0
-
-    def __post_init__(self) -> None:
-        require_between("scale", self.scale, -0.5, 0.5, "")
-        require_not_negative("noise", self.noise)
 
 
 class JointTorqueSensor(Block):
@@ -73,7 +69,7 @@ SIDES = ("both", "motor", "motor_and_torque")
 
 
 @dataclass
-class EncoderOptions:
+class EncoderOptions(Parameters):
     """What the encoders do to the true joint state.
 
     Increments are counted on the joint side: per revolution of a revolute joint, per metre
@@ -96,11 +92,8 @@ class EncoderOptions:
     motor_increments: list[float] = field(default_factory=list, metadata=ONE_OR_MANY)
     difference_quotient: bool = False
     filter_time: float = 0.0
-    sides: str = "both"
+    sides: Annotated[str, OneOf(SIDES)] = "both"
     torque: TorqueSensorOptions = field(default_factory=TorqueSensorOptions)
-
-    def __post_init__(self) -> None:
-        require_one_of("sides", self.sides, SIDES)
 
 
 class JointEncoders(Block):

@@ -1,6 +1,5 @@
 """A hand-held device that leads a robot elsewhere: its handle, motors and encoders."""
 
-import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,11 +8,11 @@ import casadi as ca
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.blocks.rotations import matrix_of, rotation_of, rotation_vector, rows_of
-from pfsc_drake.errors import require, require_positive
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 
 @dataclass
-class WristParameters:
+class WristParameters(Parameters):
     """How the handle of a device with six axes turns.
 
     Attributes:
@@ -25,23 +24,16 @@ class WristParameters:
         largest_speed: Fastest that a hand turns it [rad/s].
     """
 
-    inertia: float = 0.004
-    damping: float = 0.005
-    friction: float = 0.01
-    resolution: float = 1e-4
-    torque_limit: float = 3.0
-    largest_speed: float = 6.0
-
-    def __post_init__(self) -> None:
-        for key in ("inertia", "torque_limit", "largest_speed"):
-            require_positive(key, getattr(self, key))
-        for key in ("damping", "friction", "resolution"):
-            value = getattr(self, key)
-            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
+    inertia: Positive = 0.004
+    damping: NotNegative = 0.005
+    friction: NotNegative = 0.01
+    resolution: NotNegative = 1e-4
+    torque_limit: Positive = 3.0
+    largest_speed: Positive = 6.0
 
 
 @dataclass
-class LeaderParameters:
+class LeaderParameters(Parameters):
     """A hand-held device, with three axes or six.
 
     Attributes:
@@ -54,20 +46,13 @@ class LeaderParameters:
         wrist: How it turns, where it has six axes.
     """
 
-    mass: float = 0.35
-    damping: float = 0.5
-    friction: float = 0.3
-    resolution: float = 1e-5
-    force_limit: float = 30.0
-    largest_speed: float = 2.0
+    mass: Positive = 0.35
+    damping: NotNegative = 0.5
+    friction: NotNegative = 0.3
+    resolution: NotNegative = 1e-5
+    force_limit: Positive = 30.0
+    largest_speed: Positive = 2.0
     wrist: WristParameters = field(default_factory=WristParameters)
-
-    def __post_init__(self) -> None:
-        for key in ("mass", "force_limit", "largest_speed"):
-            require_positive(key, getattr(self, key))
-        for key in ("damping", "friction", "resolution"):
-            value = getattr(self, key)
-            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
 
 
 class LeaderDevice(Block):

@@ -11,12 +11,12 @@ from pfsc_drake import jets
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, all_of, any_of, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
 from pfsc_drake.physics.scripted_force import require_vector
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.newton_euler import points_on_links
 from pfsc_drake.robot.tool_load import joint_torque_function
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 # index of a link, and where on it [m], shape (3,)
 Points = Sequence[tuple[int, np.ndarray]]
@@ -104,7 +104,7 @@ def link_torque_function(chain: SerialChain, points: Points) -> ca.Function:
 
 
 @dataclass
-class LinkHandParameters:
+class LinkHandParameters(Parameters):
     """Properties of a hand on a link; stiffness and damping as of a relaxed human arm's.
 
     It pulls a point of the link by a spring and a damper, with a limited force, towards where
@@ -127,9 +127,9 @@ class LinkHandParameters:
     link: str = ""
     point: np.ndarray = field(default_factory=lambda: np.zeros(3))
     way: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    begin: float = 0.0
-    duration: float = 1.0
-    hold: float = 0.0
+    begin: NotNegative = 0.0
+    duration: Positive = 1.0
+    hold: NotNegative = 0.0
     comes_back: bool = False
     stiffness: float = 300.0
     damping: float = 30.0
@@ -137,13 +137,9 @@ class LinkHandParameters:
     grip_ramp: float = 0.2
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.point = require_vector("point", self.point)
         self.way = require_vector("way", self.way)
-        for key, at_least in (("begin", "zero"), ("hold", "zero"), ("duration", None)):
-            value = getattr(self, key)
-            if not (0.0 <= value < np.inf and (at_least or value > 0.0)):
-                allowed = "finite, zero or positive" if at_least else "finite and positive"
-                raise InputError(f"{key} = {value}: must be {allowed}")
         self.hand()
 
     def hand(self) -> HandParameters:

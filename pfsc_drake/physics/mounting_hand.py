@@ -14,12 +14,13 @@ from pfsc_drake.errors import require
 from pfsc_drake.physics.hand_model import HandParameters, limited, orientation
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.operator_hand import OperatorHand
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive, Seed
 
 TASKS = ("mount", "return")
 
 
 @dataclass
-class MountingHandParameters:
+class MountingHandParameters(Parameters):
     """How an operator mounts a plate.
 
     Forces by which things are brought into place come from what is seen and felt: the operator
@@ -57,47 +58,34 @@ class MountingHandParameters:
     """
 
     task: str = "mount"
-    press: float = 35.0
-    reach: float = 0.13
-    insert: float = 9.0
-    leave: float = 25.0
-    leave_distance: float = 0.015
-    hover: float = 2e-3
-    eye_error: float = 5e-4
-    eye_angle: float = 2e-3
-    eye_gap: float = 5e-4
-    stiffness: float = 2000.0
-    persistence: float = 4000.0
-    side_limit: float = 15.0
-    turning_stiffness: float = 100.0
-    turning_persistence: float = 40.0
-    turning_limit: float = 1.5
-    search_radius: float = 1.5e-3
-    search_time: float = 4.0
-    search_period: float = 1.5
-    captured: float = 4e-3
-    relaxation: float = 1.0
-    wobble: float = 1.0
-    patience: float = 0.5
-    look_time: float = 5.0
-    seed: int = 0
+    press: Positive = 35.0
+    reach: Positive = 0.13
+    insert: Positive = 9.0
+    leave: Positive = 25.0
+    leave_distance: Positive = 0.015
+    hover: Positive = 2e-3
+    eye_error: NotNegative = 5e-4
+    eye_angle: NotNegative = 2e-3
+    eye_gap: Positive = 5e-4
+    stiffness: NotNegative = 2000.0
+    persistence: NotNegative = 4000.0
+    side_limit: Positive = 15.0
+    turning_stiffness: NotNegative = 100.0
+    turning_persistence: NotNegative = 40.0
+    turning_limit: Positive = 1.5
+    search_radius: NotNegative = 1.5e-3
+    search_time: Positive = 4.0
+    search_period: Positive = 1.5
+    captured: Positive = 4e-3
+    relaxation: Positive = 1.0
+    wobble: NotNegative = 1.0
+    patience: Positive = 0.5
+    look_time: Positive = 5.0
+    seed: Seed = 0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         require(self.task in TASKS, "task", self.task, " or ".join(TASKS))
-        for key in (
-            "press", "reach", "insert", "leave", "leave_distance", "hover", "eye_gap", "side_limit",
-            "turning_limit", "search_time", "search_period", "captured", "relaxation",
-            "patience", "look_time",
-        ):  # fmt: skip
-            value = getattr(self, key)
-            require(0.0 < value < np.inf, key, value, "a positive number")
-        for key in (
-            "eye_error", "eye_angle", "stiffness", "persistence", "turning_stiffness",
-            "turning_persistence", "search_radius", "wobble",
-        ):  # fmt: skip
-            value = getattr(self, key)
-            require(0.0 <= value < np.inf, key, value, "zero or a positive number")
-        require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")
 
 
 _LARGEST_ERROR = 2.0  # standard deviations of what the eye errs by

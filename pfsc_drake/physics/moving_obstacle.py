@@ -3,7 +3,7 @@
 import dataclasses as dc
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
@@ -11,10 +11,11 @@ from scipy.interpolate import PchipInterpolator
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.checks import require, require_not_negative, require_numbers, require_positive
+from pfsc_drake.checks import require
 from pfsc_drake.control.obstacles.shapes import Capsule, ObstacleShape
 from pfsc_drake.geometry.curves.polynomial import PieceTable
 from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS, noise_at
+from pfsc_drake.yaml.rules import NotNegative, Numbers, Parameters, Positive, Range, Seed
 
 # of its standard deviation, beyond which noise is cut
 NOISE_CUT = 3.0
@@ -23,7 +24,7 @@ _JERK = 1e-6  # m/s, change of velocity at once
 
 
 @dc.dataclass
-class Stride:
+class Stride(Parameters):
     """A place on the way of an obstacle.
 
     Attributes:
@@ -31,18 +32,17 @@ class Stride:
         position: Where [m], shape (3,).
     """
 
-    time: float = 0.0
-    position: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    time: Annotated[float, Range()] = 0.0
+    position: Annotated[list[float], Numbers(3)] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def __post_init__(self) -> None:
-        require(math.isfinite(self.time), "time", self.time, "a finite number")
-        require_numbers("position", self.position, 3)
+        super().__post_init__()
         near = max(map(abs, self.position)) <= _FARTHEST
         require(near, "position", self.position, f"3 numbers of at most {_FARTHEST:g} m")
 
 
 @dc.dataclass
-class ObstaclePart:
+class ObstaclePart(Parameters):
     """A capsule, or a sphere where both ends are the same.
 
     Attributes:
@@ -51,13 +51,12 @@ class ObstaclePart:
         radius: [m].
     """
 
-    start: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    end: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    start: Annotated[list[float], Numbers(3)] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    end: Annotated[list[float], Numbers(3)] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     radius: float = 0.1
 
     def __post_init__(self) -> None:
-        for key in ("start", "end"):
-            require_numbers(key, getattr(self, key), 3)
+        super().__post_init__()
         self.capsule  # noqa: B018, which checks
 
     @property
@@ -178,7 +177,7 @@ class _Way:
 
 
 @dc.dataclass
-class ObstacleSensorParameters:
+class ObstacleSensorParameters(Parameters):
     """What a sensor makes of where obstacles are.
 
     Attributes:
@@ -189,17 +188,11 @@ class ObstacleSensorParameters:
         seed: Seed of the noise.
     """
 
-    position_noise: float = 0.008
-    velocity_noise: float = 0.05
-    period: float = 0.02
-    delay: float = 0.06
-    seed: int = 1
-
-    def __post_init__(self) -> None:
-        for key in ("position_noise", "velocity_noise", "delay"):
-            require_not_negative(key, getattr(self, key))
-        require_positive("period", self.period)
-        require(self.seed >= 0, "seed", self.seed, "zero or a positive number")
+    position_noise: NotNegative = 0.008
+    velocity_noise: NotNegative = 0.05
+    period: Positive = 0.02
+    delay: NotNegative = 0.06
+    seed: Seed = 1
 
     def deviation(self, count: int) -> np.ndarray:
         """Return the standard deviation of what is told of so many obstacles, shape (6 count,)."""

@@ -2,14 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
-from pfsc_drake.errors import InputError, require
+from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import (
     HandModel,
     HandParameters,
@@ -19,6 +19,7 @@ from pfsc_drake.physics.hand_model import (
 )
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
+from pfsc_drake.yaml.rules import Parameters, Range
 
 MAX_PERIODS = 10_000  # in a reaction delay; every wrench of it is moved at every tick
 
@@ -105,7 +106,7 @@ ASKED = 7
 
 
 @dataclass
-class LiveHandParameters:
+class LiveHandParameters(Parameters):
     """Properties of a hand whose owner decides, at every instant, what it does.
 
     Attributes:
@@ -118,22 +119,12 @@ class LiveHandParameters:
             do [s].
     """
 
-    stiffness: float = 400.0
-    damping: float = 30.0
-    rotational_damping: float = 0.3
-    force_limit: float = 45.0
-    torque_limit: float = 3.0
-    response_time: float = 0.05
-
-    def __post_init__(self) -> None:
-        for key in ("stiffness", "force_limit", "torque_limit"):
-            value = getattr(self, key)
-            require(0.0 < value <= _LARGEST, key, value, f"positive, at most {_LARGEST:g}")
-        for key in ("damping", "rotational_damping"):
-            value = getattr(self, key)
-            require(0.0 <= value <= _LARGEST, key, value, f"zero or positive, at most {_LARGEST:g}")
-        time = self.response_time
-        require(0.0 < time <= _SLOWEST, "response_time", time, f"positive, at most {_SLOWEST:g} s")
+    stiffness: Annotated[float, Range(0.0, _LARGEST, open=True)] = 400.0
+    damping: Annotated[float, Range(0.0, _LARGEST)] = 30.0
+    rotational_damping: Annotated[float, Range(0.0, _LARGEST)] = 0.3
+    force_limit: Annotated[float, Range(0.0, _LARGEST, open=True)] = 45.0
+    torque_limit: Annotated[float, Range(0.0, _LARGEST, open=True)] = 3.0
+    response_time: Annotated[float, Range(0.0, _SLOWEST, "s", open=True)] = 0.05
 
 
 class LiveHand(Block):

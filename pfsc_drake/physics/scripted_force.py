@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
@@ -12,8 +12,9 @@ from pfsc_drake.blocks.cases import all_finite, all_of, where
 from pfsc_drake.control.law.actuation import joint_jets
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.path import PathManifold, path_coordinates
-from pfsc_drake.errors import InputError, suggestion
+from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.yaml.rules import OneOf, Parameters
 
 FRAMES = ("world", "manifold")
 
@@ -52,7 +53,7 @@ def require_vector(key: str, value: np.ndarray) -> np.ndarray:
 
 
 @dataclass
-class ForcePulse:
+class ForcePulse(Parameters):
     """A wrench on the robot that comes, stays and goes, smoothly (C^2 in time).
 
     Attributes:
@@ -73,11 +74,12 @@ class ForcePulse:
     force: np.ndarray = field(default_factory=lambda: np.zeros(3))
     torque: np.ndarray = field(default_factory=lambda: np.zeros(3))
     ramp: float = 0.05
-    frame: str = "world"
+    frame: Annotated[str, OneOf(FRAMES)] = "world"
     link: str = ""
     point: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for key in ("force", "torque", "point"):
             setattr(self, key, require_vector(key, getattr(self, key)))
         if not self.link and self.point.any():
@@ -89,9 +91,6 @@ class ForcePulse:
             raise InputError(
                 f"ramp = {self.ramp}: must be positive and at most {longest:g}, half the pulse"
             )
-        if self.frame not in FRAMES:
-            allowed = f"{', '.join(FRAMES)}{suggestion(self.frame, FRAMES)}"
-            raise InputError(f"frame = {self.frame!r}: must be one of {allowed}")
 
     def at(self, time: Any) -> Any:
         """Return ``[force, torque]`` in the pulse's own frame, shape (6,) [N, Nm].

@@ -1,20 +1,20 @@
 """Suction cups: rubber that holds a plate while there is a vacuum."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.rules import Count, NotNegative, Numbers, Parameters, Positive
 
 FREE = -1.0  # index of the plate of a cup that holds none
 _DEEPEST = 0.02  # m, below which a rim is not in the face of a plate, but somewhere else
 
 
 @dataclass
-class SuctionParameters:
+class SuctionParameters(Parameters):
     """Properties of a gripper's cups; of the order of bellows of 30 mm at 0.6 bar.
 
     Attributes:
@@ -26,25 +26,16 @@ class SuctionParameters:
         shear: Force along the plate at which a cup slips [N].
     """
 
-    cups: list[list[float]] = field(
+    cups: Annotated[
+        list[Annotated[list[float], Numbers(2)]], Count(3, words="three or more [x, y] in m")
+    ] = field(
         default_factory=lambda: [[0.07, 0.045], [0.07, -0.045], [-0.07, 0.045], [-0.07, -0.045]]
     )
-    stiffness: float = 1e4
-    damping: float = 40.0
-    press: float = 2e-4
-    pull_off: float = 40.0
-    shear: float = 25.0
-
-    def __post_init__(self) -> None:
-        for key in ("stiffness", "press", "pull_off", "shear"):
-            value = getattr(self, key)
-            if not 0.0 < value < np.inf:
-                raise InputError(f"{key} = {value}; allowed: a positive number")
-        if not 0.0 <= self.damping < np.inf:
-            raise InputError(f"damping = {self.damping}; allowed: zero or a positive number")
-        table = [len(cup) == 2 and bool(np.isfinite(cup).all()) for cup in self.cups]
-        if len(table) < 3 or not all(table):
-            raise InputError(f"cups = {self.cups}; allowed: three or more [x, y] in m")
+    stiffness: Positive = 1e4
+    damping: NotNegative = 40.0
+    press: Positive = 2e-4
+    pull_off: Positive = 40.0
+    shear: Positive = 25.0
 
 
 def free_cups(count: int) -> np.ndarray:

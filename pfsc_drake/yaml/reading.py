@@ -16,7 +16,6 @@ from typing import Any, NoReturn
 
 import yaml
 
-from pfsc_drake.checks import FILE as FILE
 from pfsc_drake.errors import InputError, nearest_file, shortened
 
 MAX_BYTES = 1_000_000  # of a YAML file
@@ -70,11 +69,6 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
         return content.decode("utf-8")
     except UnicodeDecodeError:
         raise InputError(f"{path}: cannot be read: not UTF-8 text") from None
-
-
-# metadata of text, or of a mapping to text, that is a name of something known unless it has a
-# suffix
-NAME_OR_FILE = {"file": False}
 
 
 def resolve_files(value: Any, folder: Path) -> None:

@@ -1,57 +1,51 @@
-"""Typed YAML: files and data into dataclasses, with errors a person can act on.
+"""Typed YAML: files and data into dataclasses, with errors a person can act on, and back.
 
-Drake's ``yaml_load_typed`` does the loading. Its messages name neither file nor key path, so the
-schema is walked first (:mod:`~pfsc_drake.yaml.schema_check`) and the loaded object is validated
-after.
-``pydrake`` is imported only when something is loaded.
+The format is that of Drake's ``yaml_load_typed``, whose messages name neither file nor key: what a
+file does not say keeps its default, in blocks within blocks, too; a tag chooses a member of a
+union; text that is a number is one. Beyond it a single number or a word may stand for a list
+(:mod:`pfsc_drake.yaml.fields`), and NaN is none.
 """
 
+import collections.abc
 import dataclasses
 import re
+import sys
 import types
 import typing
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from pfsc_drake.errors import InputError, gathered_refusals, in_one_line
-from pfsc_drake.yaml.bounds import out_of_bounds
-from pfsc_drake.yaml.broadcast import (
-    AUTO_OR_MANY,
-    NUMBERS_OR_END,
-    ONE_FOR_ALL,
-    ONE_OR_MANY,
-    OneForAll,
-    as_lists,
-    equal,
-    mark_singles,
-    spread,
-)
+from pfsc_drake.checks import NUMBER, is_number
+from pfsc_drake.errors import InputError, did_you_mean, gathered_refusals, in_one_line, shortened
+from pfsc_drake.yaml.fields import Field, OneForAll, fields_of
 from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml, read_yaml
-from pfsc_drake.yaml.schema_check import REQUIRED, Misfit, Place, find_misfits, spelled
-
-__all__ = [
-    "AUTO_OR_MANY",
-    "NUMBERS_OR_END",
-    "ONE_FOR_ALL",
-    "ONE_OR_MANY",
-    "REQUIRED",
-    "equal",
-    "load_file",
-    "load_typed",
-    "spread",
-]
+from pfsc_drake.yaml.rules import check_value
 
 Schema = TypeVar("Schema")
+Place = tuple[Any, ...]  # keys and indices, e.g. ("controller", "gains", "eta", 1)
 
+_MOST_MISFITS = 50  # of one file
+_INTEGER = re.compile(r"[-+]?[0-9]{1,19}")
+_LONG_INTEGER = re.compile(r"[-+]?[0-9]+")
+_MAX_INTEGER = 2**63 - 1
+_SCALARS: dict[Any, str] = {
+    bool: "true or false",
+    int: "an integer",
+    float: "a number",
+    str: "text",
+    Path: "a path (text)",
+}
+# of calculations with numbers that are out of bounds
 _CONSEQUENCES = (ArithmeticError, ValueError, MemoryError)
+# in place of a value that is refused
+_REFUSED: Any = object()
 
 
 def load_file(schema_class: type[Schema], path: str | Path) -> Schema:
-    """Loads a YAML file into a schema of mutable dataclasses; see :func:`load_typed`.
+    """Loads a YAML file into a schema of dataclasses; see :func:`load_typed`.
 
     Raises:
         InputError: if the file cannot be read (:func:`pfsc_drake.yaml.reading.read_yaml`) or does
@@ -61,20 +55,17 @@ def load_file(schema_class: type[Schema], path: str | Path) -> Schema:
 
 
 def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) -> Schema:
-    """Loads data into a schema of mutable dataclasses.
+    """Loads data into a schema of dataclasses.
 
     Fields may be bool, int, float, str, Path, numpy array, list, ``dict[str, T]``, Optional, nested
     dataclasses and unions of dataclasses (chosen by a YAML tag, the first member without one; none
-    a subclass of another).
-    ``__post_init__`` runs once on the defaults and again on the loaded values, innermost first;
-    there it checks what types cannot express by raising InputError.
+    a subclass of another). A dataclass is made, innermost first, once all that is in it fits; its
+    ``__post_init__`` checks it by raising InputError.
 
     Args:
-        schema_class: Dataclass. Every field has a default, because Drake builds a schema without
-            arguments before it fills it in; a key that may not be left out is declared as
-            ``field(default=..., metadata=REQUIRED)`` with a placeholder that
-            ``__post_init__`` accepts.
-        data: As :func:`pfsc_drake.yaml.reading.read_yaml` returns it.
+        schema_class: Dataclass. A key that may not be left out has no default, or is declared as
+            ``field(default=..., metadata=REQUIRED)``.
+        data: As :func:`pfsc_drake.yaml.reading.read_yaml` returns it; it stays as it is.
         source: Name of the file, for messages.
 
     Returns:
@@ -82,104 +73,335 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
 
     Raises:
         InputError: One line that names source, and of everything that is wrong key path, value and
-            what is allowed. Where something does not fit the schema, the rest is checked without
-            it, but for what contains it.
+            what is allowed. What contains something wrong is not judged itself, but for the rules
+            of its other fields.
     """
-    singles: list[Place] = []
-    data = as_lists(schema_class, data, (), singles)
-    misfits = find_misfits(schema_class, data)
-    if misfits:
-        messages = [misfit.message for misfit in misfits]
-        messages += _further_refusals(schema_class, data, misfits)
-        raise InputError(f"{source}: {in_one_line(messages)}")
-    result = _load(schema_class, data, source)
-    mark_singles(result, singles)
-    refusals = _refusals(result, (), [])
-    if refusals:
-        raise InputError(f"{source}: {in_one_line(refusals)}")
+    reader = _Reader()
+    result = reader.block(schema_class, data, (), None)
+    problems = reader.misfits + reader.refusals
+    if problems:
+        raise InputError(f"{source}: {in_one_line(problems)}")
     return result
 
 
-def _load(schema_class: type[Schema], data: dict[str, Any], source: str) -> Schema:
-    """Returns what Drake makes of data that fit."""
-    from pydrake.common.yaml import yaml_load_typed
+class _Reader:
+    """The walk along a schema: makes values, or notes what is wrong and returns _REFUSED.
 
-    try:
-        return yaml_load_typed(schema=schema_class, data=dump_yaml(data))
-    except NotImplementedError:  # a schema that Drake cannot load is a fault of the program
-        raise
-    except (RuntimeError, ValueError) as error:
-        raise InputError(f"{source}: {' '.join(str(error).split())}") from None
-
-
-def _further_refusals(
-    schema_class: type, data: dict[str, Any], misfits: Sequence[Misfit]
-) -> list[str]:
-    """Returns what is wrong beside what does not fit the schema."""
-    if not all(misfit.place for misfit in misfits):
-        return []
-    rest = data
-    for misfit in misfits:
-        rest = _without(rest, misfit.place)
-    try:
-        result: Any = _load(schema_class, rest, "")
-    except (InputError, TypeError):  # e.g. there is no default for a key that is missing
-        return []
-    return _refusals(result, (), [misfit.place[:-1] for misfit in misfits])
-
-
-def _without(data: dict[str, Any], place: Place) -> dict[str, Any]:
-    """Returns data without one key, or of a list in it without the key that the list is under."""
-    key, *way = place
-    if key not in data:
-        return data
-    item, rest = data[key], {name: value for name, value in data.items() if name != key}
-    return {**rest, key: _without(item, tuple(way))} if way and isinstance(item, dict) else rest
-
-
-def _refusals(value: Any, place: Place, spoiled: Sequence[Place]) -> list[str]:
-    """Runs ``__post_init__`` of every dataclass in the loaded object, innermost first.
-
-    Args:
-        value: The loaded object, or a part of it.
-        place: Where it is.
-        spoiled: Places of what is not whole; what contains these, or something that is refused, is
-            not judged.
-
-    Returns:
-        What is refused, one message each.
+    Attributes:
+        misfits: What does not fit the schema, in the order of the file.
+        refusals: Values that fit and are refused.
     """
-    found: list[str] = []
-    if isinstance(value, (dict, list)):
-        items = value.items() if isinstance(value, dict) else enumerate(value)
-        for name, item in items:
-            found += _refusals(item, (*place, name), spoiled)
-    elif dataclasses.is_dataclass(value):
-        for field in dataclasses.fields(value):
-            found += _refusals(getattr(value, field.name), (*place, field.name), spoiled)
-        whole = not any(other[: len(place)] == place for other in spoiled)
-        if whole and not found:
-            found = _own_refusals(value, place)
-    return found
 
+    def __init__(self) -> None:
+        self.misfits: list[str] = []
+        self.refusals: list[str] = []
 
-def _own_refusals(value: Any, place: Place) -> list[str]:
-    """Returns what is refused of a dataclass without those in it, one message each."""
-    beyond = {
-        name: f"key '{spelled((*place, name))}' is {number:g}: expected {bounds}"
-        for name, number, bounds in out_of_bounds(value)
-    }
-    found, post_init = list[str](), getattr(value, "__post_init__", None)
-    if post_init is not None:
-        where = f"key '{spelled(place)}': " if place else ""
+    def block(self, schema: Any, data: Any, place: Place, base: Any) -> Any:
+        """Return a dataclass.
+
+        Args:
+            schema: Its class.
+            data: Mapping of its keys.
+            place: Where it is.
+            base: Instance whose values stay where a key is missing; None for the defaults.
+        """
+        fields = fields_of(schema)
+        if not isinstance(data, dict):
+            return self._misfit(data, place, _expected(schema))
+        if TAG_KEY in data:
+            return self._misfit(data[TAG_KEY], place, "a mapping without a tag")
+        values = {}
+        for name, item in data.items():
+            here = (*place, name)
+            if name in fields:
+                values[name] = self._field(fields[name], item, here, base)
+            else:
+                values[name] = self._unknown(data, name, here, fields)
+        for name, field in fields.items():
+            if name not in data and field.required:
+                here = (*place, name)
+                values[name] = self._note(
+                    f"missing key '{spelled(here)}': expected {_expected(field.kind)}"
+                )
+        return self._made(schema, values, place, base)
+
+    def _made(self, schema: Any, values: dict[str, Any], place: Place, base: Any) -> Any:
+        """Return a dataclass of values, or note which of them are refused."""
+        fields, result = fields_of(schema), _REFUSED
+        good = {name: value for name, value in values.items() if value is not _REFUSED}
+        beyond = {
+            name: f"key '{spelled((*place, name))}' is {number:g}: expected a number from {bounds}"
+            for key, value in good.items()
+            for bounds in [fields[key].bounds]
+            for name, number in fields[key].out_of_bounds(value)
+        }
         # what comes of numbers out of bounds says nothing, unless it is about them
-        with suppress(*_CONSEQUENCES if beyond else ()), np.errstate(all="ignore"):
-            with gathered_refusals() as refusals:
-                post_init()
-            found = [f"{where}{' '.join(refusal.split())}" for refusal in refusals]
-    said = " ".join(found)
-    named = all(re.search(rf"\b{re.escape(name.partition('[')[0])}\b", said) for name in beyond)
-    return found if named else list(beyond.values())
+        ignored = _CONSEQUENCES if beyond else ()
+        with suppress(*ignored), np.errstate(all="ignore"), gathered_refusals() as said:
+            if len(good) < len(values):
+                for name, value in good.items():
+                    check_value(fields[name].hint, name, value)
+            else:
+                result = schema(**good) if base is None else dataclasses.replace(base, **good)
+        told = " ".join(said)
+        named = all(re.search(rf"\b{re.escape(key.partition('[')[0])}\b", told) for key in beyond)
+        where = f"key '{spelled(place)}': " if place else ""
+        found = [f"{where}{' '.join(one.split())}" for one in said] if named else [*beyond.values()]
+        self.refusals += found
+        return _REFUSED if found else result
+
+    def _field(self, field: Field, item: Any, place: Place, base: Any) -> Any:
+        """Return the value of a field, from what stands for a list, too."""
+        form = field.form
+        if item == form.get("empty_word", ...):
+            return []
+        if form.get("one_for_all") and _is_number(item):
+            return OneForAll([float(item)])
+        if form.get("one_or_many") and (_is_number(item) or isinstance(item, str)):
+            item = [item]
+        count, parts = form.get("equal", 0), form.get("parts", 1)
+        if count and _is_number(item):
+            item = [item] * count
+        elif parts > 1 and isinstance(item, list) and len(item) == parts:
+            item = [entry for entry in item for _ in range(count // parts)]
+        if "words" in form and isinstance(item, list):
+            return self._words(form["words"], item, place)
+        if field.takes_a_number and not isinstance(item, list):
+            word = form.get("empty_word")
+            single = f"a number, {word}" if word else "a number"
+            return self._misfit(item, place, f"{single} or {_expected(field.kind)}")
+        # what is not said stays in a block or a mapping
+        old = None
+        if isinstance(item, dict):
+            old = (
+                getattr(base, field.name) if base is not None else field.default and field.default()
+            )
+        return self.value(field.kind, item, place, old)
+
+    def value(self, kind: Any, data: Any, place: Place, old: Any) -> Any:
+        """Return a value of a type.
+
+        Args:
+            kind: The type.
+            data: What the file has.
+            place: Where it is.
+            old: Value that it changes, if it is a mapping; None for none.
+        """
+        origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+        if dataclasses.is_dataclass(kind):
+            return self.block(kind, data, place, old)
+        if kind in _SCALARS:
+            found = _scalar(kind, data)
+            if found is _REFUSED:
+                self._misfit(data, place, _expected(kind) + _range(kind, data))
+            return found
+        if origin in (typing.Union, types.UnionType):
+            return self._union(arguments, data, place, old)
+        if kind is np.ndarray:
+            rows = self._rows(data, place)
+            return rows if rows is _REFUSED else np.array(rows, dtype=float)
+        if origin is list:
+            if not isinstance(data, list):
+                return self._misfit(data, place, _expected(kind))
+            items = [self.value(arguments[0], x, (*place, i), None) for i, x in enumerate(data)]
+            return _REFUSED if any(item is _REFUSED for item in items) else items
+        if origin in (dict, collections.abc.Mapping):
+            return self._mapping(kind, data, place, old or {})
+        raise NotImplementedError(f"{kind} is no type of a schema")
+
+    def _mapping(self, kind: Any, data: Any, place: Place, old: dict[str, Any]) -> Any:
+        """Return a mapping of names; those that it has already stay."""
+        if not isinstance(data, dict):
+            return self._misfit(data, place, _expected(kind))
+        found, item_kind = dict(old), typing.get_args(kind)[1]
+        for name, item in data.items():
+            if isinstance(name, str):
+                found[name] = self.value(item_kind, item, (*place, name), old.get(name))
+            else:
+                what = f"key '{spelled((*place, str(name)))}' is {_shown(name)}"
+                found[name] = self._note(f"{what}: expected a key that is text")
+        return _REFUSED if any(item is _REFUSED for item in found.values()) else found
+
+    def _union(self, members: tuple[Any, ...], data: Any, place: Place, old: Any) -> Any:
+        """Return an optional value, one of several scalars, or a dataclass by its tag."""
+        choices = [member for member in members if member is not types.NoneType]
+        _require_no_subclasses(choices)
+        if data is None and len(choices) < len(members):
+            return None
+        if len(choices) == 1 and data is not None:
+            return self.value(choices[0], data, place, old)
+        if isinstance(data, dict) and TAG_KEY in data:
+            by_tag = {f"!{getattr(choice, '__name__', choice)}": choice for choice in choices}
+            tag = str(data[TAG_KEY])
+            if tag not in by_tag:
+                hint = f"{did_you_mean(tag, by_tag)}allowed: {', '.join(by_tag)}"
+                return self._note(f"key '{spelled(place)}': unknown tag {tag}: {hint}")
+            kind = by_tag[tag]
+            content = {name: item for name, item in data.items() if name != TAG_KEY}
+            return self.value(kind, content, place, old if type(old) is kind else None)
+        if isinstance(data, (dict, list)):
+            return self._untagged(choices, data, place, old)
+        if type(data) in choices:
+            return data
+        found = _scalar(choices[0], data)
+        if found is _REFUSED:
+            self._misfit(data, place, " or ".join(_alternatives(members)))
+        return found
+
+    def _untagged(self, choices: list[Any], data: Any, place: Place, old: Any) -> Any:
+        """Return a mapping or list without tag, which is read as the first choice."""
+        before, kind = len(self.misfits), choices[0]
+        found = self.value(kind, data, place, old if type(old) is kind else None)
+        if len(self.misfits) > before:
+            others = [f"!{choice.__name__}" for choice in choices[1:] if isinstance(choice, type)]
+            first = f"!{getattr(kind, '__name__', kind)}"
+            hint = f"(without a tag '{spelled(place)}' is {first}; other tags: {', '.join(others)})"
+            self.misfits[before] += f" {hint}"
+        return found
+
+    def _rows(self, data: Any, place: Place) -> Any:
+        """Return a vector, or a matrix as a list of equally long rows, as lists of numbers."""
+        if not isinstance(data, list):
+            return self._misfit(data, place, _expected(np.ndarray))
+        lengths = {len(row) if isinstance(row, list) else -1 for row in data}
+        if len(lengths) > 1:
+            return self._misfit(data, place, "rows of equal length")
+        read = self._rows if lengths - {-1} else lambda x, here: self.value(float, x, here, None)
+        items = [read(item, (*place, index)) for index, item in enumerate(data)]
+        return _REFUSED if any(item is _REFUSED for item in items) else items
+
+    def _words(self, words: tuple[str, ...], values: list[Any], place: Place) -> Any:
+        """Return a list of numbers in which some words may stand."""
+        items = [item if item in words else _scalar(float, item) for item in values]
+        for index, (item, value) in enumerate(zip(items, values, strict=True)):
+            if item is _REFUSED:
+                hint = did_you_mean(value, words) if isinstance(value, str) else ""
+                allowed = f"a number or {' or '.join(words)}"
+                self._misfit(value, (*place, index), allowed, hint)
+        return _REFUSED if any(item is _REFUSED for item in items) else items
+
+    def _unknown(self, data: dict[Any, Any], name: Any, place: Place, known: Any) -> Any:
+        """Note a key that does not exist."""
+        hint = _decimal_comma(data, name) or did_you_mean(name, known)
+        what = f"unknown key '{spelled((*place[:-1], str(name)))}' = {_shown(data[name])}"
+        return self._note(f"{what}: {hint}allowed: {', '.join(known) or 'no keys'}")
+
+    def _misfit(self, value: Any, place: Place, expected: str, hint: str = "") -> Any:
+        """Note a value that does not fit."""
+        where = f"key '{spelled(place)}'" if place else "the root"
+        return self._note(f"{where} is {_shown(value)}: {hint}expected {expected}")
+
+    def _note(self, message: str) -> Any:
+        if len(self.misfits) < _MOST_MISFITS:
+            self.misfits.append(message)
+        return _REFUSED
+
+
+def _scalar(kind: Any, value: Any) -> Any:
+    """Return a YAML value as a scalar of a type, as Drake converts it, or _REFUSED; NaN is."""
+    given = type(value)
+    if kind is float:
+        return float(value) if _is_number(value) else _REFUSED
+    if kind is int:
+        whole = given is int or (given is float and value.is_integer())
+        whole = whole or (given is str and bool(_INTEGER.fullmatch(value)))
+        return int(value) if whole and abs(int(value)) <= _MAX_INTEGER else _REFUSED
+    if kind is bool and given is str:
+        return {"true": True, "false": False}.get(value, _REFUSED)
+    if kind is Path and given is str:
+        return Path(value)
+    return value if given is kind else _REFUSED
+
+
+def _is_number(item: Any) -> bool:
+    """Whether something is a number, or text that is one."""
+    return type(item) in (int, float, str) and is_number(item)
+
+
+def _decimal_comma(mapping: dict[Any, Any], name: Any) -> str:
+    """Return what to write for ``{velocity: 0,3}``, where YAML reads a key 3 without value."""
+    names = list(mapping)
+    place = names.index(name)
+    if type(name) is not int or mapping[name] is not None or not place:
+        return ""
+    before = names[place - 1]
+    if type(mapping[before]) is not int:
+        return ""
+    return f"a decimal comma? write {before}: {mapping[before]}.{name} "
+
+
+def spelled(place: Place) -> str:
+    """Returns a place as a path of keys, e.g. ``controller.gains.eta[1]``."""
+    text = ""
+    for step in place:
+        text += f"[{step}]" if type(step) is int and text else f".{step}" if text else f"{step}"
+    return text
+
+
+def _range(kind: Any, value: Any) -> str:
+    """What numbers a field allows, where a number was refused for its size."""
+    if isinstance(value, str):
+        beyond = bool((NUMBER if kind is float else _LONG_INTEGER).fullmatch(value))
+    else:
+        beyond = type(value) is int or (type(value) is float and value.is_integer())
+    if kind is float and beyond:
+        return f" of magnitude up to {sys.float_info.max:.2g}"
+    return f" of magnitude up to {_MAX_INTEGER}" if kind is int and beyond else ""
+
+
+def _require_no_subclasses(choices: list[Any]) -> None:
+    """Raises NotImplementedError at a member of a union that is a subclass of another one.
+
+    Drake takes an instance of a subclass for one of its base: where the default is of the subclass
+    a value with the tag of the base becomes one of the subclass.
+    """
+    kinds = [kind for kind in choices if isinstance(kind, type) and dataclasses.is_dataclass(kind)]
+    for kind in kinds:
+        if any(base is not kind and issubclass(kind, base) for base in kinds):
+            raise NotImplementedError(f"{kind.__name__} is a subclass of what it stands beside")
+
+
+def _expected(kind: Any) -> str:
+    """What a field allows, in words."""
+    if kind in _SCALARS:
+        return _SCALARS[kind]
+    if kind is np.ndarray:
+        return "a list of numbers"
+    if kind is types.NoneType:
+        return "null"
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(_alternatives(arguments))
+    if origin is list:
+        return f"a list (each item {_expected(arguments[0])})"
+    if origin in (dict, collections.abc.Mapping):
+        return f"a mapping (each value {_expected(arguments[1])})"
+    return f"a mapping with the keys {', '.join(fields_of(kind))}"
+
+
+def _alternatives(members: tuple[Any, ...]) -> list[str]:
+    """What each member of a union allows, in words."""
+    several = sum(dataclasses.is_dataclass(member) for member in members) > 1
+    return [
+        f"!{member.__name__} {{...}}"
+        if several and isinstance(member, type) and dataclasses.is_dataclass(member)
+        else _expected(member)
+        for member in members
+    ]
+
+
+def _shown(value: Any) -> str:
+    """A value as written in YAML, shortened to fit a line."""
+    if value is None:
+        return "empty (null)"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and abs(value) > _MAX_INTEGER:
+        return f"an integer of {value.bit_length()} bits"
+    try:
+        return shortened(repr(value))
+    except ValueError:  # an integer inside, of more digits than Python writes
+        return f"a {type(value).__name__}"
 
 
 def dump_typed(value: Any) -> str:

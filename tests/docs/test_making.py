@@ -49,6 +49,7 @@ def test_every_key_of_a_scenario_is_told() -> None:
         "| `mass` | [block](#keys-profile) | kg or kg m^2 | *must be given* | `m`, positive. |",
         "| `stiffness` | number, or list of numbers |",
         "| `file` | file |  | empty |",
+        "| `source` | `none` or `model` or `observer` |",
         "| `poles` | `auto`, or list of numbers |",
         "| `hand` | [block](#keys-handparameters) or `null` |  | `null` |",
         "[`!Profile`](#keys-profile), [`!SlowEnds`](#keys-slowends)",

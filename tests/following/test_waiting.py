@@ -127,7 +127,7 @@ def test_what_cannot_wait_is_refused():
     builder = DiagramBuilder()
     plant = load(builder, "comau_racer_1_4")
     path = path_from_waypoints(WaypointTable(POINTS), smoothness=6)
-    with pytest.raises(InputError, match="shapes = none"):
+    with pytest.raises(InputError, match=r"shapes = \[\]"):
         ObstacleOptions([])
     frame = np.array([0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1])
     for change in ({"stream": StreamLimits()}, {"frame": frame}):

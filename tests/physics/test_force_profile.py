@@ -95,7 +95,7 @@ def test_pulses_add_up_over_frames():
         ({"end": 1.5}, r"^begin, end = 1.5, 1.5: must be finite and ascending$"),
         ({"ramp": 0.3}, r"^ramp = 0.3: must be positive and at most 0.25, half the pulse$"),
         ({"ramp": 0.0}, "^ramp = 0.0: must be positive"),
-        ({"frame": "tool"}, "^frame = 'tool': must be one of world, manifold$"),
+        ({"frame": "tool"}, "^frame = tool; allowed: world, manifold$"),
     ],
 )
 def test_pulses_out_of_range(changes, message):

@@ -237,7 +237,7 @@ def test_a_moving_joint_is_refused(rigid):
     ],
 )
 def test_parameters_out_of_range(key, value):
-    with pytest.raises(InputError, match=f"^{key} = .*: must be "):
+    with pytest.raises(InputError, match=f"^{key} = .*; allowed: "):
         ForceTorqueParameters(**{key: value})
 
 

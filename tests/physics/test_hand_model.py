@@ -162,5 +162,5 @@ def test_parameters_come_from_a_file():
 
 
 def test_a_waypoint_has_three_coordinates():
-    with pytest.raises(InputError, match=r"^position = \[1.0, 2.0\]: must be 3 finite numbers"):
+    with pytest.raises(InputError, match=r"^position = \[1.0, 2.0\]; allowed: 3 finite numbers"):
         HandWaypoint(0.0, [1.0, 2.0])

@@ -54,8 +54,8 @@ def test_it_comes_back_before_it_lets_go():
     [
         ({"way": [0.0, 1.0]}, r"way = \[0.0, 1.0\]: must be 3"),
         ({"point": [0.0, np.nan, 0.0]}, "point = "),
-        ({"begin": -1.0}, "begin = -1.0: must be finite, zero or positive"),
-        ({"duration": 0.0}, "duration = 0.0: must be finite and positive"),
+        ({"begin": -1.0}, "begin = -1.0; allowed: zero or a positive number"),
+        ({"duration": 0.0}, "duration = 0.0; allowed: a positive number"),
         ({"hold": np.inf}, "hold = inf"),
         ({"stiffness": 0.0}, "stiffness = 0.0"),
         ({"force_limit": -1.0}, "force_limit = -1.0"),

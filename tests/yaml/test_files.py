@@ -3,7 +3,8 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE, resolve_files
+from pfsc_drake.yaml.fields import FILE, NAME_OR_FILE
+from pfsc_drake.yaml.reading import resolve_files
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Typed loading: what fits is loaded by Drake, what does not is reported in one line."""
+"""Typed loading: what fits is loaded as Drake does it, what does not is reported in one line."""
 
 import math
 import subprocess
@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydrake.common.yaml import yaml_load_typed
 
 from pfsc_drake import InputError
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED, load_file, load_typed
+from pfsc_drake.yaml.typed import load_file, load_typed, typed_data
 
 
 @dataclass
@@ -226,15 +228,29 @@ def test_long_values_are_shortened():
     assert "..." in message
 
 
-def test_whatever_passes_the_check_is_accepted_by_drake():
-    """Every kind of scalar that the check lets through must not fail in Drake afterwards."""
+def test_what_is_loaded_is_what_drake_loads():
+    """Every kind of scalar, and what a file leaves out of a block or of a mapping."""
     values = ["1", "1.0", "'1'", "1e3", "-2", ".inf", "true", "'true'", "x", "null", "[1]", "{}"]
-    for key in ("limit", "file", "figures", "mixed", "start", "name"):
-        for value in values:
-            try:
-                load(f"name: x\n{key}: {value}\n" if key != "name" else f"name: {value}\n")
-            except InputError as error:
-                assert "expected" in str(error), (key, value)
+    keys = ("limit", "file", "figures", "mixed", "start", "name")
+    texts = [f"{key}: {value}" for key in keys for value in values] + [
+        "controller: {gains: {eta: [5, '6']}, spare: {a: {order: 2.0}}}",
+        "path: {bend: 0}",
+        "path: !Circle {}",
+        "stations: [{radius: 1}, {}]",
+        "start: [[1, 2], [3, 4e0]]",
+    ]
+    loaded = 0
+    for text in texts:
+        text = text if text.startswith("name") else f"name: x\n{text}"
+        try:
+            own = load(text)
+        except InputError as error:
+            assert "expected" in str(error), text
+        else:
+            drakes = yaml_load_typed(schema=Scenario, data=text)
+            assert typed_data(own) == typed_data(drakes), text
+            loaded += 1
+    assert loaded > 25
 
 
 LEAVES = (

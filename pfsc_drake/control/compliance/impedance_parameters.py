@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Union
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
@@ -12,19 +12,19 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from pfsc_drake.blocks.cases import first_of, where
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.errors import InputError, require
-from pfsc_drake.yaml.bounds import bounded
-from pfsc_drake.yaml.schema_check import REQUIRED
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.rules import NotNegative, Numbers, Parameters, Positive, Range
 
 # relative; what misses the length of a lap by less is a lap
 _ROUNDING = 1e-6
 
 
 # of masses, dampings and stiffnesses; who has the profile knows which
-_PARAMETER = bounded(0.0, 1e10, "kg, N s/m or N/m", infinite=True)
+_UNIT, _LARGEST = "kg, N s/m or N/m", 1e10
 
 
 @dataclass
-class Profile:
+class Profile(Parameters):
     """A parameter: constant, or cubic, C^1, monotone between breakpoints, constant outside.
 
     Over the arc length of a closed path it is periodic instead: cubic, C^1 and monotone from the
@@ -38,21 +38,20 @@ class Profile:
         values: Values there.
     """
 
-    value: float = field(default=0.0, metadata=_PARAMETER)
+    value: Annotated[float, Range(0.0, _LARGEST, _UNIT, infinite=True)] = 0.0
     over: str = "eta"
     at: list[float] = field(default_factory=list)
-    values: list[float] = field(default_factory=list, metadata=_PARAMETER)
+    values: Annotated[list[float], Numbers(each=Range(0.0, _LARGEST, _UNIT))] = field(
+        default_factory=list
+    )
 
     def __post_init__(self) -> None:
-        if not self.value >= 0.0:
-            raise InputError(f"value: {self.value}; must be zero or a positive number")
+        super().__post_init__()
         if len(self.at) != len(self.values) or len(self.at) == 1:
             counts = f"values: {len(self.values)} at {len(self.at)} breakpoints"
             raise InputError(f"{counts}; as many, and none or at least two, are needed")
         if not (np.all(np.isfinite(self.at)) and np.all(np.diff(self.at) > 0.0)):
             raise InputError(f"at: {self.at}; must be finite and increasing")
-        if not all(math.isfinite(v) and v >= 0.0 for v in self.values):
-            raise InputError(f"values: {self.values}; must be finite, none negative")
 
     @property
     def varies(self) -> bool:
@@ -119,7 +118,7 @@ class Profile:
 
 
 @dataclass
-class SlowEnds:
+class SlowEnds(Parameters):
     """Damping over the arc length, large next to the ends of a path (5.4), as printed.
 
     ::
@@ -139,18 +138,14 @@ class SlowEnds:
         length: ``eta_max`` [m]; 0 for the length of the path.
     """
 
-    least: float = 90.0
+    least: NotNegative = 90.0
     most: float = 3000.0
-    start_rate: float = 40.0
-    end_rate: float = 80.0
-    length: float = 0.0
+    start_rate: Positive = 40.0
+    end_rate: Positive = 80.0
+    length: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        for key in ("start_rate", "end_rate"):
-            require(0.0 < getattr(self, key) < math.inf, key, getattr(self, key), "positive")
-        for key in ("least", "length"):
-            good = 0.0 <= getattr(self, key) < math.inf
-            require(good, key, getattr(self, key), "zero or positive")
+        super().__post_init__()
         require(self.least <= self.most < math.inf, "most", self.most, f"{self.least:g} or more")
 
     @property
@@ -187,7 +182,7 @@ class SlowEnds:
 
 
 # the first is what one without a tag means
-Damping = Union[Profile, SlowEnds]  # noqa: UP007 (Drake's YAML needs it)
+Damping = Profile | SlowEnds
 
 
 @dataclass

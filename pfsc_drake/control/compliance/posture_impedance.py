@@ -15,10 +15,11 @@ from pfsc_drake.control.law.posture import POTENTIALS, Posture, free_motion_func
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 
 @dataclass
-class NullSpaceImpedanceParameters:
+class NullSpaceImpedanceParameters(Parameters):
     """Impedance of every joint in the null space.
 
     Attributes:
@@ -28,18 +29,10 @@ class NullSpaceImpedanceParameters:
         filter_rate: ``w`` of the filter that makes the posture smooth [rad/s].
     """
 
-    inertia: float = 1.0
-    damping: float = 20.0
-    stiffness: float = 50.0
-    filter_rate: float = 30.0
-
-    def __post_init__(self) -> None:
-        for key in ("inertia", "damping", "filter_rate"):
-            value = getattr(self, key)
-            if not 0.0 < value < np.inf:
-                raise InputError(f"{key}: {value}; must be positive and finite")
-        if not 0.0 <= self.stiffness < np.inf:
-            raise InputError(f"stiffness: {self.stiffness}; must be zero or positive, and finite")
+    inertia: Positive = 1.0
+    damping: Positive = 20.0
+    stiffness: NotNegative = 50.0
+    filter_rate: Positive = 30.0
 
 
 @dataclass

@@ -3,21 +3,22 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_of, where
 from pfsc_drake.control.law.reference import Transition
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import require
+from pfsc_drake.yaml.rules import Parameters, Range
 
 # of the largest reference, by which the force may differ from it
 _ALLOWED = 1.5
 
 
 @dataclass
-class PressParameters:
+class PressParameters(Parameters):
     """Force reference of the transversal coordinate, in place of a place.
 
     With the impedance ``m xi'' + d xi' = tau_perp + f`` and no stiffness the tool moves at
@@ -43,30 +44,26 @@ class PressParameters:
             moves free it differs by the reference itself.
     """
 
-    force: float = 20.0
-    approach: float = 6.0
-    retreat: float = 6.0
-    clearance: float = 0.01
-    begin: float = 0.1
+    force: Annotated[float, Range(0.0, 1e6, "N")] = 20.0
+    approach: Annotated[float, Range(0.0, 1e6, "N")] = 6.0
+    # without it nothing would hold the tool once it does not press any more
+    retreat: Annotated[float, Range(0.0, 1e6, "N", open=True)] = 6.0
+    clearance: Annotated[float, Range(0.0, 1e3, "m", open=True)] = 0.01
+    begin: Annotated[float, Range(0.0, 1e6, "s")] = 0.1
     touching: float = 3.0
-    retreat_time: float = 0.5
-    ramp: float = 0.1
+    retreat_time: Annotated[float, Range(0.0, 1e6, "s")] = 0.5
+    ramp: Annotated[float, Range(0.0, 1e6, "s", open=True)] = 0.1
     limit: float = 0.0
 
     def __post_init__(self) -> None:
-        for key in ("force", "approach", "begin", "retreat_time"):
-            self._require(key, 0.0 <= getattr(self, key) <= 1e6, "zero or a positive number")
-        # without it nothing would hold the tool once it does not press any more
-        self._require("retreat", 0.0 < self.retreat <= 1e6, "a positive number of newtons")
-        self._require("clearance", 0.0 < self.clearance <= 1e3, "a positive number of meters")
-        self._require("ramp", 0.0 < self.ramp <= 1e6, "a positive number of seconds")
+        super().__post_init__()
         if self.force > 0.0:
             reached = 0.0 < self.touching < self.approach
             allowed = f"a positive number below approach = {self.approach:g} N"
-            self._require("touching", reached, allowed)
+            require(reached, "touching", self.touching, allowed)
         wide = self.limit == 0.0 or self._largest < self.limit <= 1e6
         allowed = f"0, or more than the largest reference of {self._largest:g} N"
-        self._require("limit", wide, allowed)
+        require(wide, "limit", self.limit, allowed)
 
     @property
     def _largest(self) -> float:
@@ -77,10 +74,6 @@ class PressParameters:
     def allowed_difference(self) -> float:
         """By how much the measured force may differ from its reference [N]."""
         return self.limit or _ALLOWED * self._largest
-
-    def _require(self, key: str, good: bool, allowed: str) -> None:
-        if not good:
-            raise InputError(f"{key} = {getattr(self, key)}: must be {allowed}")
 
     def taken_off(self, end: float) -> float:
         """Return from when on the tool is taken off [s].

@@ -1,7 +1,7 @@
 """A tool's weight and inertia taken off a force/torque measurement; what a sensor stops for."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
@@ -20,19 +20,21 @@ from pfsc_drake.control.compliance.measured_wrench import (
 )
 from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad, dead_band, predicted_load
-from pfsc_drake.yaml.typed import equal
+from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import NotNegative, Numbers, OneOf, Parameters, Positive, Range
 
 _INERTIA = ("none", "differentiated", "given")
 # rad/s or m/s, of a joint, with which no load on a sensor stays the same
 _MOVING = 1e-2
 
+_Limits = Annotated[np.ndarray, Numbers(6, Range(0.0, open=True, infinite=True))]
+
 
 @dataclass
-class ToolCompensationParameters:
+class ToolCompensationParameters(Parameters):
     """How the tool's load is taken off a measurement.
 
     Attributes:
@@ -54,42 +56,23 @@ class ToolCompensationParameters:
             :class:`~pfsc_drake.control.compliance.jump_watch.JumpWatch`. ``.inf`` for none.
     """
 
-    inertia: str = "differentiated"
-    bandwidth: float = 200.0
-    taring_time: float = 0.05
-    taring_spread: np.ndarray = field(
+    inertia: Annotated[str, OneOf(_INERTIA)] = "differentiated"
+    bandwidth: Positive = 200.0
+    taring_time: Positive = 0.05
+    taring_spread: _Limits = field(
         default_factory=lambda: np.repeat([1.0, 0.05], 3), metadata=equal(6, parts=2)
     )
-    taring_bias: np.ndarray = field(
+    taring_bias: _Limits = field(
         default_factory=lambda: np.repeat([50.0, 2.0], 3), metadata=equal(6, parts=2)
     )
-    force_dead_band: float = 0.0
-    torque_dead_band: float = 0.0
-    noise: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=equal(6, parts=2))
-    jump: np.ndarray = field(
+    force_dead_band: NotNegative = 0.0
+    torque_dead_band: NotNegative = 0.0
+    noise: Annotated[np.ndarray, Numbers(6, Range(0.0))] = field(
+        default_factory=lambda: np.zeros(6), metadata=equal(6, parts=2)
+    )
+    jump: _Limits = field(
         default_factory=lambda: np.repeat([25.0, 1.0], 3), metadata=equal(6, parts=2)
     )
-
-    def __post_init__(self) -> None:
-        if self.inertia not in _INERTIA:
-            raise InputError(f"inertia = {self.inertia!r}: must be one of {', '.join(_INERTIA)}")
-        for key in ("bandwidth", "taring_time"):
-            _require_sign(key, getattr(self, key), zero_allowed=False)
-        for key in ("force_dead_band", "torque_dead_band"):
-            _require_sign(key, getattr(self, key), zero_allowed=True)
-        for key in ("taring_spread", "taring_bias", "jump"):
-            value = np.asarray(getattr(self, key), dtype=float)
-            if value.shape != (6,) or not np.all(value > 0.0):
-                raise InputError(f"{key} = {value.tolist()}: must be 6 positive numbers")
-        noise = np.asarray(self.noise, dtype=float)
-        if noise.shape != (6,) or not np.all((noise >= 0.0) & np.isfinite(noise)):
-            raise InputError(f"noise = {noise.tolist()}: must be 6 numbers, zero or positive")
-
-
-def _require_sign(key: str, value: float, *, zero_allowed: bool) -> None:
-    if not (np.isfinite(value) and (value > 0.0 or (zero_allowed and value == 0.0))):
-        allowed = "zero or positive" if zero_allowed else "positive"
-        raise InputError(f"{key} = {value}: must be {allowed} and finite")
 
 
 @once_per_content()

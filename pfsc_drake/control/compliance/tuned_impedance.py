@@ -13,10 +13,10 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
-from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 # a request that leaves a parameter as it would be without
 AS_GIVEN = -1.0
@@ -32,7 +32,7 @@ def requests_of(kind: Kind) -> tuple[int, int]:
 
 
 @dataclass
-class TuningParameters:
+class TuningParameters(Parameters):
     """How parameters follow a request.
 
     Attributes:
@@ -45,18 +45,13 @@ class TuningParameters:
         caught_below: Speed relative to the reference below which it does [m/s, rad/s].
     """
 
-    ramp: float = 0.1
-    reserve: float = 0.05
-    capacity: float = 0.5
-    returning_stiffness: float = 2e4
-    returning_turn_stiffness: float = 200.0
-    caught_within: float = 1e-4
-    caught_below: float = 5e-3
-
-    def __post_init__(self) -> None:
-        for key, value in vars(self).items():
-            if not 0.0 <= value < math.inf or (value == 0.0 and key not in ("ramp", "reserve")):
-                raise InputError(f"{key} = {value}: must be positive and finite")
+    ramp: NotNegative = 0.1
+    reserve: NotNegative = 0.05
+    capacity: Positive = 0.5
+    returning_stiffness: Positive = 2e4
+    returning_turn_stiffness: Positive = 200.0
+    caught_within: Positive = 1e-4
+    caught_below: Positive = 5e-3
 
 
 class ImpedanceTuner(Block):

@@ -1,20 +1,20 @@
 """How far links may be from where motors and torques say that they are."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.checks import require_between, require_not_negative
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.estimation.momentum import SMOOTH
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Range
 
 
 @dataclass
-class StateUncertainty:
+class StateUncertainty(Parameters):
     """How well is known by what a controller finds the links' side of elastic joints.
 
     All are standard deviations. Errors of two joints, and of two kinds, have nothing to do with
@@ -31,18 +31,12 @@ class StateUncertainty:
             the largest speed.
     """
 
-    stiffness: float = 0.05
-    torque_scale: float = 0.01
-    torque_noise: float = 0.001
-    friction: float = 0.2
-    coulomb: float = 0.05
-    viscous: float = 0.05
-
-    def __post_init__(self) -> None:
-        require_between("stiffness", self.stiffness, 0.0, 0.5, "")
-        require_between("torque_scale", self.torque_scale, 0.0, 0.5, "")
-        for key in ("torque_noise", "friction", "coulomb", "viscous"):
-            require_not_negative(key, getattr(self, key))
+    stiffness: Annotated[float, Range(0.0, 0.5)] = 0.05
+    torque_scale: Annotated[float, Range(0.0, 0.5)] = 0.01
+    torque_noise: NotNegative = 0.001
+    friction: NotNegative = 0.2
+    coulomb: NotNegative = 0.05
+    viscous: NotNegative = 0.05
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The one place that inverts a decoupling matrix."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.blocks.linear_algebra import cholesky, householder, solve, solve_upper
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.rules import Parameters, Range
 
 # of a posture's coordinate, by which part of itself it must move with the outputs at rest
 _LEAST_SHARE = 0.1
@@ -75,7 +76,7 @@ class DecouplingSolution(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DecouplingInverse:
+class DecouplingInverse(Parameters):
     """Solves ``A q^(r) = v - b`` and judges the conditioning of A, shape (m, N) with N >= m.
 
     With as many joints as outputs that is one linear system. With more, it is the solution
@@ -103,12 +104,11 @@ class DecouplingInverse:
         damped_below: Reciprocal condition number below which the solution is damped; 0 for never.
     """
 
-    min_rcond: float = 1e-3
+    min_rcond: Annotated[float, Range(0.0, 1.0, open=True, below=True)] = 1e-3
     damped_below: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.min_rcond < 1.0:
-            raise InputError(f"min_rcond: {self.min_rcond}; must lie between 0 and 1")
+        super().__post_init__()
         if self.damped_below != 0.0 and not self.min_rcond < self.damped_below < 1.0:
             raise InputError(
                 f"damped_below: {self.damped_below}; must be 0, or lie between min_rcond = "

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
@@ -13,6 +13,7 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, largest_speeds
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Range
 
 # 1/s, by which differences of what is compared are forgotten, and ways beside a position that rests
 _FORGETTING, _FORGETTING_RESTS = 20.0, 2.0
@@ -23,7 +24,7 @@ _BENDING = 2.0
 
 
 @dataclass
-class SupervisionParameters:
+class SupervisionParameters(Parameters):
     """What of the joints is watched.
 
     Attributes:
@@ -42,21 +43,13 @@ class SupervisionParameters:
             is a fault.
     """
 
-    tolerance: float = 2e-3
+    tolerance: NotNegative = 2e-3
     resolution: np.ndarray = field(default_factory=lambda: np.zeros(1))
-    filter_time: float = 0.0
+    filter_time: NotNegative = 0.0
     joint_limits: bool = True
-    saturation_time: float = 0.0
-    chatter_turns: float = 6.0
-    overspeed: float = 0.1
-
-    def __post_init__(self) -> None:
-        for key in ("tolerance", "filter_time", "saturation_time", "chatter_turns"):
-            value = getattr(self, key)
-            if not 0.0 <= value < np.inf:
-                raise InputError(f"{key} = {value}; must be zero or a positive number")
-        if not self.overspeed >= 0.0:
-            raise InputError(f"overspeed = {self.overspeed}; must be zero or a positive number")
+    saturation_time: NotNegative = 0.0
+    chatter_turns: NotNegative = 6.0
+    overspeed: Annotated[float, Range(0.0, infinite=True)] = 0.1
 
 
 class Supervision(Block):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
@@ -11,10 +11,11 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive, Range
 
 
 @dataclass
-class Swing:
+class Swing(Parameters):
     """A transversal coordinate's reference ``A s(t) sin(2 pi f (t - begin))``.
 
     So the manifold that the tool is held on moves along its own normals, as a circle does whose
@@ -28,22 +29,11 @@ class Swing:
         ramp: Time in which s rises from 0 to 1, with four continuous derivatives [s].
     """
 
-    coordinate: int = 1
-    amplitude: float = 0.01
-    frequency: float = 0.5
-    begin: float = 0.5
-    ramp: float = 0.5
-
-    def __post_init__(self) -> None:
-        self._require("coordinate", self.coordinate in (1, 2), "1 or 2")
-        self._require("amplitude", 0.0 < self.amplitude <= 1.0, "positive, at most 1 m")
-        self._require("frequency", 0.0 < self.frequency <= 100.0, "positive, at most 100 Hz")
-        self._require("begin", 0.0 <= self.begin < math.inf, "zero or a positive number of seconds")
-        self._require("ramp", 0.0 < self.ramp < math.inf, "a positive number of seconds")
-
-    def _require(self, key: str, good: bool, allowed: str) -> None:
-        if not good:
-            raise InputError(f"{key} = {getattr(self, key)}; must be {allowed}")
+    coordinate: Annotated[int, Range(1, 2)] = 1
+    amplitude: Annotated[float, Range(0.0, 1.0, "m", open=True)] = 0.01
+    frequency: Annotated[float, Range(0.0, 100.0, "Hz", open=True)] = 0.5
+    begin: NotNegative = 0.5
+    ramp: Positive = 0.5
 
 
 class SwingingReference:

@@ -14,6 +14,7 @@ from pfsc_drake.checks import require_positive
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.polynomial import PieceTable
 from pfsc_drake.jets import Jet, compose
+from pfsc_drake.yaml.rules import Parameters, Positive
 
 # of the pace that was planned; backwards likewise
 FASTEST_PACE = 1.5
@@ -139,7 +140,7 @@ def _filter_step(order: int, bandwidth: float, period: float) -> np.ndarray:
 
 
 @dataclass
-class StreamLimits:
+class StreamLimits(Parameters):
     """How fast a tool goes to way points that come one after the other.
 
     Attributes:
@@ -148,13 +149,9 @@ class StreamLimits:
         bandwidth: Bandwidth of the filter that makes it smooth enough for the law [1/s].
     """
 
-    velocity: float = 0.1
-    acceleration: float = 0.5
-    bandwidth: float = 20.0
-
-    def __post_init__(self) -> None:
-        for key in ("velocity", "acceleration", "bandwidth"):
-            require_positive(key, getattr(self, key))
+    velocity: Positive = 0.1
+    acceleration: Positive = 0.5
+    bandwidth: Positive = 20.0
 
 
 class StreamedReference(Block):

@@ -9,19 +9,19 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
-from pfsc_drake.checks import require_positive
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.geometry.segments import from_nearest
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import ArmOutline, outline_points
+from pfsc_drake.yaml.rules import Parameters, Positive
 
 # m, below which an obstacle is on a joint and no direction leads away
 _ON_IT = 1e-6
 
 
 @dc.dataclass
-class ElbowParameters:
+class ElbowParameters(Parameters):
     """How an elbow gives way to obstacles.
 
     Attributes:
@@ -30,13 +30,9 @@ class ElbowParameters:
         force_limit: Largest push [N].
     """
 
-    room: float = 0.4
-    stiffness: float = 150.0
-    force_limit: float = 30.0
-
-    def __post_init__(self) -> None:
-        for key in ("room", "stiffness", "force_limit"):
-            require_positive(key, getattr(self, key))
+    room: Positive = 0.4
+    stiffness: Positive = 150.0
+    force_limit: Positive = 30.0
 
 
 class ElbowRoom(Block):

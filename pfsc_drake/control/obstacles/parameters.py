@@ -1,12 +1,13 @@
 """What a controller is told of obstacles, and how it keeps away from them."""
 
 import dataclasses as dc
+from typing import Annotated
 
-from pfsc_drake.checks import require_between, require_not_negative, require_positive
+from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive, Range
 
 
 @dc.dataclass
-class WatchParameters:
+class WatchParameters(Parameters):
     """How progress on a path waits for obstacles.
 
     Attributes:
@@ -31,31 +32,17 @@ class WatchParameters:
             below 1.
     """
 
-    margin: float = 0.15
-    largest_speed: float = 1.6
-    largest_acceleration: float | None = None
-    uncertainty: float = 0.03
-    velocity_uncertainty: float = 0.3
-    latency: float = 0.1
-    spread: float = 0.05
-    retreat: float = 0.0
-    side: float = 0.05
-    horizon: float = 2.5
-    smoothing: float = 0.1
-    resting_speed: float = 0.025
-    arm_radius: float = 0.1
-    reserve: float = 0.3
-
-    def __post_init__(self) -> None:
-        for key in ("margin", "uncertainty", "velocity_uncertainty", "spread", "side"):
-            require_not_negative(key, getattr(self, key))
-        for key in ("resting_speed", "arm_radius"):
-            require_positive(key, getattr(self, key))
-        require_between("largest_speed", self.largest_speed, 0.01, 100.0, "m/s")
-        if self.largest_acceleration is not None:
-            require_between("largest_acceleration", self.largest_acceleration, 0.1, 1e3, "m/s^2")
-        require_between("retreat", self.retreat, 0.0, 1.0, "of the planned pace")
-        require_between("latency", self.latency, 0.0, 10.0, "s")
-        require_between("horizon", self.horizon, 0.1, 60.0, "s")
-        require_between("smoothing", self.smoothing, 1e-3, 10.0, "s")
-        require_between("reserve", self.reserve, 0.0, 0.99, "of the torques")
+    margin: NotNegative = 0.15
+    largest_speed: Annotated[float, Range(0.01, 100.0, "m/s")] = 1.6
+    largest_acceleration: Annotated[float, Range(0.1, 1e3, "m/s^2")] | None = None
+    uncertainty: NotNegative = 0.03
+    velocity_uncertainty: NotNegative = 0.3
+    latency: Annotated[float, Range(0.0, 10.0, "s")] = 0.1
+    spread: NotNegative = 0.05
+    retreat: Annotated[float, Range(0.0, 1.0, "of the planned pace")] = 0.0
+    side: NotNegative = 0.05
+    horizon: Annotated[float, Range(0.1, 60.0, "s")] = 2.5
+    smoothing: Annotated[float, Range(0.001, 10.0, "s")] = 0.1
+    resting_speed: Positive = 0.025
+    arm_radius: Positive = 0.1
+    reserve: Annotated[float, Range(0.0, 0.99, "of the torques")] = 0.3

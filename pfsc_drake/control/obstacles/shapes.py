@@ -1,11 +1,12 @@
 """What obstacles look like: spheres, columns, persons, and anything made of capsules."""
 
 import dataclasses as dc
+from typing import Annotated
 
 import casadi as ca
-import numpy as np
 
-from pfsc_drake.errors import require, require_one_of, require_positive
+from pfsc_drake.errors import require
+from pfsc_drake.yaml.rules import Numbers, OneOf, Parameters, Positive, Range
 
 KINDS = ("sphere", "column", "person", "capsules")
 
@@ -14,7 +15,7 @@ _HEAD, _FARTHEST = 0.15, 100.0
 
 
 @dc.dataclass(frozen=True)
-class Capsule:
+class Capsule(Parameters):
     """All that is nearer to a line than a radius; a sphere where the line is a point.
 
     Attributes:
@@ -23,16 +24,9 @@ class Capsule:
         radius: [m].
     """
 
-    start: tuple[float, float, float]
-    end: tuple[float, float, float]
-    radius: float
-
-    def __post_init__(self) -> None:
-        for name in ("start", "end"):
-            place = getattr(self, name)
-            good = len(place) == 3 and bool(np.all(np.abs(place) <= _FARTHEST))
-            require(good, name, list(place), f"3 numbers of at most {_FARTHEST:g} m")
-        require_positive("radius", self.radius)
+    start: Annotated[tuple[float, float, float], Numbers(3, Range(-_FARTHEST, _FARTHEST, "m"))]
+    end: Annotated[tuple[float, float, float], Numbers(3, Range(-_FARTHEST, _FARTHEST, "m"))]
+    radius: Positive
 
     @property
     def is_sphere(self) -> bool:
@@ -41,7 +35,7 @@ class Capsule:
 
 
 @dc.dataclass(frozen=True)
-class ObstacleShape:
+class ObstacleShape(Parameters):
     """What moves, without turning.
 
     Attributes:
@@ -52,18 +46,17 @@ class ObstacleShape:
         given: Of ``capsules``: which.
     """
 
-    kind: str
-    radius: float
+    kind: Annotated[str, OneOf(KINDS)]
+    radius: Positive
     height: float = 1.75
     given: tuple[Capsule, ...] = ()
 
     def __post_init__(self) -> None:
-        require_one_of("kind", self.kind, KINDS)
+        super().__post_init__()
         if self.kind == "capsules":
             require(bool(self.given), "parts", "none", "one or more where kind is capsules")
             return
         require(not self.given, "parts", "given", "none unless kind is capsules")
-        require_positive("radius", self.radius)
         if self.kind == "person":
             least = 2.0 * (self.radius + _HEAD)
             tall = least <= self.height <= _FARTHEST

@@ -4,21 +4,21 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import casadi as ca
 import numpy as np
 from scipy.special import gammainccinv
 
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.checks import require_between, require_positive
+from pfsc_drake.yaml.rules import Parameters, Positive, Range
 
 # times by bandwidth, after which nothing is left of a pace
 _LONGEST = 60.0
 
 
 @dataclass(frozen=True)
-class WaitingPace:
+class WaitingPace(Parameters):
     """How fast a reference may go that can be stopped within a time, whatever has been before.
 
     The pace ``z_1`` of a motion follows what is asked for, ``0 <= w <= 1``, through r lags,
@@ -54,12 +54,8 @@ class WaitingPace:
     """
 
     order: int
-    bandwidth: float
-    resting: float
-
-    def __post_init__(self) -> None:
-        require_positive("bandwidth", self.bandwidth)
-        require_between("resting", self.resting, 1e-4, 0.5, "of the planned pace")
+    bandwidth: Positive
+    resting: Annotated[float, Range(0.0001, 0.5, "of the planned pace")]
 
     @property
     def time_to_stop(self) -> float:

@@ -1,15 +1,15 @@
 """What can be chosen of a path whose way points come while the tool moves."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
-import numpy as np
-
-from pfsc_drake.checks import require, require_between, require_not_negative, require_positive
+from pfsc_drake.checks import require
 from pfsc_drake.control.law.timed_reference import StreamLimits
+from pfsc_drake.yaml.rules import Numbers, Parameters, Positive, Range
 
 
 @dataclass
-class StreamParameters:
+class StreamParameters(Parameters):
     """How way points become a path, and how fast it is followed.
 
     Attributes:
@@ -30,30 +30,21 @@ class StreamParameters:
         columns: How many control points are known at once, at least 20.
     """
 
-    spacing: float = 0.01
+    spacing: Annotated[float, Range(0.0001, 1.0, "m")] = 0.01
     through: bool = True
-    least_radius: float = 0.005
-    velocity: float = 0.3
-    acceleration: float = 1.5
-    normal_acceleration: float = 1.5
-    jerk: float = 30.0
-    bandwidth: float = 40.0
-    patience: float = 0.5
-    lower: list[float] = field(default_factory=list)
-    upper: list[float] = field(default_factory=list)
-    columns: int = 48
+    least_radius: Positive = 0.005
+    velocity: Positive = 0.3
+    acceleration: Positive = 1.5
+    normal_acceleration: Positive = 1.5
+    jerk: Positive = 30.0
+    bandwidth: Positive = 40.0
+    patience: Positive = 0.5
+    lower: Annotated[list[float], Numbers(3, empty=True)] = field(default_factory=list)
+    upper: Annotated[list[float], Numbers(3, empty=True)] = field(default_factory=list)
+    columns: Annotated[int, Range(0)] = 48
 
     def __post_init__(self) -> None:
-        require_between("spacing", self.spacing, 1e-4, 1.0, "m")
-        for key in ("least_radius", "normal_acceleration", "jerk", "patience"):
-            require_positive(key, getattr(self, key))
-        for key in ("velocity", "acceleration", "bandwidth"):
-            require_positive(key, getattr(self, key))
-        require_not_negative("columns", self.columns)
-        for key in ("lower", "upper"):
-            values = getattr(self, key)
-            good = len(values) in (0, 3) and bool(np.isfinite(values).all())
-            require(good, key, values, "three numbers, or none")
+        super().__post_init__()
         if self.lower and self.upper:
             inside = all(a < b for a, b in zip(self.lower, self.upper, strict=True))
             require(inside, "upper", self.upper, f"more than lower, {self.lower}")

@@ -1,17 +1,18 @@
 """How leader and follower are coupled, and the numbers that keep them passive."""
 
-import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import casadi as ca
 
-from pfsc_drake.errors import require, require_one_of, require_positive
+from pfsc_drake.errors import require
+from pfsc_drake.yaml.rules import NotNegative, OneOf, Parameters, Positive, Range
 
 COUPLINGS = ("waves", "position_force", "four_channel")
 
 
 @dataclass
-class PortTankParameters:
+class PortTankParameters(Parameters):
     """Energy that one side may give to what it moves, beyond what it got [J].
 
     Attributes:
@@ -22,22 +23,19 @@ class PortTankParameters:
             only while the other side lacks energy.
     """
 
-    capacity: float = 4.0
+    capacity: Positive = 4.0
     initial: float = 0.2
-    refill: float = 20.0
-    share: float = 20.0
+    refill: NotNegative = 20.0
+    share: NotNegative = 20.0
 
     def __post_init__(self) -> None:
-        require_positive("capacity", self.capacity)
+        super().__post_init__()
         good = 0.0 < self.initial <= self.capacity
         require(good, "initial", self.initial, f"above 0, up to the capacity, {self.capacity:g} J")
-        for key in ("refill", "share"):
-            value = getattr(self, key)
-            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
 
 
 @dataclass
-class RotationParameters:
+class RotationParameters(Parameters):
     """How turns are coupled, three axes more, about those of the world.
 
     Attributes:
@@ -47,20 +45,14 @@ class RotationParameters:
         scale: How far the follower turns by the leader's turn.
     """
 
-    impedance: float = 1.0
-    stiffness: float = 20.0
-    damping: float = 1.0
-    scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        for key in ("impedance", "stiffness", "scale"):
-            require_positive(key, getattr(self, key))
-        good = 0.0 <= self.damping < math.inf
-        require(good, "damping", self.damping, "zero or a positive number")
+    impedance: Positive = 1.0
+    stiffness: Positive = 20.0
+    damping: NotNegative = 1.0
+    scale: Positive = 1.0
 
 
 @dataclass
-class CouplingParameters:
+class CouplingParameters(Parameters):
     """How leader and follower are coupled, in lengths and forces of the follower.
 
     Attributes:
@@ -82,28 +74,18 @@ class CouplingParameters:
         rotation: How turns are coupled; null for three axes.
     """
 
-    coupling: str = "waves"
+    coupling: Annotated[str, OneOf(COUPLINGS)] = "waves"
     passive: bool = True
-    impedance: float = 40.0
-    stiffness: float = 1000.0
-    damping: float = 40.0
-    force_share: float = 0.5
-    motion_scale: float = 1.0
-    force_scale: float = 1.0
-    smoothing: float = 0.01
-    velocity_smoothing: float = 0.004
+    impedance: Positive = 40.0
+    stiffness: Positive = 1000.0
+    damping: NotNegative = 40.0
+    force_share: Annotated[float, Range(0.0, 1.0)] = 0.5
+    motion_scale: Positive = 1.0
+    force_scale: Positive = 1.0
+    smoothing: NotNegative = 0.01
+    velocity_smoothing: NotNegative = 0.004
     tank: PortTankParameters = field(default_factory=PortTankParameters)
     rotation: RotationParameters | None = None
-
-    def __post_init__(self) -> None:
-        require_one_of("coupling", self.coupling, COUPLINGS)
-        for key in ("impedance", "stiffness", "motion_scale", "force_scale"):
-            require_positive(key, getattr(self, key))
-        for key in ("damping", "smoothing", "velocity_smoothing"):
-            value = getattr(self, key)
-            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
-        good = 0.0 <= self.force_share <= 1.0
-        require(good, "force_share", self.force_share, "0 to 1")
 
     @property
     def axes(self) -> int:
@@ -137,7 +119,7 @@ class CouplingParameters:
 
 
 @dataclass(frozen=True)
-class PortLimits:
+class PortLimits(Parameters):
     """What a port may count on, of what it moves.
 
     Attributes:
@@ -152,20 +134,12 @@ class PortLimits:
         InputError: If a number is out of range.
     """
 
-    force: float
-    speed: float
-    ticks_late: int
-    period: float
-    moment: float = 0.0
-    turning: float = 0.0
-
-    def __post_init__(self) -> None:
-        for key in ("force", "speed", "period"):
-            require_positive(key, getattr(self, key))
-        for key in ("moment", "turning"):
-            value = getattr(self, key)
-            require(0.0 <= value < math.inf, key, value, "zero or a positive number")
-        require(0 <= self.ticks_late <= 10, "ticks_late", self.ticks_late, "0 to 10")
+    force: Positive
+    speed: Positive
+    ticks_late: Annotated[int, Range(0, 10)]
+    period: Positive
+    moment: NotNegative = 0.0
+    turning: NotNegative = 0.0
 
     @property
     def reserve(self) -> float:

@@ -1,16 +1,11 @@
 """How a tool yields to forces, and how those are known without a sensor."""
 
 import dataclasses as dc
+from typing import Annotated
 
 import numpy as np
 
-from pfsc_drake.checks import (
-    require,
-    require_between,
-    require_not_negative,
-    require_one_of,
-    require_positive,
-)
+from pfsc_drake.checks import require, require_between
 from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
     ImpedanceParameters,
@@ -18,6 +13,7 @@ from pfsc_drake.control.compliance.impedance_parameters import (
 )
 from pfsc_drake.control.compliance.pressing import PressParameters
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
+from pfsc_drake.yaml.rules import NotNegative, OneOf, Parameters, Positive
 
 SOURCES = ("sensor", "observed")
 # of what a hand feels: least and most mass, most damping, most stiffness, and their units
@@ -27,7 +23,7 @@ _BOUNDS = {"tangential": _OF_PLACES, "transversal": _OF_PLACES, "rotational": _O
 
 
 @dc.dataclass
-class ObservedForceParameters:
+class ObservedForceParameters(Parameters):
     """Forces on the tool from the torques in the joints, without a sensor.
 
     Attributes:
@@ -37,19 +33,14 @@ class ObservedForceParameters:
         torque_dead_band: [Nm].
     """
 
-    rate: float = 100.0
-    damping: float = 0.02
-    force_dead_band: float = 0.0
-    torque_dead_band: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive("rate", self.rate)
-        for key in ("damping", "force_dead_band", "torque_dead_band"):
-            require_not_negative(key, getattr(self, key))
+    rate: Positive = 100.0
+    damping: NotNegative = 0.02
+    force_dead_band: NotNegative = 0.0
+    torque_dead_band: NotNegative = 0.0
 
 
 @dc.dataclass
-class ComplianceParameters:
+class ComplianceParameters(Parameters):
     """How the tool yields to measured forces (3.42), (3.44); what is not given stays rigid.
 
     Attributes:
@@ -67,7 +58,7 @@ class ComplianceParameters:
             itself cannot go on; in space see ``fixtures.limits``.
     """
 
-    source: str = "sensor"
+    source: Annotated[str, OneOf(SOURCES)] = "sensor"
     observed: ObservedForceParameters = dc.field(default_factory=ObservedForceParameters)
     tangential: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
     transversal: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
@@ -77,7 +68,7 @@ class ComplianceParameters:
     limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
 
     def __post_init__(self) -> None:
-        require_one_of("source", self.source, SOURCES)
+        super().__post_init__()
         for kind, bounds in _BOUNDS.items():
             _require_bearable(kind, getattr(self, kind), *bounds)
         stiffness = self.transversal.stiffness

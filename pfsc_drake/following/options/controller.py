@@ -1,23 +1,23 @@
 """Options of a law: gains, poles, forces that it is told of, and the posture of spare joints."""
 
 import dataclasses as dc
+from typing import Annotated
 
-import numpy as np
-
-from pfsc_drake.checks import (
-    LARGEST_ANGLE,
-    require,
-    require_between,
-    require_not_negative,
-    require_one_of,
-    require_positive,
-)
+from pfsc_drake.checks import LARGEST_ANGLE, require, require_one_of
 from pfsc_drake.control.estimation.link_deviation import StateUncertainty
 from pfsc_drake.control.law.following_law import BEYOND_END_RANGE, MAX_BEYOND_END
 from pfsc_drake.control.law.laws import LAWS, Law
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
-from pfsc_drake.yaml.reading import NAME_OR_FILE
-from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_FOR_ALL
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, NAME_OR_FILE, ONE_FOR_ALL
+from pfsc_drake.yaml.rules import (
+    NotNegative,
+    Numbers,
+    OneOf,
+    Parameters,
+    Positive,
+    Positives,
+    Range,
+)
 
 POSTURE_TASKS = ("reference", "limits", "conditioning", "elbow")
 _WEIGHTS = ("identity", "inertia", "range")
@@ -26,7 +26,7 @@ _ELBOW_JOINTS = (2, 4, 6)
 
 
 @dc.dataclass
-class PostureParameters:
+class PostureParameters(Parameters):
     """Posture of a robot with more joints than the task has outputs.
 
     The joints stay next to a posture reference as far as the outputs let them, with the poles of
@@ -56,35 +56,27 @@ class PostureParameters:
         observer_rate: How fast torques are observed [rad/s].
     """
 
-    task: str = "reference"
-    reference_deg: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
-    weight: str = "identity"
-    joint_weights: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
+    task: Annotated[str, OneOf(POSTURE_TASKS)] = "reference"
+    reference_deg: Annotated[
+        list[float], Numbers(each=Range(-LARGEST_ANGLE, LARGEST_ANGLE, "deg"))
+    ] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
+    weight: Annotated[str, OneOf(_WEIGHTS)] = "identity"
+    joint_weights: Positives = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     elbow_joints: list[int] = dc.field(default_factory=lambda: list(_ELBOW_JOINTS))
-    inertia: float = 1.0
-    damping: float = 20.0
-    stiffness: float = 50.0
-    filter_rate: float = 30.0
-    yields: str = "none"
-    observer_rate: float = 60.0
+    inertia: Positive = 1.0
+    damping: Positive = 20.0
+    stiffness: NotNegative = 50.0
+    filter_rate: Positive = 30.0
+    yields: Annotated[str, OneOf(_YIELD_SOURCES)] = "none"
+    observer_rate: Positive = 60.0
 
     def __post_init__(self) -> None:
-        require_one_of("task", self.task, POSTURE_TASKS)
-        require_one_of("weight", self.weight, _WEIGHTS)
-        require_one_of("yields", self.yields, _YIELD_SOURCES)
-        good = all(abs(angle) <= LARGEST_ANGLE for angle in self.reference_deg)
-        allowed = f"numbers of at most {LARGEST_ANGLE:g} deg"
-        require(good, "reference_deg", self.reference_deg, allowed)
-        good = all(0.0 < weight < np.inf for weight in self.joint_weights)
-        require(good, "joint_weights", self.joint_weights, "positive numbers")
+        super().__post_init__()
         alone = not self.joint_weights or self.weight == "identity"
         require(alone, "joint_weights", self.joint_weights, "empty where weight is given")
         joints = self.elbow_joints
         good = len(joints) == 3 and 0 < joints[0] < joints[1] < joints[2]
         require(good, "elbow_joints", joints, "3 numbers of joints in ascending order")
-        for key in ("inertia", "damping", "filter_rate", "observer_rate"):
-            require_positive(key, getattr(self, key))
-        require_not_negative("stiffness", self.stiffness)
 
     @property
     def is_pulled(self) -> bool:
@@ -98,7 +90,7 @@ _TORQUE_SOURCES = ("none", "known", "measured", "observed")
 
 
 @dc.dataclass
-class GainParameters:
+class GainParameters(Parameters):
     """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
 
     Attributes:
@@ -118,18 +110,15 @@ class GainParameters:
     poles: list[float] = dc.field(default_factory=list, metadata=AUTO_OR_MANY)
     coefficients: list[float] = dc.field(default_factory=list)
     integral: float = 0.0
-    integral_pole: float = 0.0
-    bandwidth: float = 0.0
-    bears: float = 0.05
+    integral_pole: Annotated[float, Range(most=0.0, words="zero or a negative number")] = 0.0
+    bandwidth: NotNegative = 0.0
+    bears: Annotated[float, Range(0.0, 0.5, words="a fraction from 0 to 0.5")] = 0.05
     free: bool = False
 
     def __post_init__(self) -> None:
-        require_not_negative("bandwidth", self.bandwidth)
-        good = self.integral_pole <= 0.0 and bool(np.isfinite(self.integral_pole))
-        require(good, "integral_pole", self.integral_pole, "zero or a negative number")
+        super().__post_init__()
         alone = self.integral_pole != 0.0 and bool(self.coefficients)
         require(not alone, "integral_pole", self.integral_pole, "0 with coefficients; see integral")
-        require(0.0 <= self.bears <= 0.5, "bears", self.bears, "a fraction from 0 to 0.5")
         held = self.bandwidth or self.integral or self.integral_pole
         require(
             not (self.free and held),
@@ -192,7 +181,7 @@ class LawGains:
 
 
 @dc.dataclass
-class ExternalTorqueParameters:
+class ExternalTorqueParameters(Parameters):
     """What the law knows of the external torques in the joints.
 
     Attributes:
@@ -204,14 +193,11 @@ class ExternalTorqueParameters:
             derivatives, which only an observer cannot do.
     """
 
-    source: str = "none"
-    bandwidth: float = 0.0
+    source: Annotated[str, OneOf(_TORQUE_SOURCES)] = "none"
+    bandwidth: Annotated[float, Range(_SLOWEST, _FASTEST, "rad/s", besides=0.0)] = 0.0
 
     def __post_init__(self) -> None:
-        require_one_of("source", self.source, _TORQUE_SOURCES)
-        good = self.bandwidth == 0.0 or _SLOWEST <= self.bandwidth <= _FASTEST
-        allowed = f"0, or {_SLOWEST:g} to {_FASTEST:g} rad/s"
-        require(good, "bandwidth", self.bandwidth, allowed)
+        super().__post_init__()
         possible = self.source != "observed" or self.bandwidth > 0.0
         require(possible, "bandwidth", self.bandwidth, "a positive number with source observed")
 
@@ -220,7 +206,7 @@ STATES = ("measured", "from_torque", "observed")
 
 
 @dc.dataclass
-class ControllerParameters:
+class ControllerParameters(Parameters):
     """The path following controller.
 
     Attributes:
@@ -258,27 +244,27 @@ class ControllerParameters:
             ticks to the middle of that for which they are held, as those of the elastic laws are.
     """
 
-    law: str = "elastic"
+    law: Annotated[str, OneOf(LAWS)] = "elastic"
     gains: dict[str, LawGains] = dc.field(default_factory=dict)
-    sampling_time: float = 1e-3
+    sampling_time: Annotated[float, Range(1e-05, 0.1, "s, a positive number")] = 1e-3
     boundary_layer_damping: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
     min_rcond: float = 1e-3
     damped_below: float = 0.0
     max_alpha: float = 0.95
-    max_beyond_end: float = MAX_BEYOND_END
-    brake_damping: float = 0.1
-    effort_scale: float = 1.0
-    manifold: str = "path"
+    max_beyond_end: Annotated[float, Range(*BEYOND_END_RANGE, "m")] = MAX_BEYOND_END
+    brake_damping: NotNegative = 0.1
+    effort_scale: Positive = 1.0
+    manifold: Annotated[str, OneOf(MANIFOLDS)] = "path"
     external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
     model: str = dc.field(default="", metadata=NAME_OR_FILE)
     friction: FrictionCompensationParameters = dc.field(
         default_factory=FrictionCompensationParameters
     )
     posture: PostureParameters = dc.field(default_factory=PostureParameters)
-    state: str = "measured"
-    state_bandwidth: float = 800.0
+    state: Annotated[str, OneOf(STATES)] = "measured"
+    state_bandwidth: Positive = 800.0
     state_uncertainty: StateUncertainty = dc.field(default_factory=StateUncertainty)
-    delay: float | None = None
+    delay: NotNegative | None = None
     torque_lead: bool = False
 
     @property
@@ -287,22 +273,11 @@ class ControllerParameters:
         return LAWS[self.law]
 
     def __post_init__(self) -> None:
-        require_one_of("state", self.state, STATES)
-        require_positive("state_bandwidth", self.state_bandwidth)
-        require_not_negative("delay", self.delay or 0.0)
-        require_one_of("law", self.law, LAWS)
+        super().__post_init__()
         allowed = "false but with the law 'rigid'; the elastic laws lead their torques anyway"
         require(self.law_record.can_lead or not self.torque_lead, "torque_lead", True, allowed)
-        require_one_of("manifold", self.manifold, MANIFOLDS)
         for law in self.gains:
             require_one_of("gains", law, LAWS)
-        in_range = 1e-5 <= self.sampling_time <= 0.1
-        require(
-            in_range, "sampling_time", self.sampling_time, "a positive number from 1e-5 to 0.1 s"
-        )
         good = self.damped_below == 0.0 or self.min_rcond < self.damped_below < 1.0
         allowed = f"0, or above min_rcond = {self.min_rcond:g} and below 1"
         require(good, "damped_below", self.damped_below, allowed)
-        require_between("max_beyond_end", self.max_beyond_end, *BEYOND_END_RANGE, "m")
-        require_positive("effort_scale", self.effort_scale)
-        require_not_negative("brake_damping", self.brake_damping)

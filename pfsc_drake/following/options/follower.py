@@ -2,10 +2,10 @@
 
 import dataclasses as dc
 from collections.abc import Callable, Sequence
+from typing import Annotated
 
 import numpy as np
 
-from pfsc_drake.checks import require, require_between, require_not_negative, require_positive
 from pfsc_drake.control.compliance.tuned_impedance import REQUESTS, TuningParameters
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters, RobotLimitParameters
 from pfsc_drake.control.law.swing import Swing
@@ -18,11 +18,12 @@ from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.motion import MotionLimits
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.yaml.typed import ONE_OR_MANY
+from pfsc_drake.yaml.fields import ONE_OR_MANY
+from pfsc_drake.yaml.rules import Count, NotNegative, NotNegatives, Parameters, Positive, Range
 
 
 @dc.dataclass
-class BrakeParameters:
+class BrakeParameters(Parameters):
     """Holding brakes on the motors, which close at stop category 0.
 
     Attributes:
@@ -31,17 +32,12 @@ class BrakeParameters:
         delay: From the request until they hold [s].
     """
 
-    torque: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
-    delay: float = 0.1
-
-    def __post_init__(self) -> None:
-        valid = all(0.0 <= value < np.inf for value in self.torque)
-        require(valid, "torque", self.torque, "finite numbers, none negative")
-        require_not_negative("delay", self.delay)
+    torque: NotNegatives = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    delay: NotNegative = 0.1
 
 
 @dc.dataclass
-class FaultParameters:
+class FaultParameters(Parameters):
     """What is a fault beside what every law takes for one, and what happens then.
 
     Attributes:
@@ -63,24 +59,14 @@ class FaultParameters:
             hold it.
     """
 
-    plausibility: float = 2e-3
+    plausibility: NotNegative = 2e-3
     joint_limits: bool = True
-    overspeed: float = 0.1
-    saturation_time: float | None = None
-    chatter_turns: float = 6.0
-    hold_bandwidth: float = 60.0
-    effort_share: float = 0.7
+    overspeed: Annotated[float, Range(0.0, infinite=True)] = 0.1
+    saturation_time: NotNegative | None = None
+    chatter_turns: NotNegative = 6.0
+    hold_bandwidth: Positive = 60.0
+    effort_share: Annotated[float, Range(0.0, 1.0, open=True)] = 0.7
     brakes: BrakeParameters | None = dc.field(default_factory=BrakeParameters)
-
-    def __post_init__(self) -> None:
-        require_not_negative("plausibility", self.plausibility)
-        require(self.overspeed >= 0.0, "overspeed", self.overspeed, "zero or a positive number")
-        if self.saturation_time is not None:
-            require_not_negative("saturation_time", self.saturation_time)
-        require_not_negative("chatter_turns", self.chatter_turns)
-        require_positive("hold_bandwidth", self.hold_bandwidth)
-        good = 0.0 < self.effort_share <= 1.0
-        require(good, "effort_share", self.effort_share, "above 0, at most 1")
 
 
 # at a sample, so that a region that comes near is found beside those that are
@@ -88,7 +74,7 @@ _FEWEST_LOOKS = 2
 
 
 @dc.dataclass
-class FixtureOptions:
+class FixtureOptions(Parameters):
     """What limits a tool that is led through space.
 
     Attributes:
@@ -102,17 +88,14 @@ class FixtureOptions:
 
     guidance: GuidanceParameters = dc.field(default_factory=GuidanceParameters)
     limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
-    smoothing: float = 0.003
-    looks: int = 0
-
-    def __post_init__(self) -> None:
-        require_between("smoothing", self.smoothing, 1e-3, 0.1, "s")
-        good = self.looks == 0 or self.looks >= _FEWEST_LOOKS
-        require(good, "looks", self.looks, f"0, or {_FEWEST_LOOKS} and more")
+    smoothing: Annotated[float, Range(0.001, 0.1, "s")] = 0.003
+    looks: Annotated[
+        int, Range(_FEWEST_LOOKS, besides=0, words=f"0, or {_FEWEST_LOOKS} and more")
+    ] = 0
 
 
 @dc.dataclass
-class ObstacleOptions:
+class ObstacleOptions(Parameters):
     """Obstacles that progress along a path waits for.
 
     Attributes:
@@ -121,12 +104,9 @@ class ObstacleOptions:
         elbow: How the elbow of an arm with joints to spare avoids them; it does not if omitted.
     """
 
-    shapes: list[ObstacleShape]
+    shapes: Annotated[list[ObstacleShape], Count(1)]
     watch: WatchParameters = dc.field(default_factory=WatchParameters)
     elbow: ElbowParameters | None = None
-
-    def __post_init__(self) -> None:
-        require(bool(self.shapes), "shapes", "none", "one or more")
 
 
 @dc.dataclass

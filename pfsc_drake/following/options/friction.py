@@ -1,13 +1,20 @@
 """What the controller does about friction."""
 
 import dataclasses as dc
+from typing import Annotated
 
-import numpy as np
-
-from pfsc_drake.checks import require, require_not_negative, require_one_of, require_positive
+from pfsc_drake.checks import require
 from pfsc_drake.physics.friction import FrictionDrift
-from pfsc_drake.yaml.reading import NAME_OR_FILE
-from pfsc_drake.yaml.typed import ONE_FOR_ALL, ONE_OR_MANY
+from pfsc_drake.yaml.fields import NAME_OR_FILE, ONE_FOR_ALL, ONE_OR_MANY
+from pfsc_drake.yaml.rules import (
+    NotNegative,
+    NotNegatives,
+    Numbers,
+    OneOf,
+    Parameters,
+    Positive,
+    Range,
+)
 
 _SOURCES = ("none", "model", "observer")
 _OBSERVERS = ("disturbance", "kalman")
@@ -19,7 +26,7 @@ _LARGEST = 1e9  # of friction; what it multiplies stays within a float
 
 
 @dc.dataclass
-class JointFrictionParameters:
+class JointFrictionParameters(Parameters):
     """Coulomb and viscous friction of the joints; empty for none.
 
     Attributes:
@@ -33,21 +40,20 @@ class JointFrictionParameters:
             Gears have 1 to 1000 urad.
     """
 
-    f_c: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
-    f_v: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
+    f_c: Annotated[list[float], Numbers(each=Range(0.0, _LARGEST))] = dc.field(
+        default_factory=list, metadata=ONE_FOR_ALL
+    )
+    f_v: Annotated[list[float], Numbers(each=Range(0.0, _LARGEST))] = dc.field(
+        default_factory=list, metadata=ONE_FOR_ALL
+    )
     file: str = dc.field(default="", metadata=NAME_OR_FILE)
     drift: FrictionDrift | None = None
-    presliding: list[float] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
+    presliding: Annotated[
+        list[float], Numbers(each=Range(_PRESLIDING[0], _PRESLIDING[1], "rad or m"))
+    ] = dc.field(default_factory=list, metadata=ONE_FOR_ALL)
 
     def __post_init__(self) -> None:
-        low, high = _PRESLIDING
-        valid = all(low <= value <= high for value in self.presliding)
-        allowed = f"numbers between {low:g} and {high:g} (rad or m)"
-        require(valid, "presliding", self.presliding, allowed)
-        for key in ("f_c", "f_v"):
-            values = getattr(self, key)
-            valid = all(0.0 <= value <= _LARGEST for value in values)
-            require(valid, key, values, f"finite numbers, none negative, at most {_LARGEST:g}")
+        super().__post_init__()
         given = bool(self.f_c or self.f_v)
         require(not (self.file and given), "file", self.file, "either file, or f_c and f_v")
 
@@ -58,7 +64,7 @@ class JointFrictionParameters:
 
 
 @dc.dataclass
-class KalmanParameters:
+class KalmanParameters(Parameters):
     """The friction Kalman filter, see :class:`FrictionKalmanFilter`.
 
     Numbers of the same kind are one for all joints or one per joint.
@@ -77,30 +83,23 @@ class KalmanParameters:
             [rad/s or m/s]; ``intervals: mean`` only.
     """
 
-    intervals: str = "mean"
-    start: float = 1.0
-    momentum_noise: list[float] = dc.field(default_factory=lambda: [1e-6], metadata=ONE_OR_MANY)
-    coulomb_noise: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
-    viscous_noise: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
-    measurement_noise: list[float] = dc.field(default_factory=lambda: [1e-3], metadata=ONE_OR_MANY)
-    initial_variance: float = 1e3
-    resting_velocity: float = 0.01
-
-    def __post_init__(self) -> None:
-        require_one_of("intervals", self.intervals, ("mean", "begin"))
-        for key in ("start", "initial_variance", "resting_velocity"):
-            require_not_negative(key, getattr(self, key))
-        for key in ("momentum_noise", "coulomb_noise", "viscous_noise"):
-            good = all(0.0 <= x < np.inf for x in getattr(self, key))
-            require(good, key, getattr(self, key), "finite numbers, none negative")
-        require(bool(self.momentum_noise), "momentum_noise", [], "one number or one per joint")
-        noise = self.measurement_noise
-        good = bool(noise) and all(0.0 < x < np.inf for x in noise)
-        require(good, "measurement_noise", noise, "positive numbers")
+    intervals: Annotated[str, OneOf(("mean", "begin"))] = "mean"
+    start: NotNegative = 1.0
+    momentum_noise: Annotated[
+        list[float],
+        Numbers(each=Range(0.0), fewest=1, words="numbers, none negative, one or one per joint"),
+    ] = dc.field(default_factory=lambda: [1e-6], metadata=ONE_OR_MANY)
+    coulomb_noise: NotNegatives = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    viscous_noise: NotNegatives = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    measurement_noise: Annotated[list[float], Numbers(each=Range(0.0, open=True), fewest=1)] = (
+        dc.field(default_factory=lambda: [1e-3], metadata=ONE_OR_MANY)
+    )
+    initial_variance: NotNegative = 1e3
+    resting_velocity: NotNegative = 0.01
 
 
 @dc.dataclass
-class FrictionCompensationParameters:
+class FrictionCompensationParameters(Parameters):
     """Friction that the drive torques overcome, (2.42), (3.29), (3.58), (3.65).
 
     What is believed of it is what the plant has, unless ``believed`` says otherwise. Nothing of
@@ -123,22 +122,18 @@ class FrictionCompensationParameters:
             :class:`RestHold`; with ``none`` they do not.
     """
 
-    source: str = "none"
-    velocity: str = "measured"
-    smoothing: float = 0.02
-    observer: str = "disturbance"
-    rate: float = 300.0
+    source: Annotated[str, OneOf(_SOURCES)] = "none"
+    velocity: Annotated[str, OneOf(_VELOCITIES)] = "measured"
+    smoothing: Positive = 0.02
+    observer: Annotated[str, OneOf(_OBSERVERS)] = "disturbance"
+    rate: Positive = 300.0
     kalman: KalmanParameters = dc.field(default_factory=KalmanParameters)
     watched: bool = False
     believed: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
     hold_at_rest: bool = True
 
     def __post_init__(self) -> None:
-        require_one_of("source", self.source, _SOURCES)
-        require_one_of("velocity", self.velocity, _VELOCITIES)
-        require_one_of("observer", self.observer, _OBSERVERS)
-        require_positive("smoothing", self.smoothing)
-        require_positive("rate", self.rate)
+        super().__post_init__()
         told = self.velocity == "measured" or self.source == "none" or self.has_coefficients
         allowed = "measured; the disturbance observer knows no friction that acts on a velocity"
         require(told, "velocity", self.velocity, allowed)

@@ -1,21 +1,25 @@
 """How a motion is adapted to the drives."""
 
 import dataclasses as dc
+from typing import Annotated
 
 import numpy as np
 
-from pfsc_drake.errors import require, require_one_of
 from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.yaml.rules import OneOf, Parameters, Range
 
 _LIMITS = ("respect", "warn")
 _SPEEDS = ("asked", "fastest")
 _VELOCITY = 0.1  # m/s
+# beyond, durations have no digits left, or none at all
+VELOCITY = Range(1e-6, 1e3, "m/s, a positive number")
+ACCELERATION = Range(1e-6, 1e6, "m/s^2, a positive number")
 # samples of a motion whose largest rates are looked for, and the least of these [m/s, m/s^2]
 _SAMPLES, _SLOWEST = 2001, 1e-6
 
 
 @dc.dataclass(kw_only=True)
-class MotionLimits:
+class MotionLimits(Parameters):
     """What a motion may take of the drives.
 
     Attributes:
@@ -32,19 +36,13 @@ class MotionLimits:
             ten times their largest torque in a second; infinite for any.
     """
 
-    velocity: float | None = None
-    acceleration: float = 1.0
-    dwell: float = 0.3
-    limits: str = "respect"
-    reserve: float = 0.3
-    speed: str = "asked"
-    torque_rate: float = 1000.0
-
-    def __post_init__(self) -> None:
-        require_one_of("limits", self.limits, _LIMITS)
-        require(0.0 <= self.reserve < 1.0, "reserve", self.reserve, "from 0 to below 1")
-        require_one_of("speed", self.speed, _SPEEDS)
-        require(self.torque_rate > 0.0, "torque_rate", self.torque_rate, "a positive number")
+    velocity: Annotated[float, VELOCITY] | None = None
+    acceleration: Annotated[float, ACCELERATION] = 1.0
+    dwell: Annotated[float, Range(1e-6, 1e6, "s", besides=0.0)] = 0.3
+    limits: Annotated[str, OneOf(_LIMITS)] = "respect"
+    reserve: Annotated[float, Range(0.0, 1.0, below=True)] = 0.3
+    speed: Annotated[str, OneOf(_SPEEDS)] = "asked"
+    torque_rate: Annotated[float, Range(0.0, open=True, infinite=True)] = 1000.0
 
     @property
     def largest_velocity(self) -> float:

@@ -20,7 +20,7 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.robot.robot_model import largest_speeds
 from pfsc_drake.robot.singular_posture import singular_posture
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 # share of joint speeds that is left where torques are commanded
 _SPEED_RESERVE = 0.05

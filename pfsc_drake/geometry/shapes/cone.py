@@ -2,6 +2,7 @@
 
 import dataclasses as dc
 import math
+from typing import Annotated
 
 import casadi as ca
 import numpy as np
@@ -23,6 +24,7 @@ from pfsc_drake.geometry.shapes.revolution import (
 )
 from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs, pair, require_ends
 from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.yaml.rules import Range
 
 
 @dc.dataclass
@@ -34,13 +36,11 @@ class Cone(OfRevolution):
         distances: First and last theta_2 [m], positive.
     """
 
-    opening_deg: float = 30.0
+    opening_deg: Annotated[float, Range(0.0, 90.0, "deg", open=True, below=True)] = 30.0
     distances: list[float] = dc.field(default_factory=lambda: [0.1, 0.4])
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        allowed = "above 0 and below 90 deg"
-        require(0.0 < self.opening_deg < 90.0, "opening_deg", self.opening_deg, allowed)
         require_ends("distances", self.distances)
         allowed = "positive numbers of m: a cone has no normal at its apex"
         require(self.distances[0] > 0.0, "distances", self.distances, allowed)

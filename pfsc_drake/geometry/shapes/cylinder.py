@@ -5,7 +5,6 @@ import dataclasses as dc
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from pfsc_drake.checks import require_length
 from pfsc_drake.geometry.regions.region import (
     Region,
     Symbol,
@@ -21,6 +20,7 @@ from pfsc_drake.geometry.shapes.revolution import (
 )
 from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs, pair, require_ends
 from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.yaml.rules import Length
 
 
 @dc.dataclass
@@ -32,12 +32,11 @@ class Cylinder(OfRevolution):
         heights: First and last theta_2 [m].
     """
 
-    radius: float = 0.1
+    radius: Length = 0.1
     heights: list[float] = dc.field(default_factory=lambda: [-0.2, 0.2])
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_length("radius", self.radius)
         require_ends("heights", self.heights)
 
     def surface(self, inputs: ShapeInputs) -> MadeSurface:

@@ -1,18 +1,11 @@
 """Surfaces fitted to points, as a workpiece is scanned."""
 
 import dataclasses as dc
-from typing import Literal, cast
+from typing import Annotated, Literal, cast
 
 import numpy as np
 
-from pfsc_drake.checks import (
-    FARTHEST,
-    FILE,
-    require,
-    require_direction,
-    require_one_of,
-    require_place,
-)
+from pfsc_drake.checks import FARTHEST, require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import UNITS, Unit
 from pfsc_drake.geometry.regions.region import Region
@@ -21,7 +14,7 @@ from pfsc_drake.geometry.shapes.shape import (
     MadeSurface,
     PlacedSurface,
     ShapeInputs,
-    require_smoothness,
+    Smoothness,
 )
 from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
@@ -29,9 +22,13 @@ from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.point_file import read_surface_file
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
+from pfsc_drake.yaml.fields import FILE
+from pfsc_drake.yaml.rules import Count, MaybeDirection, MaybePoint, OneOf, Range
 
 _BASES = ("auto", "plane", "cylinder")
 _SHORTEST_TOLERANCE = 1e-7  # m
+_Tolerance = Annotated[float, Range(_SHORTEST_TOLERANCE, FARTHEST, "m", besides=0.0)]
+_OfGrid = Annotated[list[bool], Count(2, 2, words="two of true and false")]
 # times the distance of points, from which on a place without any is a hole
 _HOLE = 2.0
 # how many times further apart neighbours are where a row ends unseen
@@ -65,39 +62,25 @@ class Fitted(PlacedSurface):
     """
 
     file: str = dc.field(default="", metadata=FILE)
-    unit: str = "m"
+    unit: Annotated[str, OneOf(tuple(UNITS))] = "m"
     grid: list[int] = dc.field(default_factory=list)
-    closed: list[bool] = dc.field(default_factory=lambda: [False, False])
-    tolerance: float = 0.0
+    closed: _OfGrid = dc.field(default_factory=lambda: [False, False])
+    tolerance: _Tolerance = 0.0
     interpolate: bool = False
-    smoothness: int = 0
-    base: str = "auto"
-    base_axis: list[float] = dc.field(default_factory=list)
-    base_point: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    seen_from: list[float] = dc.field(default_factory=list)
-    along: list[float] = dc.field(default_factory=list)
-    largest_hole: float = 0.0
+    smoothness: Smoothness = 0
+    base: Annotated[str, OneOf(_BASES)] = "auto"
+    base_axis: MaybeDirection = dc.field(default_factory=list)
+    base_point: MaybePoint = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    seen_from: MaybePoint = dc.field(default_factory=list)
+    along: MaybeDirection = dc.field(default_factory=list)
+    largest_hole: _Tolerance = 0.0
     trim: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key, values in {"unit": UNITS, "base": _BASES}.items():
-            require_one_of(key, getattr(self, key), values)
-        require_smoothness(self.smoothness)
-        for key in ("tolerance", "largest_hole"):
-            value = getattr(self, key)
-            good = value == 0.0 or _SHORTEST_TOLERANCE <= value <= FARTHEST
-            require(good, key, value, f"0, or {_SHORTEST_TOLERANCE:g} m to {FARTHEST:g} m")
         good = len(self.grid) in (0, 2) and min(self.grid, default=2) >= 2
         require(good, "grid", self.grid, "empty, or [rows, columns] of two or more each")
-        require(len(self.closed) == 2, "closed", self.closed, "two of true and false")
         self._require_of_grids()
-        for key in ("base_axis", "along"):
-            if getattr(self, key):
-                require_direction(key, getattr(self, key))
-        for key in ("base_point", "seen_from"):
-            if getattr(self, key):
-                require_place(key, getattr(self, key))
         if self.base_axis:
             require(self.base == "cylinder", "base", self.base, "cylinder, with base_axis")
 

@@ -1,9 +1,9 @@
 """Paths along the edge in which two surfaces meet."""
 
 import dataclasses as dc
-from typing import Any
+from typing import Annotated, Any
 
-from pfsc_drake.checks import FARTHEST, require, require_place
+from pfsc_drake.checks import FARTHEST, require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.intersections.edge import Edge, find_edge, find_edges
@@ -11,10 +11,11 @@ from pfsc_drake.geometry.shapes.path_shapes import CurveShape
 from pfsc_drake.geometry.shapes.shape import ShapeInputs
 from pfsc_drake.geometry.shapes.surface_list import SurfaceShape
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
+from pfsc_drake.yaml.rules import MaybePoint, Parameters, Range
 
 
 @dc.dataclass
-class Intersection(CurveShape):
+class Intersection(Parameters, CurveShape):
     """The edge in which two surfaces meet, along the cross product of their normals.
 
     Attributes:
@@ -26,18 +27,15 @@ class Intersection(CurveShape):
     """
 
     surfaces: list[SurfaceShape] = dc.field(default_factory=list)
-    near: list[float] = dc.field(default_factory=list)
-    tolerance: float = 1e-6
+    near: MaybePoint = dc.field(default_factory=list)
+    tolerance: Annotated[float, Range(1e-9, FARTHEST, "m")] = 1e-6
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         count = len(self.surfaces)
         require(
             count in (0, 2), "surfaces", f"{count} given", "2, e.g. [!Plane {..}, !Sphere {..}]"
         )
-        if self.near:
-            require_place("near", self.near)
-        good = 1e-9 <= self.tolerance <= FARTHEST
-        require(good, "tolerance", self.tolerance, f"1e-09 m to {FARTHEST:g} m")
 
     def curve(self, inputs: ShapeInputs) -> Curve:
         """Return the edge in which both surfaces meet."""

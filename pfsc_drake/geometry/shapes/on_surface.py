@@ -1,11 +1,11 @@
 """Paths on a surface."""
 
 import dataclasses as dc
-from typing import cast
+from typing import Annotated, cast
 
 import numpy as np
 
-from pfsc_drake.checks import FARTHEST, FILE, require, require_numbers, require_one_of
+from pfsc_drake.checks import FARTHEST, require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation_curve import OrientationCurve
@@ -21,10 +21,12 @@ from pfsc_drake.geometry.paths.waypoints import read_waypoints
 from pfsc_drake.geometry.shapes.shape import PlacedSurface, ShapeInputs
 from pfsc_drake.geometry.shapes.tool_orientation import SurfaceOrientationParameters
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
+from pfsc_drake.yaml.fields import FILE
+from pfsc_drake.yaml.rules import OneOf, Pair, Parameters, Range
 
 
 @dc.dataclass
-class OnSurface:
+class OnSurface(Parameters):
     """A path on the scenario's ``surface``, whose transversal coordinates are normal and sideways.
 
     Its orientation is ``surface.orientation``. It is a spline through waypoints, given either by
@@ -40,19 +42,15 @@ class OnSurface:
         closed: Whether the path is closed.
     """
 
-    thetas: list[list[float]] = dc.field(default_factory=list)
+    thetas: list[Pair] = dc.field(default_factory=list)
     file: str = dc.field(default="", metadata=FILE)
-    unit: str = "m"
-    max_distance: float = 1e-3
+    unit: Annotated[str, OneOf(tuple(UNITS))] = "m"
+    max_distance: Annotated[float, Range(0.0, FARTHEST, "m", open=True)] = 1e-3
     closed: bool = False
 
     def __post_init__(self) -> None:
-        require_one_of("unit", self.unit, UNITS)
+        super().__post_init__()
         require(bool(self.file) or self.unit == "m", "unit", self.unit, "m without a file")
-        for i, theta in enumerate(self.thetas):
-            require_numbers(f"thetas[{i}]", theta, 2)
-        good = 0.0 < self.max_distance <= FARTHEST
-        require(good, "max_distance", self.max_distance, f"a positive number up to {FARTHEST:g} m")
 
     def path_on(
         self,

@@ -3,17 +3,18 @@
 import dataclasses as dc
 import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.region import Region, Symbol
 from pfsc_drake.geometry.shapes.plane import OverRectangle, graph
 from pfsc_drake.geometry.shapes.revolution import Meridian, TurnedRegion
 from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs
 from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.yaml.rules import Range
 
 _MOST_BENT = 1e4  # 1/m
 # A bound, safe from rounding errors.
@@ -30,12 +31,7 @@ class Paraboloid(OverRectangle):
         coefficient: Coefficient of ``theta_1^2 + theta_2^2`` in its height [1/m].
     """
 
-    coefficient: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        good = abs(self.coefficient) <= _MOST_BENT
-        require(good, "coefficient", self.coefficient, f"a number of at most {_MOST_BENT:g} 1/m")
+    coefficient: Annotated[float, Range(-_MOST_BENT, _MOST_BENT, "1/m")] = 1.0
 
     def surface(self, inputs: ShapeInputs) -> MadeSurface:
         """Return the surface, whatever its class."""
@@ -48,7 +44,7 @@ class Paraboloid(OverRectangle):
 
 def paraboloid(
     size: Sequence[float | Pair],
-    coefficient: float,
+    coefficient: Annotated[float, Range(-_MOST_BENT, _MOST_BENT, "1/m")],
     origin: ArrayLike = (0.0, 0.0, 0.0),
     rotation: ArrayLike | None = None,
 ) -> ProductSurface:

@@ -3,14 +3,16 @@
 import dataclasses as dc
 import math
 from abc import ABC, abstractmethod
+from typing import Annotated
 
-from pfsc_drake.checks import require_length, require_numbers, require_place
+from pfsc_drake.checks import require_length
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.fourier_curve import FourierCurve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.paths.geometric_path import Path
 from pfsc_drake.geometry.shapes.shape import ShapeInputs
 from pfsc_drake.geometry.shapes.tool_orientation import OrientationParameters
+from pfsc_drake.yaml.rules import Length, Numbers, Parameters, Point
 
 
 class PathShape(ABC):
@@ -50,7 +52,7 @@ class CurveShape(PathShape):
 
 
 @dc.dataclass
-class Line(CurveShape):
+class Line(Parameters, CurveShape):
     """A straight path.
 
     Attributes:
@@ -58,12 +60,11 @@ class Line(CurveShape):
         end: Last point [m], at least 1e-4 from the first.
     """
 
-    start: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
-    end: list[float] = dc.field(default_factory=lambda: [0.8, 0.3, 1.0])
+    start: Point = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
+    end: Point = dc.field(default_factory=lambda: [0.8, 0.3, 1.0])
 
     def __post_init__(self) -> None:
-        require_place("start", self.start)
-        require_place("end", self.end)
+        super().__post_init__()
         require_length("distance of start and end", math.dist(self.start, self.end))
 
     def curve(self, inputs: ShapeInputs) -> Curve:
@@ -72,7 +73,7 @@ class Line(CurveShape):
 
 
 @dc.dataclass
-class Circle(CurveShape):
+class Circle(Parameters, CurveShape):
     """A circular path ``center + radius (u cos theta + v sin theta)``.
 
     Attributes:
@@ -83,16 +84,10 @@ class Circle(CurveShape):
             its part perpendicular to ``u``. Both lengths are made one.
     """
 
-    center: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
-    radius: float = 0.15
-    axis_u: list[float] = dc.field(default_factory=lambda: [0.0, 1.0, 0.0])
-    axis_v: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-
-    def __post_init__(self) -> None:
-        require_length("radius", self.radius)
-        require_place("center", self.center)
-        for key in ("axis_u", "axis_v"):
-            require_numbers(key, getattr(self, key), 3)
+    center: Point = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
+    radius: Length = 0.15
+    axis_u: Annotated[list[float], Numbers(3)] = dc.field(default_factory=lambda: [0.0, 1.0, 0.0])
+    axis_v: Annotated[list[float], Numbers(3)] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
 
     def curve(self, inputs: ShapeInputs) -> Curve:
         """Return the curve."""

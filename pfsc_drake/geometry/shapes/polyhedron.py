@@ -5,18 +5,21 @@ import itertools
 import math
 from collections.abc import Sequence
 from functools import reduce
+from typing import Annotated
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
-from pfsc_drake.checks import equal, require, require_length, require_numbers
+from pfsc_drake.checks import FARTHEST, SHORTEST, require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.region import FormulaRegion, Region, Symbol, Triple, direction
 from pfsc_drake.geometry.shapes.plane import plane
 from pfsc_drake.geometry.shapes.shape import PlacedShape, ShapeInputs
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface, checked_placement
+from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import Numbers, Range
 
 # Planes whose coefficients differ by less are one, m.
 _SAME = 1e-9
@@ -31,13 +34,9 @@ class Box(PlacedShape):
         size: Along its three axes [m]; one number for a cube.
     """
 
-    size: list[float] = dc.field(default_factory=lambda: [0.1, 0.1, 0.1], metadata=equal(3))
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_numbers("size", self.size, 3)
-        for length in self.size:
-            require_length("size", length)
+    size: Annotated[list[float], Numbers(3, Range(SHORTEST, FARTHEST, "m"))] = dc.field(
+        default_factory=lambda: [0.1, 0.1, 0.1], metadata=equal(3)
+    )
 
     def check_side(self, admissible: str) -> None:
         """Refuse an admissible side that its region does not have."""

@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pfsc_drake.checks import FILE, require_direction, require_length
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import interpolate
@@ -24,11 +23,13 @@ from pfsc_drake.geometry.shapes.shape import (
     MadeSurface,
     PlacedSurface,
     ShapeInputs,
-    require_smoothness,
+    Smoothness,
 )
 from pfsc_drake.geometry.surfaces.point_file import read_profile
 from pfsc_drake.geometry.surfaces.product import extruded_surface
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
+from pfsc_drake.yaml.fields import FILE
+from pfsc_drake.yaml.rules import Direction, Length
 
 Profile = tuple[PiecewisePolynomialCurve, tuple[str, ...]]
 
@@ -44,7 +45,7 @@ class FromProfile(PlacedSurface):
 
     file: str
     closed: bool
-    smoothness: int
+    smoothness: Smoothness
 
     @property
     def encloses(self) -> bool:
@@ -107,11 +108,7 @@ class Revolved(FromProfile, OfRevolution):
 
     file: str = dc.field(default="", metadata=FILE)
     closed: bool = False
-    smoothness: int = 0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_smoothness(self.smoothness)
+    smoothness: Smoothness = 0
 
     def points(self, file: Path) -> tuple[np.ndarray, tuple[str, ...]]:
         """Return radius and height of the profile [m], dimension 2, and what was ignored."""
@@ -150,16 +147,10 @@ class Extruded(FromProfile):
     """
 
     file: str = dc.field(default="", metadata=FILE)
-    direction: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    length: float = 0.2
+    direction: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    length: Length = 0.2
     closed: bool = False
-    smoothness: int = 0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_direction("direction", self.direction)
-        require_length("length", self.length)
-        require_smoothness(self.smoothness)
+    smoothness: Smoothness = 0
 
     def points(self, file: Path) -> tuple[np.ndarray, tuple[str, ...]]:
         """Return the profile in the world [m], dimension 3, and what was ignored."""

@@ -8,20 +8,24 @@ import dataclasses as dc
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from pfsc_drake.checks import FARTHEST, require, require_direction, require_numbers, require_place
+from pfsc_drake.checks import FARTHEST, require, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.regions.region import Region
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface, rotation_from_axes
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
+from pfsc_drake.yaml.rules import Direction, MaybeDirection, Parameters, Point, Range
 
 Pair = tuple[float, float]
 # class C^k of the surface of a region, and of one that is drawn
 _REGION_SMOOTHNESS = 2
+# class C^k of splines
+Smoothness = Annotated[int, Range(2, 6, besides=0, words="0 for what the law needs, or 2 to 6")]
 
 
 @dc.dataclass(frozen=True)
@@ -67,7 +71,7 @@ class MadeSurface:
 
 
 @dc.dataclass
-class PlacedShape(ABC):
+class PlacedShape(Parameters, ABC):
     """Where a shape stands.
 
     Attributes:
@@ -77,15 +81,9 @@ class PlacedShape(ABC):
             along x_0.
     """
 
-    origin: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    start: list[float] = dc.field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        require_place("origin", self.origin)
-        require_direction("axis", self.axis)
-        if self.start:
-            require_direction("start", self.start)
+    origin: Point = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    start: MaybeDirection = dc.field(default_factory=list)
 
     @property
     def rotation(self) -> np.ndarray:
@@ -183,9 +181,3 @@ def require_ends(key: str, values: list[float]) -> None:
     require_numbers(key, values, 2)
     good = -FARTHEST <= values[0] < values[1] <= FARTHEST
     require(good, key, values, f"two numbers that increase, of at most {FARTHEST:g} m")
-
-
-def require_smoothness(value: int) -> None:
-    """Refuse a class C^k that no spline has."""
-    allowed = "0 for what the law needs, or 2 to 6"
-    require(value == 0 or 2 <= value <= 6, "smoothness", value, allowed)

@@ -2,12 +2,13 @@
 
 import dataclasses as dc
 import math
+from typing import Annotated
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pfsc_drake.checks import require, require_length, require_numbers
+from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.fourier_curve import FourierCurve
 from pfsc_drake.geometry.regions.region import (
@@ -26,6 +27,7 @@ from pfsc_drake.geometry.shapes.revolution import (
 )
 from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs, pair
 from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.yaml.rules import Length, Numbers
 
 
 @dc.dataclass
@@ -37,13 +39,13 @@ class Sphere(OfRevolution):
         latitudes_deg: First and last theta_2 [deg], without the poles.
     """
 
-    radius: float = 0.2
-    latitudes_deg: list[float] = dc.field(default_factory=lambda: [-60.0, 60.0])
+    radius: Length = 0.2
+    latitudes_deg: Annotated[list[float], Numbers(2)] = dc.field(
+        default_factory=lambda: [-60.0, 60.0]
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_length("radius", self.radius)
-        require_numbers("latitudes_deg", self.latitudes_deg, 2)
         good = -90.0 < self.latitudes_deg[0] < self.latitudes_deg[1] < 90.0
         allowed = (
             "two numbers that increase between -90 and 90 deg, without the poles, where longitudes "

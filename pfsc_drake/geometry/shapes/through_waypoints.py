@@ -2,11 +2,11 @@
 
 import dataclasses as dc
 import math
-from typing import Literal, cast
+from typing import Annotated, Literal, cast
 
 import numpy as np
 
-from pfsc_drake.checks import FARTHEST, FILE, SHORTEST, require, require_one_of
+from pfsc_drake.checks import FARTHEST, SHORTEST, require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import UNITS, Unit
 from pfsc_drake.geometry.paths.geometric_path import Path
@@ -27,12 +27,14 @@ from pfsc_drake.geometry.rotation import (
 from pfsc_drake.geometry.shapes.path_shapes import PathShape
 from pfsc_drake.geometry.shapes.shape import ShapeInputs
 from pfsc_drake.geometry.shapes.tool_orientation import OrientationParameters
+from pfsc_drake.yaml.fields import FILE
+from pfsc_drake.yaml.rules import OneOf, Parameters, Range
 
 _SHORTEST_TOLERANCE = 1e-7  # m
 
 
 @dc.dataclass
-class Waypoints(PathShape):
+class Waypoints(Parameters, PathShape):
     """A path through the waypoints of a CSV file, or near them; orientation included.
 
     It is a spline through all of them, unless ``tolerance`` or ``corner_distance`` is given.
@@ -57,27 +59,19 @@ class Waypoints(PathShape):
     """
 
     file: str = dc.field(default="", metadata=FILE)
-    unit: str = "m"
+    unit: Annotated[str, OneOf(tuple(UNITS))] = "m"
     closed: bool = False
-    parametrization: str = "chord"
-    smoothness: int = 0
-    tolerance: float = 0.0
-    tolerance_deg: float = 1.0
-    corner_distance: float = 0.0
+    parametrization: Annotated[str, OneOf(("chord", "centripetal"))] = "chord"
+    smoothness: Annotated[int, Range(0, 6)] = 0
+    tolerance: Annotated[float, Range(_SHORTEST_TOLERANCE, FARTHEST, "m", besides=0.0)] = 0.0
+    tolerance_deg: Annotated[float, Range(0.001, 90.0, "deg")] = 1.0
+    # a blend shorter than any path is no motion, and takes long to be tabulated
+    corner_distance: Annotated[float, Range(SHORTEST, FARTHEST, "m", besides=0.0)] = 0.0
 
     def __post_init__(self) -> None:
-        require_one_of("unit", self.unit, UNITS)
-        require_one_of("parametrization", self.parametrization, ("chord", "centripetal"))
-        require(0 <= self.smoothness <= 6, "smoothness", self.smoothness, "0 to 6")
-        # a blend shorter than any path is no motion, and takes long to be tabulated
-        for key, least in {"tolerance": _SHORTEST_TOLERANCE, "corner_distance": SHORTEST}.items():
-            value = getattr(self, key)
-            good = value == 0.0 or least <= value <= FARTHEST
-            require(good, key, value, f"0, or {least:g} m to {FARTHEST:g} m")
+        super().__post_init__()
         both = self.tolerance > 0.0 and self.corner_distance > 0.0
         require(not both, "corner_distance", self.corner_distance, "0 where tolerance is given")
-        good = 0.001 <= self.tolerance_deg <= 90.0
-        require(good, "tolerance_deg", self.tolerance_deg, "0.001 deg to 90 deg")
 
     def path(self, orientation: OrientationParameters, inputs: ShapeInputs) -> Path:
         """Return the path, with the orientation that it has."""

@@ -2,16 +2,13 @@
 
 import dataclasses as dc
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
 from pfsc_drake.checks import (
     LARGEST_ANGLE,
-    equal,
     require,
-    require_direction,
-    require_numbers,
-    require_one_of,
 )
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
@@ -20,16 +17,19 @@ from pfsc_drake.geometry.rotation import (
     EULER_TO_QUATERNION,
     quaternion_to_matrix,
 )
+from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.rules import Direction, Numbers, OneOf, Parameters, Range
 
 PATH_TASKS = ("full", "tool_axis", "yaw", "none")
 _KINDS = ("none", "given", "normal")
 _TASKS = ("full", "tool_axis", "yaw")
 _CONVENTIONS = ("zyx", "zyz")
 _JACOBIANS = ("geometric", "analytic")
+_Angles = Annotated[list[float], Numbers(3, Range(-LARGEST_ANGLE, LARGEST_ANGLE, "deg"))]
 
 
 @dc.dataclass
-class Keyframe:
+class Keyframe(Parameters):
     """Orientation of the tool at one point of the path.
 
     Attributes:
@@ -37,12 +37,12 @@ class Keyframe:
         angles_deg: Euler angles [deg], in the order of the convention's name; at most 3600.
     """
 
-    theta: float = 0.0
-    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    theta: Annotated[float, Range(0.0, 1.0, words="0 to 1, a fraction")] = 0.0
+    angles_deg: _Angles = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
 
 
 @dc.dataclass
-class OrientationParameters:
+class OrientationParameters(Parameters):
     """Orientation along the path.
 
     Attributes:
@@ -61,26 +61,16 @@ class OrientationParameters:
             which are singular where these are. Only for the task ``full``.
     """
 
-    convention: str = "zyx"
+    convention: Annotated[str, OneOf(_CONVENTIONS)] = "zyx"
     keyframes: list[Keyframe] = dc.field(default_factory=list)
-    task: str = "full"
-    tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    jacobian: str = "geometric"
+    task: Annotated[str, OneOf(PATH_TASKS)] = "full"
+    tool_axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    yaw_axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    jacobian: Annotated[str, OneOf(_JACOBIANS)] = "geometric"
 
     def __post_init__(self) -> None:
-        require_one_of("convention", self.convention, _CONVENTIONS)
-        require_one_of("task", self.task, PATH_TASKS)
+        super().__post_init__()
         _require_jacobian(self.jacobian, "task", self.task)
-        require_direction("tool_axis", self.tool_axis)
-        require_direction("yaw_axis", self.yaw_axis)
-        for i, keyframe in enumerate(self.keyframes):
-            key, angles = f"keyframes[{i}].angles_deg", keyframe.angles_deg
-            require_numbers(key, angles, 3)
-            good = max(map(abs, angles)) <= LARGEST_ANGLE
-            require(good, key, angles, f"3 numbers of at most {LARGEST_ANGLE:g} deg")
-            good = 0.0 <= keyframe.theta <= 1.0
-            require(good, f"keyframes[{i}].theta", keyframe.theta, "0 to 1, a fraction")
 
     def along(self, position: Curve, smoothness: int) -> OrientationCurve | None:
         """Return the interpolated keyframes, or None if there are none.
@@ -117,7 +107,7 @@ class OrientationParameters:
 
 
 @dc.dataclass
-class SurfaceOrientationParameters:
+class SurfaceOrientationParameters(Parameters):
     """Orientation of the tool along a surface.
 
     Attributes:
@@ -132,25 +122,18 @@ class SurfaceOrientationParameters:
         jacobian: ``geometric`` or ``analytic``, see ``path.orientation.jacobian``.
     """
 
-    kind: str = "none"
-    convention: str = "zyx"
-    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
-    task: str = "full"
-    tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    jacobian: str = "geometric"
+    kind: Annotated[str, OneOf(_KINDS)] = "none"
+    convention: Annotated[str, OneOf(_CONVENTIONS)] = "zyx"
+    angles_deg: _Angles = dc.field(default_factory=lambda: [0.0, 0.0, 0.0], metadata=equal(3))
+    task: Annotated[str, OneOf(_TASKS)] = "full"
+    tool_axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    yaw_axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    jacobian: Annotated[str, OneOf(_JACOBIANS)] = "geometric"
 
     def __post_init__(self) -> None:
-        for key, values in {"kind": _KINDS, "convention": _CONVENTIONS, "task": _TASKS}.items():
-            require_one_of(key, getattr(self, key), values)
+        super().__post_init__()
         _require_jacobian(self.jacobian, "task", self.task)
         _require_jacobian(self.jacobian, "kind", "full" if self.kind != "none" else self.kind)
-        require_numbers("angles_deg", self.angles_deg, 3)
-        good = max(map(abs, self.angles_deg)) <= LARGEST_ANGLE
-        allowed = f"3 numbers of at most {LARGEST_ANGLE:g} deg"
-        require(good, "angles_deg", self.angles_deg, allowed)
-        require_direction("tool_axis", self.tool_axis)
-        require_direction("yaw_axis", self.yaw_axis)
 
     @property
     def quaternion(self) -> np.ndarray | None:
@@ -173,13 +156,12 @@ def _quaternions(convention: str, angles_deg: Sequence[Sequence[float]]) -> np.n
 
 
 def _require_jacobian(jacobian: str, key: str, value: str) -> None:
-    """Refuse an unknown Jacobian, and the analytic one where not all of an orientation matters.
+    """Refuse the analytic Jacobian where not all of an orientation matters.
 
     Args:
         jacobian: What the scenario says.
         key: What says how much of the orientation matters.
         value: Its value; ``full`` for all of it.
     """
-    require_one_of("jacobian", jacobian, _JACOBIANS)
     good = jacobian == "geometric" or value == "full"
     require(good, "jacobian", jacobian, f"geometric with {key}: {value}")

@@ -6,7 +6,7 @@ import math
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from pfsc_drake.checks import require, require_length
+from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.fourier_curve import FourierCurve
 from pfsc_drake.geometry.regions.region import (
@@ -25,6 +25,7 @@ from pfsc_drake.geometry.shapes.revolution import (
 )
 from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs
 from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.yaml.rules import Length
 
 
 @dc.dataclass
@@ -36,13 +37,11 @@ class Torus(OfRevolution):
         tube_radius: [m].
     """
 
-    ring_radius: float = 0.3
-    tube_radius: float = 0.1
+    ring_radius: Length = 0.3
+    tube_radius: Length = 0.1
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in ("ring_radius", "tube_radius"):
-            require_length(key, getattr(self, key))
         allowed = f"more than tube_radius = {self.tube_radius:g} m"
         require(self.ring_radius > self.tube_radius, "ring_radius", self.ring_radius, allowed)
 
@@ -58,8 +57,8 @@ class Torus(OfRevolution):
 
 
 def torus(
-    ring_radius: float,
-    tube_radius: float,
+    ring_radius: Length,
+    tube_radius: Length,
     turned: Turned | None = None,
     part: Pair | None = None,
 ) -> ProductSurface:
@@ -100,8 +99,8 @@ class TorusRegion(TurnedRegion):
 
     def __init__(
         self,
-        ring_radius: float,
-        tube_radius: float,
+        ring_radius: Length,
+        tube_radius: Length,
         origin: ArrayLike,
         axis: ArrayLike,
         *,

@@ -7,14 +7,17 @@ Tab. 2.2 define the symbols.
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
+from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.parameters import FrictionParameters
-from pfsc_drake.robot.parameter_checks import check_vector, require
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.rules import Name, NotNegative, Numbers, Parameters, Positive, Range
+from pfsc_drake.yaml.typed import load_file
 
 NUM_ARMS = 3
 SHIPPED_ROBOTS = ("festo_expt_45",)
@@ -29,7 +32,7 @@ def _zeros() -> np.ndarray:
 
 
 @dataclass
-class DeltaGeometry:
+class DeltaGeometry(Parameters):
     """Dimensions of the three equal arms.
 
     Attributes:
@@ -39,15 +42,14 @@ class DeltaGeometry:
         h_P: height of the point P that all rails point to, below the base [m].
     """
 
-    l_BC: float = field(default=1.0, metadata=REQUIRED)
-    l_A: float = field(default=1.0, metadata=REQUIRED)
-    l_EC: float = field(default=0.1, metadata=REQUIRED)
-    h_P: float = field(default=1.0, metadata=REQUIRED)
+    l_BC: Positive = field(default=1.0, metadata=REQUIRED)
+    l_A: Positive = field(default=1.0, metadata=REQUIRED)
+    l_EC: Positive = field(default=0.1, metadata=REQUIRED)
+    h_P: Positive = field(default=1.0, metadata=REQUIRED)
     source: str = ""
 
     def __post_init__(self) -> None:
-        for key in ("l_BC", "l_A", "l_EC", "h_P"):
-            require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
+        super().__post_init__()
         require(self.l_EC < self.l_A, "l_EC", self.l_EC, f"less than l_A = {self.l_A!r}")
 
     @property
@@ -80,7 +82,7 @@ class DeltaGeometry:
 
 
 @dataclass
-class DeltaMasses:
+class DeltaMasses(Parameters):
     """Masses of the moving parts.
 
     Attributes:
@@ -90,18 +92,11 @@ class DeltaMasses:
         load: m_l of what the plate carries [kg].
     """
 
-    slide: float = field(default=1.0, metadata=REQUIRED)
-    rod_pair: float = field(default=0.0, metadata=REQUIRED)
-    plate: float = field(default=1.0, metadata=REQUIRED)
-    load: float = 0.0
+    slide: Positive = field(default=1.0, metadata=REQUIRED)
+    rod_pair: NotNegative = field(default=0.0, metadata=REQUIRED)
+    plate: Positive = field(default=1.0, metadata=REQUIRED)
+    load: NotNegative = 0.0
     source: str = ""
-
-    def __post_init__(self) -> None:
-        for key in ("slide", "plate"):
-            require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
-        for key in ("rod_pair", "load"):
-            allowed = "zero or positive"
-            require(0.0 <= getattr(self, key) < np.inf, key, getattr(self, key), allowed)
 
     @property
     def effective_slide(self) -> float:
@@ -115,7 +110,7 @@ class DeltaMasses:
 
 
 @dataclass
-class DeltaDrives:
+class DeltaDrives(Parameters):
     """Limits of the three linear drives.
 
     Attributes:
@@ -125,26 +120,32 @@ class DeltaDrives:
         effort: ``[3]`` largest absolute drive forces [N].
     """
 
-    position_lower: np.ndarray = field(default_factory=_zeros, metadata=REQUIRED)
-    position_upper: np.ndarray = field(default_factory=_ones, metadata=REQUIRED)
-    velocity: np.ndarray = field(default_factory=_ones, metadata=REQUIRED)
-    effort: np.ndarray = field(default_factory=_ones, metadata=REQUIRED)
+    position_lower: Annotated[np.ndarray, Numbers(NUM_ARMS, Range(0.0))] = field(
+        default_factory=_zeros, metadata=REQUIRED
+    )
+    position_upper: Annotated[np.ndarray, Numbers(NUM_ARMS)] = field(
+        default_factory=_ones, metadata=REQUIRED
+    )
+    velocity: Annotated[np.ndarray, Numbers(NUM_ARMS, Range(0.0, open=True))] = field(
+        default_factory=_ones, metadata=REQUIRED
+    )
+    effort: Annotated[np.ndarray, Numbers(NUM_ARMS, Range(0.0, open=True))] = field(
+        default_factory=_ones, metadata=REQUIRED
+    )
     source: str = ""
 
     def __post_init__(self) -> None:
-        for key in ("position_lower", "position_upper", "velocity", "effort"):
-            check_vector(key, getattr(self, key), NUM_ARMS)
+        super().__post_init__()
         for key in ("velocity", "effort"):
             value = getattr(self, key)
             require(bool(np.all(value > 0.0)), key, value, "positive")
         lower, upper = self.position_lower, self.position_upper
-        require(bool(np.all(lower >= 0.0)), "position_lower", lower, "zero or positive")
         allowed = f"less than position_upper = {upper.tolist()}"
         require(bool(np.all(lower < upper)), "position_lower", lower, allowed)
 
 
 @dataclass
-class DeltaWorkspace:
+class DeltaWorkspace(Parameters):
     """How far the robot keeps from singular configurations.
 
     Attributes:
@@ -152,16 +153,14 @@ class DeltaWorkspace:
             vectors, between 0 (two rods parallel or all in one plane) and 1 (orthogonal).
     """
 
-    min_rod_independence: float = field(default=0.1, metadata=REQUIRED)
+    min_rod_independence: Annotated[float, Range(0.0, 1.0, open=True, below=True)] = field(
+        default=0.1, metadata=REQUIRED
+    )
     source: str = ""
-
-    def __post_init__(self) -> None:
-        value = self.min_rod_independence
-        require(0.0 < value < 1.0, "min_rod_independence", value, "between 0 and 1")
 
 
 @dataclass
-class DeltaParameters:
+class DeltaParameters(Parameters):
     """All physical parameters of a DELTA robot with linear drives.
 
     Attributes:
@@ -174,10 +173,12 @@ class DeltaParameters:
         workspace: distance from singular configurations.
     """
 
-    name: str = field(default="unnamed", metadata=REQUIRED)
+    name: Name = field(default="unnamed", metadata=REQUIRED)
     geometry: DeltaGeometry = field(default_factory=DeltaGeometry, metadata=REQUIRED)
     masses: DeltaMasses = field(default_factory=DeltaMasses, metadata=REQUIRED)
-    gravity: np.ndarray = field(default_factory=_zeros, metadata=REQUIRED)
+    gravity: Annotated[np.ndarray, Numbers(NUM_ARMS)] = field(
+        default_factory=_zeros, metadata=REQUIRED
+    )
     drives: DeltaDrives = field(default_factory=DeltaDrives, metadata=REQUIRED)
     friction: FrictionParameters = field(
         default_factory=lambda: FrictionParameters(_zeros(), _zeros()), metadata=REQUIRED
@@ -185,10 +186,9 @@ class DeltaParameters:
     workspace: DeltaWorkspace = field(default_factory=DeltaWorkspace, metadata=REQUIRED)
 
     def __post_init__(self) -> None:
-        require(bool(self.name), "name", self.name, "a name")
-        check_vector("gravity", self.gravity, NUM_ARMS)
+        super().__post_init__()
         for key in ("coulomb", "viscous"):
-            check_vector(f"friction.{key}", getattr(self.friction, key), NUM_ARMS)
+            require_numbers(f"friction.{key}", getattr(self.friction, key), NUM_ARMS)
         upper, end = self.drives.position_upper, self.geometry.rail_length
         allowed = f"less than the rails' length to P, {end:.6g} m"
         require(bool(np.all(upper < end)), "drives.position_upper", upper, allowed)

@@ -21,7 +21,7 @@ from pfsc_drake.robot.models.joint_edits import (
     take_joint,
 )
 from pfsc_drake.robot.models.model_parts import LARGEST
-from pfsc_drake.yaml.typed import spread
+from pfsc_drake.yaml.fields import spread
 
 # positive numbers below are slips of the pen
 _SMALLEST = 1e-9

@@ -8,21 +8,24 @@ import copy
 import functools
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.serial.denavit_hartenberg import DenavitHartenberg
+from pfsc_drake.yaml.fields import REQUIRED
 from pfsc_drake.yaml.reading import read_text
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.rules import Name, Numbers, Parameters, Positive, Range
+from pfsc_drake.yaml.typed import load_file
 
-# Placeholders of required keys make a robot with one joint: a schema's defaults must be valid.
+# Defaults of required keys make a robot with one joint, which is valid.
 _PLACEHOLDER_NAME = "unnamed"
-_POSITIVE = {**REQUIRED, "sign": "positive"}
-_NOT_NEGATIVE = {**REQUIRED, "sign": "not negative"}
+
+_Positives = Annotated[np.ndarray, Numbers(each=Range(0.0, open=True))]
+_NotNegatives = Annotated[np.ndarray, Numbers(each=Range(0.0))]
 
 # by which the length of a unit vector may be off
 _UNIT_LENGTH = 1e-6
@@ -64,7 +67,7 @@ class DhParameters:
 
 
 @dataclass
-class JointLimitParameters:
+class JointLimitParameters(Parameters):
     """Limits of the N joints (Tab. C.1), at the joint side.
 
     Attributes:
@@ -77,12 +80,13 @@ class JointLimitParameters:
 
     position_lower_deg: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
     position_upper_deg: np.ndarray = field(default_factory=_one, metadata=REQUIRED)
-    velocity_deg: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
-    acceleration_deg: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
-    effort: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    velocity_deg: _Positives = field(default_factory=_one, metadata=REQUIRED)
+    acceleration_deg: _Positives = field(default_factory=_one, metadata=REQUIRED)
+    effort: _Positives = field(default_factory=_one, metadata=REQUIRED)
     source: str = ""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         lower, upper = self.position_lower_deg, self.position_upper_deg
         _check_entries(self, axes=lower.size)
         allowed = f"less than position_upper_deg = {upper.tolist()}"
@@ -110,7 +114,7 @@ class JointLimitParameters:
 
 
 @dataclass
-class BodyParameters:
+class BodyParameters(Parameters):
     """Mass properties of one rigid body, in its body frame (a link's DH frame).
 
     Attributes:
@@ -120,17 +124,18 @@ class BodyParameters:
         inertia: ``[6]``, about the center of mass: xx, yy, zz, xy, xz, yz [kg m^2].
     """
 
-    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
-    mass: float = field(default=1.0, metadata=REQUIRED)
-    center_of_mass: np.ndarray = field(default_factory=_origin, metadata=REQUIRED)
-    inertia: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=REQUIRED)
+    name: Name = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    mass: Positive = field(default=1.0, metadata=REQUIRED)
+    center_of_mass: Annotated[np.ndarray, Numbers(3)] = field(
+        default_factory=_origin, metadata=REQUIRED
+    )
+    inertia: Annotated[np.ndarray, Numbers(6)] = field(
+        default_factory=lambda: np.zeros(6), metadata=REQUIRED
+    )
     source: str = ""
 
     def __post_init__(self) -> None:
-        require(bool(self.name), "name", self.name, "a name")
-        require(0 < self.mass < np.inf, "mass", self.mass, "positive and finite")
-        check_vector("center_of_mass", self.center_of_mass, 3)
-        check_vector("inertia", self.inertia, 6)
+        super().__post_init__()
         principal = np.linalg.eigvalsh(self.inertia_matrix())
         physical = principal[0] >= 0 and 2 * principal[2] <= principal.sum() * (1 + 1e-6)
         allowed = "physical (no principal moment negative or above the sum of the other two)"
@@ -150,15 +155,13 @@ class ToolParameters(BodyParameters):
         tool_point: ``[3]`` tool offset ``[x_NT, y_NT, z_NT]`` of (2.5) [m].
     """
 
-    tool_point: np.ndarray = field(default_factory=_origin, metadata=REQUIRED)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_vector("tool_point", self.tool_point, 3)
+    tool_point: Annotated[np.ndarray, Numbers(3)] = field(
+        default_factory=_origin, metadata=REQUIRED
+    )
 
 
 @dataclass
-class RotorParameters:
+class RotorParameters(Parameters):
     """The rotors of the N drives.
 
     Attributes:
@@ -170,17 +173,17 @@ class RotorParameters:
             column of R_i^{M,j} (Tab. 2.3); or empty.
     """
 
-    inertia: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
-    gear_ratio: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
-    body_mass: float = 0.0
+    inertia: _Positives = field(default_factory=_one, metadata=REQUIRED)
+    gear_ratio: _Positives = field(default_factory=_one, metadata=REQUIRED)
+    body_mass: Annotated[float, Range(0, words="at least 0 and finite")] = 0.0
     fixed_to_link: list[int] = field(default_factory=list)
     spin_axes: list[list[float]] = field(default_factory=list)
     source: str = ""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         axes = self.inertia.size
         _check_entries(self, axes)
-        require(0 <= self.body_mass < np.inf, "body_mass", self.body_mass, "at least 0 and finite")
         links, spin_axes = self.fixed_to_link, self.spin_axes
         for key, value in (("fixed_to_link", links), ("spin_axes", spin_axes)):
             fits = len(value) == (axes if links or spin_axes else 0)
@@ -198,7 +201,7 @@ class RotorParameters:
 
 
 @dataclass
-class ElasticityParameters:
+class ElasticityParameters(Parameters):
     """Elasticity of the first joints of a robot, eq. (2.66).
 
     Attributes:
@@ -206,16 +209,17 @@ class ElasticityParameters:
         damping: diagonal of K_d [Nms/rad].
     """
 
-    stiffness: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
-    damping: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
+    stiffness: _Positives = field(default_factory=_one, metadata=REQUIRED)
+    damping: _NotNegatives = field(default_factory=_zero, metadata=REQUIRED)
     source: str = ""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _check_entries(self, axes=self.stiffness.size)
 
 
 @dataclass
-class FrictionParameters:
+class FrictionParameters(Parameters):
     """Joint friction ``f_c sign(q') + f_v q'``, eq. (2.41), at the joint side.
 
     Attributes:
@@ -223,16 +227,17 @@ class FrictionParameters:
         viscous: ``[N]`` f_v [Nms/rad].
     """
 
-    coulomb: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
-    viscous: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
+    coulomb: _NotNegatives = field(default_factory=_zero, metadata=REQUIRED)
+    viscous: _NotNegatives = field(default_factory=_zero, metadata=REQUIRED)
     source: str = ""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _check_entries(self, axes=self.coulomb.size)
 
 
 @dataclass
-class VariantParameters:
+class VariantParameters(Parameters):
     """One model file that is written from the parameters.
 
     Attributes:
@@ -241,17 +246,13 @@ class VariantParameters:
         fixed_deg: DH angles at which the last joints are welded [deg]; empty if all joints move.
     """
 
-    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    name: Name = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
     elasticity: str = ""
-    fixed_deg: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-    def __post_init__(self) -> None:
-        require(bool(self.name), "name", self.name, "a name")
-        check_vector("fixed_deg", self.fixed_deg, self.fixed_deg.size)
+    fixed_deg: Annotated[np.ndarray, Numbers()] = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass
-class ArmParameters:
+class ArmParameters(Parameters):
     """All physical parameters of a serial robot with N revolute joints.
 
     Attributes:
@@ -266,7 +267,7 @@ class ArmParameters:
         variants: the model files that are written from these parameters.
     """
 
-    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    name: Name = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
     denavit_hartenberg: DhParameters = field(default_factory=DhParameters, metadata=REQUIRED)
     joint_limits: JointLimitParameters = field(
         default_factory=JointLimitParameters, metadata=REQUIRED
@@ -281,8 +282,8 @@ class ArmParameters:
     variants: list[VariantParameters] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         axes = self.denavit_hartenberg.d.size
-        require(bool(self.name), "name", self.name, "a name")
         for key in ("joint_limits", "rotors", "friction"):
             _check_entries(getattr(self, key), axes, prefix=f"{key}.")
         require(len(self.links) == axes, "links", len(self.links), f"{axes} links")
@@ -328,12 +329,9 @@ def _parameters(path: Path, content: str) -> ArmParameters:
 
 
 def _check_entries(group: Any, axes: int, prefix: str = "") -> None:
-    """Checks that every vector of a group has one entry per axis, with the sign of its field."""
+    """Check that every vector of a group has one entry per axis."""
     for entry in fields(group):
         key, value = prefix + entry.name, getattr(group, entry.name)
         if isinstance(value, np.ndarray):
             require(axes > 0, key, value, "one number per joint")
-            check_vector(key, value, axes)
-            sign = entry.metadata.get("sign", "")
-            fits = np.all(value > 0 if sign == "positive" else value >= 0) or not sign
-            require(bool(fits), key, value, sign)
+            require_numbers(key, value, axes)

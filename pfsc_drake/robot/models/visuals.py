@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.typed import REQUIRED
+from pfsc_drake.yaml.fields import REQUIRED
 
 _DIGITS = 9  # of shape poses: the files do not depend on the last bits of a libm
 

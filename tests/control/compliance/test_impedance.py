@@ -358,7 +358,7 @@ def test_profiles_over_a_single_coordinate():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Profile(-1.0), "value: -1.0"),
+        (lambda: Profile(-1.0), "value = -1.0"),
         (
             lambda: ImpedanceOnNumbers(over("theta"), POSITION, 2, 1e-3),
             "compliance.transversal.damping.over: 'theta'; must be one of eta, xi_1, xi_2, xi",

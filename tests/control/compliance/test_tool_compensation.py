@@ -280,7 +280,7 @@ def test_a_reading_that_jumps_is_a_fault_once_it_is_tared(arm, component, size, 
     ],
 )
 def test_parameters_out_of_range(key, value):
-    with pytest.raises(InputError, match=f"^{key} = .*: must be "):
+    with pytest.raises(InputError, match=f"^{key} = .*; allowed: "):
         ToolCompensationParameters(**{key: value})
 
 

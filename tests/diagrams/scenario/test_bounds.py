@@ -12,14 +12,14 @@ import pytest
 from diagrams.scenario import Scenario
 from docs.making.scenario_keys import blocks
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.bounds import bounds_of
+from pfsc_drake.yaml.fields import fields_of, ranges_of
 from pfsc_drake.yaml.typed import load_typed, typed_data
 
 OWNERS = [Scenario, *blocks()]
 HOW = (
     "write its unit into the docstring, as in `margin: Least distance [m]`, whose bounds are those "
-    "of pfsc_drake/yaml/bounds.py, or declare bounds of its own: field(default=.., "
-    'metadata=bounded(least, most, "unit"))'
+    "of pfsc_drake/yaml/fields.py, or declare bounds of its own: "
+    'margin: Annotated[float, Range(least, most, "unit")]'
 )
 
 
@@ -63,12 +63,14 @@ def test_every_number_is_bounded(owner):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for name in numbers_of(owner):
-            bounds = bounds_of(owner, name)
+            entry = fields_of(owner)[name]
+            ranges = [*ranges_of(entry.hint), *([entry.bounds] if entry.bounds else [])]
+            infinite = any(each.infinite for each in ranges)
             for number in (1e300, -1e300, math.nan, math.inf, -math.inf):
                 said = refusal(owner, name, number)
                 place = f"{owner.__module__}.{owner.__name__}.{name} = {number}"
                 if said is None:
-                    assert number == math.inf and bounds.infinite, f"{place} is accepted: {HOW}"
+                    assert number == math.inf and infinite, f"{place} is accepted: {HOW}"
                 else:
                     assert name in said and "\n" not in said, f"{place}: {said}"
 

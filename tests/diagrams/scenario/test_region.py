@@ -87,7 +87,10 @@ def test_what_has_an_inside(shape, has_inside):
             {"shape": {TAG_KEY: "!Sphere", "angles_deg": [0, 90]}},
             r"shape.angles_deg = \[0.0, 90.0\]; allowed: empty",
         ),
-        ({"shape": {TAG_KEY: "!Box", "size": [0.1, 0.1, 0.0]}}, "size = 0.0; allowed: 0.0001 m to"),
+        (
+            {"shape": {TAG_KEY: "!Box", "size": [0.1, 0.1, 0.0]}},
+            r"size = \[0.1, 0.1, 0.0\]; allowed: 3 numbers from 0.0001 to",
+        ),
         ({"stiffness": 0.0}, "stiffness = 0.0; allowed: 1 to 1e\\+06 N/m, or null"),
         (
             {"motion": {TAG_KEY: "!Shift", "direction": [0, 0, 0]}},

@@ -14,7 +14,7 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.jets import Jet
-from pfsc_drake.yaml.broadcast import OneForAll
+from pfsc_drake.yaml.fields import OneForAll
 from tests.control.conftest import BENT_7
 from tests.scenarios import LONG
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from diagrams.scenario_task import make_task
 
 from diagrams.scenario.schema import driven
 from diagrams.scenario.streamed import DrawnPlane
+from diagrams.scenario_task import make_task
 from diagrams.tasks.drawn_plane import border, plane_axes
 from diagrams.tasks.streaming import ScenarioStream
 from experiments.scenario_file import SCENARIO_DIRECTORY

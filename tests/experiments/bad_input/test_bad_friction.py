@@ -33,7 +33,10 @@ def test_of_the_controller(mine, refused, change, part):
 @pytest.mark.parametrize(
     ("change", "part"),
     [
-        ("friction={f_c: [1.0, 1.0, 1.0], drift: {factor: 0.0}}", "factor = 0.0; must be"),
+        (
+            "friction={f_c: [1.0, 1.0, 1.0], drift: {factor: 0.0}}",
+            "factor = 0.0; allowed: a pos",
+        ),
         ("friction={f_c: [1.0, 1.0, 1.0], drift: {begin: 3.0}}", "begin = 3.0 s, end = 1.0 s"),
         ("compliance.source=guess", "source = guess; allowed: sensor, observed"),
         ("compliance.observed.rate=0", "rate = 0"),

@@ -18,10 +18,10 @@ def shape(first, second, more=""):
         (shape(FLOOR, "!Line {}"), ("surfaces[1]", "Line")),
         (
             shape(FLOOR, "!Sphere {radius: -1}"),
-            ("path.shape.surfaces[1]", "radius = -1", "0.0001 m"),
+            ("path.shape.surfaces[1]", "radius = -1", "0.0001 to 10000 m"),
         ),
         (shape(FLOOR, BALL, ", near: [1, 2]"), ("near", "3")),
-        (shape(FLOOR, BALL, ", tolerance: 0"), ("tolerance = 0", "1e-09 m")),
+        (shape(FLOOR, BALL, ", tolerance: 0"), ("tolerance = 0", "1e-09 to")),
         (
             shape(FLOOR, "!Torus {origin: [0.85, 0, 0.8], ring_radius: 0.1, tube_radius: 0.03}"),
             ("path.shape.near: none given", "2 edges", "must be a point"),

@@ -63,13 +63,13 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         ("start.posture_deg=[15, 115]", ("start.posture_deg", "2 values", "3 joints")),
         (
             "path.orientation.keyframes=[{angles_deg: [1, 2, 3, 4]}]",
-            ("keyframes[0].angles_deg", "4.0", "3 finite numbers"),
+            ("keyframes[0]': angles_deg", "4.0", "3 finite numbers"),
         ),
         ("path.shape=!Line {start: [1, 2]}", ("start", "[1.0, 2.0]", "3")),
         ("path.shape=!Circle {center: [1, 2]}", ("center", "[1.0, 2.0]", "3")),
         ("path.shape=!Circle {axis_u: [0, 1]}", ("axis_u", "[0.0, 1.0]", "3")),
         # paths that are none
-        ("path.shape=!Circle {radius: -1}", ("radius", "-1", "0.0001 m to 10000 m")),
+        ("path.shape=!Circle {radius: -1}", ("radius", "-1", "0.0001 to 10000 m")),
         ("path.shape=!Circle {axis_u: [0, 0, 1]}", ("axes", "0 deg between", "at least 0.1 deg")),
         (
             "path.shape=!Line {start: [1, 0, 0], end: [1, 0, 0]}",
@@ -80,7 +80,7 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         ("reference.points=[]", ("points", "[]", "two or more")),
         ("reference.velocity=0", ("velocity", "0", "positive")),
         ("reference.acceleration=-1", ("acceleration", "-1", "positive")),
-        ("reference.dwell=-1", ("dwell", "-1", "zero or a positive")),
+        ("reference.dwell=-1", ("dwell", "-1", "0, or 1e-06 to")),
         # regions that nothing would keep the tool out of
         (
             "fixtures={regions: [{shape: !Plane {}}]}",

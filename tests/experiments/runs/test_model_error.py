@@ -61,7 +61,7 @@ def test_a_start_beside_the_path_without_a_jump(three_axes):
 @pytest.mark.parametrize(
     ("scenario", "change", "message"),
     [
-        ("pfc_elastic_3r", "start.transition=-1", "allowed: zero or a positive number"),
+        ("pfc_elastic_3r", "start.transition=-1", "allowed: 0, or 0.001 to 1000 s"),
         ("ttc_comau_6r", "start.transition=0.3", "start.transition = 0.3; allowed: 0 with"),
         ("pfc_elastic_3r", "model_error.mass=[1, 1]", "model_error.mass: 2 values; allowed"),
         ("pfc_elastic_3r", "controller.model=nowhere", "controller.model: robot model 'nowhere'"),

@@ -68,7 +68,7 @@ def test_a_hand_on_the_path(path, target):
 
 
 def test_wrong_frames():
-    with pytest.raises(InputError, match="frame = tool; allowed: one of world, manifold"):
+    with pytest.raises(InputError, match="frame = tool; allowed: world, manifold"):
         HandParameters(frame="tool")
     with pytest.raises(InputError, match="frame = manifold; allowed: world without a path"):
         HandModel(HandParameters(frame="manifold"))

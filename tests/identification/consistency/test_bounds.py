@@ -76,12 +76,12 @@ def test_true_robot_is_a_prior(comau):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("mass: [2, 1]", r"'links\[0\]'.*mass = \[2.0, 1.0\]: must be \[least, largest\]"),
-        ("mass: [0, 1]", r"mass = \[0.0, 1.0\]: must be \[least, largest\], both positive"),
-        ("mass: [1]", r"mass = \[1.0\]: must be 2 finite numbers"),
-        ("least_extent: 0", "least_extent = 0.0: must be positive and finite"),
-        ("center_of_mass: {lower: [0, 0, 1], upper: [1, 1, 1]}", "lower = .* must be below upper"),
-        ("center_of_mass: {lower: [0, 0], upper: [1, 1, 1]}", "lower = .* must be 3 finite"),
+        ("mass: [2, 1]", r"'links\[0\]'.*mass = \[2.0, 1.0\]; allowed: \[least, largest\]"),
+        ("mass: [0, 1]", r"mass = \[0.0, 1.0\]; allowed: \[least, largest\], both positive"),
+        ("mass: [1]", r"mass = \[1.0\]; allowed: 2 finite numbers"),
+        ("least_extent: 0", "least_extent = 0.0; allowed: a positive number"),
+        ("center_of_mass: {lower: [0, 0, 1], upper: [1, 1, 1]}", "lower = .* allowed: below upper"),
+        ("center_of_mass: {lower: [0, 0], upper: [1, 1, 1]}", "lower = .* allowed: 3 finite"),
         ("volume: 1", "volume"),
     ],
 )
@@ -105,11 +105,11 @@ def write(folder, text):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("links: []", "links = 0: must be one entry per link, or instead the key delta"),
-        ("delta: {slide: [1, 2], plate: [1, 2]}", "links = 1: must be one entry per link"),
-        ("rotor_inertia: [[1, 2], [1, 2]]", "rotor_inertia = 2: must be one interval per link, 1"),
-        ("rotor_inertia: [[2, 1]]", r"rotor_inertia\[0\] = .* must be \[least, largest\]"),
-        ("total_mass: [1]", "total_mass = .* must be 2 finite numbers"),
+        ("links: []", "links = 0; allowed: one entry per link, or instead the key delta"),
+        ("delta: {slide: [1, 2], plate: [1, 2]}", "links = 1; allowed: one entry per link"),
+        ("rotor_inertia: [[1, 2], [1, 2]]", "rotor_inertia = 2; allowed: one interval per link, 1"),
+        ("rotor_inertia: [[2, 1]]", r"rotor_inertia\[0\] = .* allowed: \[least, largest\]"),
+        ("total_mass: [1]", "total_mass = .* allowed: 2 finite numbers"),
     ],
 )
 def test_bad_robots(text, message, tmp_path):
@@ -123,7 +123,7 @@ def test_unknown_robots(delta, panda):
         load_bounds("nobody")
     with pytest.raises(InputError, match="festo_expt_45: no chain of links"):
         bounds_from_geometry(delta, (1.0, 2.0), 0.1)
-    with pytest.raises(InputError, match=r"margin = 0.0: must be positive"):
+    with pytest.raises(InputError, match=r"margin = 0.0; allowed: positive and finite"):
         bounds_from_geometry(panda, (1.0, 2.0), 0.0)
     with pytest.raises(InputError, match=r"total_mass = .* both positive"):
         bounds_from_geometry(panda, (3.0, 2.0), 0.1)

@@ -33,11 +33,12 @@ from identification.model.parameters import (
     parameter_units,
 )
 from identification.model.subject import Subject
+from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount
-from pfsc_drake.yaml.typed import REQUIRED, load_file
+from pfsc_drake.yaml.fields import REQUIRED
+from pfsc_drake.yaml.typed import load_file
 
 # sine of an angle that counts as none
 _PARALLEL = 1e-9
@@ -179,9 +180,9 @@ class PrintedBase:
     source: str = ""
 
     def __post_init__(self) -> None:
-        check_vector("mean", self.mean, SIZE)
+        require_numbers("mean", self.mean, SIZE)
         key, deviation = "relative_deviation_percent", self.relative_deviation_percent
-        check_vector(key, deviation, SIZE)
+        require_numbers(key, deviation, SIZE)
         require(bool(np.all(deviation > 0.0)), key, deviation, "positive")
 
     @property
@@ -213,7 +214,7 @@ class PrintedTorque:
     def __post_init__(self) -> None:
         for key in ("error_rms", "noise_level", "variance"):
             value = getattr(self, key)
-            check_vector(key, value, AXES)
+            require_numbers(key, value, AXES)
             require(bool(np.all(value > 0.0)), key, value, "positive")
 
 

@@ -43,23 +43,39 @@ def test_a_file_is_loaded_by_its_path(tmp_path):
 @pytest.mark.parametrize(
     ("keys", "value", "message"),
     [
-        (("geometry", "l_BC"), -0.5, r"'geometry': l_BC = -0.5: must be positive"),
-        (("geometry", "l_EC"), 0.5, r"'geometry': l_EC = 0.5: must be less than l_A = 0.416"),
-        (("masses", "plate"), 0.0, r"'masses': plate = 0.0: must be positive"),
-        (("masses", "load"), -1.0, r"'masses': load = -1.0: must be zero or positive"),
-        (("gravity",), [0.0, 9.81], r"gravity = \[0.0, 9.81\]: must be 3 finite numbers"),
-        (("drives", "effort"), [200.0], r"'drives': effort = \[200.0\]: must be 3 finite numbers"),
-        (("drives", "velocity"), [1.0, 0.0, 1.0], r"velocity = .*: must be positive"),
-        (("drives", "position_lower"), [-0.1, 0, 0], r"position_lower = .*: must be zero or pos"),
-        (("drives", "position_upper"), [0.4, 0.0, 0.4], r"position_lower = .*: must be less than"),
+        (("geometry", "l_BC"), -0.5, r"'geometry': l_BC = -0.5; allowed: a positive number"),
+        (("geometry", "l_EC"), 0.5, r"'geometry': l_EC = 0.5; allowed: less than l_A = 0.416"),
+        (("masses", "plate"), 0.0, r"'masses': plate = 0.0; allowed: a positive number"),
+        (("masses", "load"), -1.0, r"'masses': load = -1.0; allowed: zero or a positive number"),
+        (("gravity",), [0.0, 9.81], r"gravity = \[0.0, 9.81\]; allowed: 3 finite numbers"),
+        (
+            ("drives", "effort"),
+            [200.0],
+            r"'drives': effort = \[200.0\]; allowed: 3 positive",
+        ),
+        (("drives", "velocity"), [1.0, 0.0, 1.0], r"velocity = .*; allowed: 3 positive numbers"),
+        (
+            ("drives", "position_lower"),
+            [-0.1, 0, 0],
+            r"position_lower = .*; allowed: 3 .*, none neg",
+        ),
+        (("drives", "position_upper"), [0.4, 0.0, 0.4], r"position_lower = .*; allowed: less than"),
         (("drives", "position_upper"), [0.4, 0.53, 0.4], r"position_upper = .*P, 0.527902 m"),
         (
             ("friction",),
             {"coulomb": [5.0], "viscous": [9.0]},
-            r"friction.coulomb = \[5.0\]: must be 3 finite numbers",
+            r"friction.coulomb = \[5.0\]; allowed: 3 finite numbers",
         ),
-        (("friction", "viscous"), [1.0, 2.0, -3.0], r"'friction': viscous = .*: must be not neg"),
-        (("workspace", "min_rod_independence"), 1.0, r"min_rod_independence = 1.0: must be betw"),
+        (
+            ("friction", "viscous"),
+            [1.0, 2.0, -3.0],
+            r"'friction': viscous = .*; allowed: .*, none neg",
+        ),
+        (
+            ("workspace", "min_rod_independence"),
+            1.0,
+            r"min_rod_independence = 1.0; allowed: above 0",
+        ),
     ],
 )
 def test_wrong_values_are_refused_in_one_line(keys, value, message):
