@@ -79,7 +79,7 @@ benchmark: setup
 # warnings are errors; executed notebooks are kept beside what they wrote
 docs: setup
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -d out/doctrees docs out/site
-	$(BIN)/python -m docs.making.links out/site
+	$(BIN)/python -m docs.making.site_links out/site
 	@echo "Open out/site/index.html"
 
 # the page of signals, metrics and figures

@@ -1,4 +1,4 @@
-"""One builder of stations: a robot, a task and surroundings, each chosen independently."""
+"""One builder of stations: a robot, a task and an environment, each chosen independently."""
 
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -12,6 +12,8 @@ from diagrams.drawing.mounting_look import mounting_look
 from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import build_delta_replay, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
+from diagrams.environment.acting_forces import Environment
+from diagrams.environment.mounting_parts import payload_of
 from diagrams.holder_station import Holder, add_holder
 from diagrams.robots.arm import Arm
 from diagrams.robots.delta import DeltaPart
@@ -37,20 +39,18 @@ from diagrams.station_options import (
 )
 from diagrams.station_parts import PARTS
 from diagrams.station_start import find_start
-from diagrams.surroundings.forces import Surroundings
-from diagrams.surroundings.mounting_parts import payload_of
 from diagrams.tasks.task_drawing import drawing_of
 from diagrams.turntable_station import Turntable
 from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.checks import require
-from pfsc_drake.following.extension import Extension
-from pfsc_drake.following.options.follower import (
+from pfsc_drake.controller.extension import Extension
+from pfsc_drake.controller.options.follower_options import (
     FollowerOptions,
     ObstacleOptions,
     OperatorOptions,
 )
-from pfsc_drake.following.sensed_force import SensedForce
-from pfsc_drake.following.tasks.task import Task
+from pfsc_drake.controller.sensed_force import SensedForce
+from pfsc_drake.controller.tasks.task import Task
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.fuse import fuse_blocks
 
@@ -79,7 +79,7 @@ def build_station(
             are symbols: such a station is not simulated, but its blocks' networks differentiated.
         remote: Whether the robot is in another process: the station has a
             :class:`~diagrams.robots.remote_arm.RemoteArm` for it, and the scenario must not have
-            surroundings, see :func:`~diagrams.scenario.schema.driven`.
+            an environment, see :func:`~diagrams.scenario.schema.driven`.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -112,7 +112,7 @@ def build_station(
     check_trajectory(scenario)
     placed = part, task, task.manifold, outside(scenario), start[0]
     at_tool = scenario.operator is not None and scenario.teleoperation is None
-    around = Surroundings(*placed, at_tool, mounting, spring)
+    around = Environment(*placed, at_tool, mounting, spring)
     robot = add_controlled_robot(
         builder,
         scenario,
@@ -159,7 +159,7 @@ def _add_carrier(
 def _options(
     scenario: Scenario,
     part: RobotPart,
-    around: Surroundings,
+    around: Environment,
     carrier: Holder | Turntable | None,
 ) -> FollowerOptions:
     """Return the options of the robot's controller."""

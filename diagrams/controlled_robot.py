@@ -11,19 +11,19 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from diagrams.fault_instant import first_instant
 from diagrams.oscillation import oscillation_before
 from diagrams.robots.belief import believed_robot
-from diagrams.robots.friction import FrictionOptions, believed_friction
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor, check_sides
 from diagrams.robots.part import RobotPart
+from diagrams.robots.plant_friction import FrictionOptions, believed_friction
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.signal_log import SignalLog
 from diagrams.station_warnings import controller_warnings
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.controller.controller import Controller
+from pfsc_drake.controller.fault_description import FoundFault
+from pfsc_drake.controller.options.follower_options import FollowerOptions
+from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.controller import Controller
-from pfsc_drake.following.fault_description import FoundFault
-from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.signal_log import SignalLog
-from pfsc_drake.following.fault_description import FaultInstant
+from pfsc_drake.controller.fault_description import FaultInstant
 from pfsc_drake.systems.fuse import BlockAccess
 
 

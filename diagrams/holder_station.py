@@ -12,25 +12,25 @@ import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from diagrams.controlled_robot import ControlledRobot, add_controlled_robot
+from diagrams.environment.held_reaction import add_held_reaction
 from diagrams.named_builder import PrefixingBuilder
 from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.drives import add_drives
-from diagrams.robots.friction import add_friction
 from diagrams.robots.held_workpiece import holding
 from diagrams.robots.model import is_delta
+from diagrams.robots.plant_friction import add_friction
 from diagrams.scenario import DriverParameters, HolderParameters, Scenario
 from diagrams.scenario.pair import holder_scenario
 from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import SignalLog
 from diagrams.station_options import belief_source, following_options, friction_options
 from diagrams.station_start import find_start
-from diagrams.surroundings.held_reaction import add_held_reaction
 from pfsc_drake.checks import require
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
+from pfsc_drake.controller.carrier import CarriedFrame, Derivatives, MeasuredReaction
+from pfsc_drake.controller.fault_description import FoundFault
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.carrier import CarriedFrame, Derivatives, MeasuredReaction
-from pfsc_drake.following.fault_description import FoundFault
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.robot_model import pose_function

@@ -1,4 +1,4 @@
-"""A robot with its friction, sensors and surroundings, and nobody who controls it."""
+"""A robot with its friction, sensors and environment, and nobody who controls it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,12 +8,13 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource
 
+from diagrams.environment.acting_forces import Environment
 from diagrams.robots.drives import add_drives
 from diagrams.robots.force_sensor import add_force_sensor
-from diagrams.robots.friction import add_friction
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
+from diagrams.robots.plant_friction import add_friction
 from diagrams.scenario import DriverParameters, Scenario, Streamed
 from diagrams.scenario_task import check_joints, make_task
 from diagrams.station_options import (
@@ -24,12 +25,11 @@ from diagrams.station_options import (
     servo_options,
 )
 from diagrams.station_start import find_start
-from diagrams.surroundings.forces import Surroundings
 from pfsc_drake.checks import require
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
+from pfsc_drake.controller.assembly import acts_on_motors
+from pfsc_drake.controller.believed import Believed
 from pfsc_drake.drivers.messages import ControlMode
-from pfsc_drake.following.assembly import acts_on_motors
-from pfsc_drake.following.believed import Believed
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import BlockAccess, fuse_blocks
@@ -174,7 +174,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     projector = BlockSystem(task.projecting, period)
     builder.AddNamedSystem(task.projector_name, projector)
     builder.Connect(tool.GetOutputPort("tool_pose"), projector.GetInputPort("tool_pose"))
-    around = Surroundings(part, task, task.manifold, outside(scenario), start)
+    around = Environment(part, task, task.manifold, outside(scenario), start)
     point = projector.GetOutputPort("manifold_point")
     forces = around.add(builder, {"true_state": true_state, "manifold_point": point})
     torque = wrench = None

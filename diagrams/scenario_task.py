@@ -25,13 +25,13 @@ from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest, straight_lines, together
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
+from pfsc_drake.controller.fixtures import free_motion, make_lead
+from pfsc_drake.controller.tasks.path_task import PathTask, is_on
+from pfsc_drake.controller.tasks.space_task import SpaceTask
+from pfsc_drake.controller.tasks.stream_task import StreamTask
+from pfsc_drake.controller.tasks.surface_task import SurfaceTask
+from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.fixtures import free_motion, make_lead
-from pfsc_drake.following.tasks.path_task import PathTask, is_on
-from pfsc_drake.following.tasks.space_task import SpaceTask
-from pfsc_drake.following.tasks.stream_task import StreamTask
-from pfsc_drake.following.tasks.surface_task import SurfaceTask
-from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve
 from pfsc_drake.geometry.paths.path_warnings import closing_gap, euler_warnings, path_warnings
 from pfsc_drake.geometry.progress import Progress

@@ -6,16 +6,16 @@ from pathlib import Path as FilePath
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.controlled_robot import ControlledRobot
+from diagrams.environment.acting_forces import Environment
+from diagrams.environment.operator import Operator
 from diagrams.holder_station import Holder
 from diagrams.scenario import Scenario
-from diagrams.surroundings.forces import Surroundings
-from diagrams.surroundings.operator import Operator
 from diagrams.turntable_station import Turntable
 from pfsc_drake.blocks.block import Block
+from pfsc_drake.controller.controller import Controller
+from pfsc_drake.controller.tasks.task import Task
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.controller import Controller
-from pfsc_drake.following.tasks.task import Task
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess
@@ -55,7 +55,7 @@ class Site:
     scenario: Scenario
     folder: FilePath
     robot: ControlledRobot
-    around: Surroundings
+    around: Environment
     remote: bool = False
     carrier: Holder | Turntable | None = None
     signals: dict[str, OutputPort] = field(default_factory=dict)

@@ -14,11 +14,11 @@ from diagrams.site import Site
 from diagrams.turntable_station import Turntable
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.following.fault_description import FoundFault
-from pfsc_drake.following.law_warnings import MODES
-from pfsc_drake.following.tasks.path_task import PathTask
-from pfsc_drake.following.tasks.task import StartPoint, Task
-from pfsc_drake.following.waiting import Waiting
+from pfsc_drake.controller.fault_description import FoundFault
+from pfsc_drake.controller.law_warnings import MODES
+from pfsc_drake.controller.tasks.path_task import PathTask
+from pfsc_drake.controller.tasks.task import StartPoint, Task
+from pfsc_drake.controller.waiting import Waiting
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess

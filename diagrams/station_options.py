@@ -4,30 +4,30 @@ from pathlib import Path as FilePath
 
 from pydrake.systems.framework import DiagramBuilder
 
+from diagrams.environment.acting_forces import Outside
+from diagrams.environment.leader_side import teleoperated
+from diagrams.environment.mounting import Mounting, make_mounting
+from diagrams.environment.workpieces import NotchedWorkpiece, PressedWorkpiece
 from diagrams.robots.arm import add_arm
 from diagrams.robots.belief import BeliefSource
 from diagrams.robots.delta import add_delta, free_step
 from diagrams.robots.drives import ServoOptions
-from diagrams.robots.friction import FrictionOptions
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
+from diagrams.robots.plant_friction import FrictionOptions
 from diagrams.robots.remote_arm import add_remote_arm
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.scenario.massless import check_massless
-from diagrams.surroundings.forces import Outside
-from diagrams.surroundings.mounting import Mounting, make_mounting
-from diagrams.surroundings.teleoperation import teleoperated
-from diagrams.surroundings.workpieces import NotchedWorkpiece, PressedWorkpiece
 from pfsc_drake.checks import require, require_whole_fraction
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
+from pfsc_drake.controller.options.compliance_parameters import ComplianceParameters
+from pfsc_drake.controller.options.follower_options import FollowerOptions
+from pfsc_drake.controller.tasks.path_task import PathTask
+from pfsc_drake.controller.tasks.surface_task import SurfaceTask
+from pfsc_drake.controller.tasks.task import Task
+from pfsc_drake.controller.teleoperated import Teleoperated
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.options.compliance import ComplianceParameters
-from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.tasks.path_task import PathTask
-from pfsc_drake.following.tasks.surface_task import SurfaceTask
-from pfsc_drake.following.tasks.task import Task
-from pfsc_drake.following.teleoperated import Teleoperated
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 

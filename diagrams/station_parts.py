@@ -7,17 +7,17 @@ afterwards.
 
 from collections.abc import Callable
 
+from diagrams.environment.leader import Leading
+from diagrams.environment.leader_side import add_leader_side
+from diagrams.environment.measured_obstacles import add_obstacles, add_told_obstacles
+from diagrams.environment.operator import add_operator
 from diagrams.holder_station import HOLDER, Holder
 from diagrams.robots.drives import add_drives
 from diagrams.robots.force_sensor import add_force_sensor
-from diagrams.robots.friction import add_friction
+from diagrams.robots.plant_friction import add_friction
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.site import Site
 from diagrams.station_options import friction_options, servo_options
-from diagrams.surroundings.leader import Leading
-from diagrams.surroundings.obstacles import add_obstacles, add_told_obstacles
-from diagrams.surroundings.operator import add_operator
-from diagrams.surroundings.teleoperation import add_leader_side
 from diagrams.tasks.streaming import ScenarioStream
 from diagrams.turntable_station import Turntable
 from pfsc_drake.blocks.wiring_blocks import Hold
@@ -91,7 +91,7 @@ def _leader(site: Site) -> None:
         site.show(**signals)
 
 
-def _surroundings(site: Site) -> None:
+def _environment(site: Site) -> None:
     ports, carrier = dict(site.signals), site.carrier
     if carrier is None:
         # forces act where the tool is, also if a law follows another point
@@ -132,5 +132,5 @@ def _friction(site: Site) -> None:
 
 PARTS: list[Callable[[Site], None]] = [
     *(_controller, _carrier, _obstacles, _waypoints, _operator, _leader),
-    *(_surroundings, _force_sensor, _drives, _friction),
+    *(_environment, _force_sensor, _drives, _friction),
 ]

@@ -2,14 +2,14 @@
 
 import numpy as np
 
+from diagrams.environment.mounting import Mounting
 from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import StartParameters
 from diagrams.scenario_task import inverted_start
-from diagrams.surroundings.mounting import Mounting
+from pfsc_drake.controller.moving_start import placed
+from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.carried import placed
-from pfsc_drake.following.tasks.task import StartPoint, Task
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
 

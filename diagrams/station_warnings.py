@@ -8,10 +8,10 @@ from diagrams.robots.force_sensor import taring_warnings
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.warnings.encoders import coarse_encoders
-from diagrams.warnings.fixtures import firm_guides, stiff_fixtures
-from diagrams.warnings.obstacles import obstacle_warnings
+from diagrams.warnings.fixture_warnings import firm_guides, stiff_fixtures
+from diagrams.warnings.obstacle_warnings import obstacle_warnings
+from diagrams.warnings.rest_warnings import rest_warnings
 from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
-from diagrams.warnings.teleoperation import rest_warnings
 from diagrams.warnings.untold_forces import (
     ExpectedForces,
     bearable_way,
@@ -19,14 +19,14 @@ from diagrams.warnings.untold_forces import (
     untold_forces,
     untold_friction,
 )
-from pfsc_drake.following.controller import Controller
-from pfsc_drake.following.law_warnings import (
+from pfsc_drake.controller.controller import Controller
+from pfsc_drake.controller.law_warnings import (
     law_warnings,
     observed_force_warnings,
     servo_warnings,
     unused_parameters,
 )
-from pfsc_drake.following.tasks.space_task import SpaceTask
+from pfsc_drake.controller.tasks.space_task import SpaceTask
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.operator_hand import LiveHandParameters
 

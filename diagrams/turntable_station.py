@@ -14,7 +14,7 @@ from pfsc_drake.checks import require_whole_ticks
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.turntable import TurntableAxes, turntable_motion_function
-from pfsc_drake.following.carrier import Derivatives, TurntableMotion, delayed
+from pfsc_drake.controller.carrier import Derivatives, TurntableMotion, delayed
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.physics.turntable import TurntableDrive
 from pfsc_drake.systems.block_system import BlockSystem

@@ -1,4 +1,4 @@
-"""The house: its floors, what each room may import, and the picture of both.
+"""The architecture: its layers, what each package may import, and the picture of both.
 
     python -m docs.architecture     # writes docs/images/architecture.svg anew
 
@@ -14,20 +14,20 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 
-# its door names everything for type checkers, and loads what is used
+# its stub names everything for type checkers, and loads what is used
 LIBRARY = "pfsc_drake"
-# from the top down; a file imports from its own room and from those below, not from one beside
-FLOORS = [
+# from the top down; a file imports from its own package and from those below, not from one beside
+LAYERS = [
     ["experiments"],
     ["identification"],
     ["reporting"],
     ["diagrams"],
     ["diagrams.drawing"],
-    ["diagrams.surroundings"],
+    ["diagrams.environment"],
     ["diagrams.tasks"],
     ["diagrams.robots"],
     ["diagrams.scenario"],
-    ["pfsc_drake.following", "pfsc_drake.codegen", "pfsc_drake.drivers"],
+    ["pfsc_drake.controller", "pfsc_drake.codegen", "pfsc_drake.drivers"],
     ["pfsc_drake.systems"],
     ["pfsc_drake.physics"],
     ["pfsc_drake.control"],
@@ -38,8 +38,8 @@ FLOORS = [
     ["pfsc_drake.jets", "pfsc_drake.checks"],
     ["pfsc_drake.errors"],
 ]
-ROOMS = [room for floor in FLOORS for room in floor]
-# packages that a room must not know
+PACKAGES = [package for layer in LAYERS for package in layer]
+# packages that a package must not know
 UNKNOWN = {
     "pfsc_drake.jets": ["pydrake", "matplotlib"],
     "pfsc_drake.blocks": ["pydrake", "matplotlib"],
@@ -52,7 +52,7 @@ UNKNOWN = {
 }
 
 _WIDTH, _HEIGHT, _GAP, _MARGIN = 1000, 58, 22, 16
-# where boxes begin and end; beside them arrows go past floors
+# where boxes begin and end; beside them arrows go past layers
 _LEFT, _RIGHT = 90, 900
 _STYLE = """
 text { font: 13px system-ui, sans-serif; fill: #17202e; }
@@ -68,7 +68,7 @@ path { fill: none; stroke: #0072b2; stroke-opacity: .45; }
 def imports() -> dict[str, set[str]]:
     """Return the modules that every file imports, by the file's own module."""
     found = {}
-    for top in sorted({room.split(".")[0] for room in ROOMS}):
+    for top in sorted({package.split(".")[0] for package in PACKAGES}):
         for file in sorted((ROOT / top).rglob("*.py")):
             name = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
             imported: set[str] = set()
@@ -91,49 +91,53 @@ def _loaded(tree: ast.Module) -> Iterator[ast.AST]:
             yield from ast.walk(statement)
 
 
-def is_inside(module: str, room: str) -> bool:
-    """Return whether a module is a room or one of its files."""
-    return module == room or module.startswith(room + ".")
+def is_inside(module: str, package: str) -> bool:
+    """Return whether a module is a package or one of its files."""
+    return module == package or module.startswith(package + ".")
 
 
-def room_of(module: str) -> str | None:
-    """Return the smallest room that a module is in, if there is one."""
-    found = [room for room in ROOMS if is_inside(module, room)]
+def package_of(module: str) -> str | None:
+    """Return the smallest package that a module is in, if there is one."""
+    found = [package for package in PACKAGES if is_inside(module, package)]
     return max(found, key=len, default=None)
 
 
-def floor_of(room: str) -> int:
-    """Return the number of a room's floor, from the top."""
-    return next(i for i, floor in enumerate(FLOORS) if room in floor)
+def layer_of(package: str) -> int:
+    """Return the number of a package's layer, from the top."""
+    return next(i for i, layer in enumerate(LAYERS) if package in layer)
 
 
 def arrows() -> set[tuple[str, str]]:
-    """Return which room imports from which other."""
+    """Return which package imports from which other."""
     found = set()
     for module, imported in imports().items():
         for other in imported:
-            pair = room_of(module), room_of(other)
+            pair = package_of(module), package_of(other)
             if None not in pair and pair[0] != pair[1] and other in imports():
                 found.add(pair)
     return found
 
 
 def draw() -> str:
-    """Return the picture as SVG: rooms with what they are for, and imports that are no detour."""
+    """Return the picture as SVG: packages with their purpose, and direct imports."""
     direct = arrows()
     below: dict[str, set[str]] = {}
-    for room in reversed(ROOMS):
-        own = {b for a, b in direct if a == room}
-        below[room] = own.union(*(below.get(b, set()) for b in own))
+    for package in reversed(PACKAGES):
+        own = {b for a, b in direct if a == package}
+        below[package] = own.union(*(below.get(b, set()) for b in own))
     shown = [
         (a, b) for a, b in sorted(direct) if not any(b in below[c] for x, c in direct if x == a)
     ]
     boxes = {}
-    for row, floor in enumerate(FLOORS):
-        width = (_RIGHT - _LEFT - (len(floor) - 1) * _MARGIN) / len(floor)
-        for k, room in enumerate(floor):
-            boxes[room] = (_LEFT + k * (width + _MARGIN), _MARGIN + row * (_HEIGHT + _GAP), width)
-    height = len(FLOORS) * (_HEIGHT + _GAP) + _MARGIN
+    for row, layer in enumerate(LAYERS):
+        width = (_RIGHT - _LEFT - (len(layer) - 1) * _MARGIN) / len(layer)
+        for k, package in enumerate(layer):
+            boxes[package] = (
+                _LEFT + k * (width + _MARGIN),
+                _MARGIN + row * (_HEIGHT + _GAP),
+                width,
+            )
+    height = len(LAYERS) * (_HEIGHT + _GAP) + _MARGIN
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}">',
         f"<style>{_STYLE}</style>",
@@ -141,24 +145,27 @@ def draw() -> str:
         'orient="auto"><path d="M0 0 L6 3 L0 6 z" style="fill:#0072b2"/></marker>',
         f'<rect x="0" y="0" width="{_WIDTH}" height="{height}" style="stroke:none"/>',
     ]
-    for room, (x, y, width) in boxes.items():
+    for package, (x, y, width) in boxes.items():
         lines.append(f'<rect x="{x:.0f}" y="{y}" width="{width:.0f}" height="{_HEIGHT}"/>')
-        texts = [("name", room), ("what", _purpose(room)), ("inside", _inside(room))]
+        texts = [("name", package), ("what", _purpose(package)), ("inside", _inside(package))]
         for k, (kind, text) in enumerate(texts):
             lines.append(
                 f'<text class="{kind}" x="{x + 10:.0f}" y="{y + 18 + 16 * k}">{escape(text)}</text>'
             )
     lanes = {True: 0, False: 0}
     for a, b in shown:
-        if floor_of(b) == floor_of(a) + 1:
+        if layer_of(b) == layer_of(a) + 1:
             x, _, width = min(boxes[a], boxes[b], key=lambda box: box[2])
             x += width / 2.0
             lines.append(_arrow([(x, boxes[a][1] + _HEIGHT), (x, boxes[b][1])]))
             continue
-        # past the floors between, on the side where both can be reached
-        left = any(boxes[room][0] + boxes[room][2] < _RIGHT - 1.0 for room in (a, b))
+        # past the layers between, on the side where both can be reached
+        left = any(boxes[package][0] + boxes[package][2] < _RIGHT - 1.0 for package in (a, b))
         lanes[left] += 1
-        edges = [boxes[room][0] if left else boxes[room][0] + boxes[room][2] for room in (a, b)]
+        edges = [
+            boxes[package][0] if left else boxes[package][0] + boxes[package][2]
+            for package in (a, b)
+        ]
         lane = _LEFT - 12 * lanes[left] if left else _RIGHT + 12 * lanes[left]
         begin, end = boxes[a][1] + 0.7 * _HEIGHT, boxes[b][1] + 0.3 * _HEIGHT
         lines.append(_arrow([(edges[0], begin), (lane, begin), (lane, end), (edges[1], end)]))
@@ -170,25 +177,27 @@ def _arrow(corners: list[tuple[float, float]]) -> str:
     return f'<path d="M{way}" marker-end="url(#tip)"/>'
 
 
-def _purpose(room: str) -> str:
-    """Return the first sentence that a room says of itself."""
-    path = ROOT.joinpath(*room.split("."))
+def _purpose(package: str) -> str:
+    """Return the first sentence that a package says of itself."""
+    path = ROOT.joinpath(*package.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     said = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
     return said.split("\n")[0]
 
 
-def _inside(room: str) -> str:
-    """Return the folders in a room that are no rooms themselves."""
-    path = ROOT.joinpath(*room.split("."))
+def _inside(package: str) -> str:
+    """Return the folders in a package that are no packages themselves."""
+    path = ROOT.joinpath(*package.split("."))
     folders = [p.name for p in sorted(path.glob("*")) if (p / "__init__.py").exists()]
-    return " · ".join(name for name in folders if f"{room}.{name}" not in ROOMS)
+    return " · ".join(name for name in folders if f"{package}.{name}" not in PACKAGES)
 
 
 def may_import() -> list[tuple[str, str]]:
-    """Return each room, and the rooms that its files import from, as text."""
+    """Return each package, and the packages that its files import from, as text."""
     own = arrows()
-    return [(room, ", ".join(b for b in ROOMS if (room, b) in own)) for room in ROOMS]
+    return [
+        (package, ", ".join(b for b in PACKAGES if (package, b) in own)) for package in PACKAGES
+    ]
 
 
 if __name__ == "__main__":

@@ -34,4 +34,4 @@ from experiments.kept_run import (
 from experiments.kept_run import (
     load as load,
 )
-from experiments.studies.margins.page import Margins as Margins
+from experiments.studies.margins.margins_page import Margins as Margins

@@ -31,7 +31,7 @@ from experiments.scenario_file import ScenarioFile, apply_change, expand_home, r
 from experiments.simulated_run import RunOptions, run_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
-from experiments.studies.margins.page import Margins
+from experiments.studies.margins.margins_page import Margins
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import dialect
 from pfsc_drake.errors import InputError, WriteError

@@ -16,7 +16,7 @@ from diagrams.drawing.replay import record
 from diagrams.tasks.task_drawing import drawing_of
 from experiments.preparation import PreparedRun
 from experiments.results.features import FEATURES, render_figures
-from experiments.results.joint_limits import DriveLimitsOfRun
+from experiments.results.joint_limits_feature import DriveLimitsOfRun
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.requirements import (
     leave_unjudged,
@@ -24,7 +24,7 @@ from experiments.results.requirements import (
     set_targets,
     unjudged_distance,
 )
-from experiments.results.rest import MotionAfterFault
+from experiments.results.rest_feature import MotionAfterFault
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
 from experiments.simulation import SimulationResult, measure_tick

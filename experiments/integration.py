@@ -8,7 +8,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from diagrams.integration import STABILITY, Integration, continuous_modes, is_stable
-from diagrams.robots.friction import FRICTION_INTEGRATORS
+from diagrams.robots.plant_friction import FRICTION_INTEGRATORS
 from diagrams.scenario import SimulationParameters
 from diagrams.scenario.simulation import AUTO
 from diagrams.station import Station

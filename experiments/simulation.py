@@ -12,7 +12,7 @@ from diagrams.scenario import SimulationParameters
 from diagrams.station import Station
 from diagrams.tasks.streaming import ScenarioStream
 from experiments.results.run_log import RunLog
-from pfsc_drake.following.tasks.space_task import SpaceTask
+from pfsc_drake.controller.tasks.space_task import SpaceTask
 from reporting.progress import ProgressListener
 
 # progress and faults are looked at this often [s]; between them nothing interrupts the loop

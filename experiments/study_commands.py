@@ -158,7 +158,12 @@ def margins_command(
     """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
     from experiments.scenario_file import read_scenario
     from experiments.studies.margins.box import ErrorBox
-    from experiments.studies.margins.page import case_table, place_table, summary, write_margins
+    from experiments.studies.margins.margins_page import (
+        case_table,
+        place_table,
+        summary,
+        write_margins,
+    )
 
     with interruptible():
         loaded = read_scenario(scenario, overrides or [])

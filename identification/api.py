@@ -20,7 +20,7 @@ from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
 from identification.options import check_folder
 from identification.pages import write_identification
-from identification.report.page import torque_table
+from identification.report.identification_page import torque_table
 from identification.steps import (
     MeasuredFiles,
     bounds_of,

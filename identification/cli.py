@@ -166,7 +166,7 @@ def estimate_command(
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
     from identification.pages import write_identification
-    from identification.report.page import parameter_table, torque_table
+    from identification.report.identification_page import parameter_table, torque_table
     from identification.steps import MeasuredFiles, estimate_files
     from reporting.terminal import print_table
 

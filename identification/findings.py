@@ -8,7 +8,7 @@ import numpy as np
 from identification.consistency.bounds import PhysicalBounds
 from identification.consistency.nearest import ConsistentParameters, nearest_consistent
 from identification.estimation.choice import FrictionChoice, choose_friction
-from identification.estimation.friction import FrictionTerms
+from identification.estimation.friction_terms import FrictionTerms
 from identification.estimation.information import MeasuredMotion
 from identification.estimation.least_squares import Estimate, estimate
 from identification.estimation.repetitions import Repetitions

@@ -17,7 +17,7 @@ from identification.measurement.files import read_record
 from identification.measurement.periods import AveragedMotion, friction_trend
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
-from identification.report.page import PageContent, write_page
+from identification.report.identification_page import PageContent, write_page
 from identification.steps import RECORDING, bounds_of, consistent_set, stored_findings
 from pfsc_drake.errors import InputError
 from reporting.folder import ResultsFolder, open_results

@@ -25,7 +25,7 @@ from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.periods import AveragedMotion
 from identification.model.base import BaseParameters, base_parameters
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
 from identification.options import make_folder

@@ -7,7 +7,7 @@ The entry points are :func:`add_path_following`, :func:`add_path_streaming`,
 :func:`add_surface_following` and :func:`add_guidance`; their arguments (paths, surfaces, regions,
 options) have names here, too. Packages import downwards only:
 
-* :mod:`pfsc_drake.following`: whole controllers, from the joint state to the drives.
+* :mod:`pfsc_drake.controller`: whole controllers, from the joint state to the drives.
 * :mod:`pfsc_drake.codegen`: controllers as C99.
 * :mod:`pfsc_drake.systems`: blocks as Drake systems, one by one or fused; plants, drawing.
 * :mod:`pfsc_drake.physics`: what a controller meets and does not know.

@@ -14,22 +14,22 @@ from pfsc_drake.control.compliance.impedance_parameters import (
 from pfsc_drake.control.compliance.pressing import PressParameters as PressParameters
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters as TuningParameters
 from pfsc_drake.control.estimation.link_deviation import StateUncertainty as StateUncertainty
-from pfsc_drake.control.fixtures.guides import Guide as Guide
-from pfsc_drake.control.fixtures.parameters import (
+from pfsc_drake.control.fixtures.fixture_parameters import (
     Admittance as Admittance,
 )
-from pfsc_drake.control.fixtures.parameters import (
+from pfsc_drake.control.fixtures.fixture_parameters import (
     Fixture as Fixture,
 )
-from pfsc_drake.control.fixtures.parameters import (
+from pfsc_drake.control.fixtures.fixture_parameters import (
     GuidanceParameters as GuidanceParameters,
 )
-from pfsc_drake.control.fixtures.parameters import (
+from pfsc_drake.control.fixtures.fixture_parameters import (
     RobotLimitParameters as RobotLimitParameters,
 )
-from pfsc_drake.control.fixtures.parameters import (
+from pfsc_drake.control.fixtures.fixture_parameters import (
     TankParameters as TankParameters,
 )
+from pfsc_drake.control.fixtures.guides import Guide as Guide
 from pfsc_drake.control.law.reference import (
     rest_to_rest as rest_to_rest,
 )
@@ -39,83 +39,83 @@ from pfsc_drake.control.law.reference import (
 from pfsc_drake.control.law.swing import Swing as Swing
 from pfsc_drake.control.law.timed_reference import StreamLimits as StreamLimits
 from pfsc_drake.control.obstacles.elbow_room import ElbowParameters as ElbowParameters
-from pfsc_drake.control.obstacles.parameters import WatchParameters as WatchParameters
 from pfsc_drake.control.obstacles.shapes import (
     Capsule as Capsule,
 )
 from pfsc_drake.control.obstacles.shapes import (
     ObstacleShape as ObstacleShape,
 )
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters as WatchParameters
 from pfsc_drake.control.streams.messages import WaypointSender as WaypointSender
-from pfsc_drake.control.streams.parameters import StreamParameters as StreamParameters
-from pfsc_drake.errors import InputError as InputError
-from pfsc_drake.following.controller import Controller as Controller
-from pfsc_drake.following.extension import Extension as Extension
-from pfsc_drake.following.follower import Follower as Follower
-from pfsc_drake.following.guidance import (
+from pfsc_drake.control.streams.stream_parameters import StreamParameters as StreamParameters
+from pfsc_drake.controller.controller import Controller as Controller
+from pfsc_drake.controller.extension import Extension as Extension
+from pfsc_drake.controller.follower import Follower as Follower
+from pfsc_drake.controller.hand_guiding import (
     GuidanceOptions as GuidanceOptions,
 )
-from pfsc_drake.following.guidance import (
+from pfsc_drake.controller.hand_guiding import (
     add_guidance as add_guidance,
 )
-from pfsc_drake.following.options.compliance import (
+from pfsc_drake.controller.options.compliance_parameters import (
     ComplianceParameters as ComplianceParameters,
 )
-from pfsc_drake.following.options.compliance import (
+from pfsc_drake.controller.options.compliance_parameters import (
     ObservedForceParameters as ObservedForceParameters,
 )
-from pfsc_drake.following.options.controller import (
+from pfsc_drake.controller.options.controller_parameters import (
     ControllerParameters as ControllerParameters,
 )
-from pfsc_drake.following.options.controller import (
+from pfsc_drake.controller.options.controller_parameters import (
     ExternalTorqueParameters as ExternalTorqueParameters,
 )
-from pfsc_drake.following.options.controller import (
+from pfsc_drake.controller.options.controller_parameters import (
     GainParameters as GainParameters,
 )
-from pfsc_drake.following.options.controller import (
+from pfsc_drake.controller.options.controller_parameters import (
     LawGains as LawGains,
 )
-from pfsc_drake.following.options.controller import (
+from pfsc_drake.controller.options.controller_parameters import (
     PostureParameters as PostureParameters,
 )
-from pfsc_drake.following.options.follower import (
+from pfsc_drake.controller.options.follower_options import (
     BrakeParameters as BrakeParameters,
 )
-from pfsc_drake.following.options.follower import (
+from pfsc_drake.controller.options.follower_options import (
     FaultParameters as FaultParameters,
 )
-from pfsc_drake.following.options.follower import (
+from pfsc_drake.controller.options.follower_options import (
     FixtureOptions as FixtureOptions,
 )
-from pfsc_drake.following.options.follower import (
+from pfsc_drake.controller.options.follower_options import (
     FollowerOptions as FollowerOptions,
 )
-from pfsc_drake.following.options.follower import (
+from pfsc_drake.controller.options.follower_options import (
     ObstacleOptions as ObstacleOptions,
 )
-from pfsc_drake.following.options.follower import (
+from pfsc_drake.controller.options.follower_options import (
     OperatorOptions as OperatorOptions,
 )
-from pfsc_drake.following.options.friction import (
+from pfsc_drake.controller.options.friction_parameters import (
     FrictionCompensationParameters as FrictionCompensationParameters,
 )
-from pfsc_drake.following.options.friction import (
+from pfsc_drake.controller.options.friction_parameters import (
     JointFrictionParameters as JointFrictionParameters,
 )
-from pfsc_drake.following.options.friction import (
+from pfsc_drake.controller.options.friction_parameters import (
     KalmanParameters as KalmanParameters,
 )
-from pfsc_drake.following.options.motion import MotionLimits as MotionLimits
-from pfsc_drake.following.path_following import add_path_following as add_path_following
-from pfsc_drake.following.sensed_force import (
+from pfsc_drake.controller.options.motion_limits import MotionLimits as MotionLimits
+from pfsc_drake.controller.path_following import add_path_following as add_path_following
+from pfsc_drake.controller.path_streaming import add_path_streaming as add_path_streaming
+from pfsc_drake.controller.sensed_force import (
     Payload as Payload,
 )
-from pfsc_drake.following.sensed_force import (
+from pfsc_drake.controller.sensed_force import (
     SensedForce as SensedForce,
 )
-from pfsc_drake.following.streaming import add_path_streaming as add_path_streaming
-from pfsc_drake.following.surface_following import add_surface_following as add_surface_following
+from pfsc_drake.controller.surface_following import add_surface_following as add_surface_following
+from pfsc_drake.errors import InputError as InputError
 from pfsc_drake.geometry import (
     Curve as Curve,
 )

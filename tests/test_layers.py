@@ -3,26 +3,26 @@
 import pytest
 
 from docs.architecture import (
-    FLOORS,
+    LAYERS,
+    PACKAGES,
     PICTURE,
-    ROOMS,
     UNKNOWN,
     arrows,
     draw,
-    floor_of,
     imports,
     is_inside,
-    room_of,
+    layer_of,
+    package_of,
 )
 
-# rooms that stand beside each other and do not know each other
+# packages that stand beside each other and do not know each other
 STRANGERS = [
     ("diagrams.robots", "diagrams.tasks"),
-    ("diagrams.robots", "diagrams.surroundings"),
-    ("diagrams.tasks", "diagrams.surroundings"),
+    ("diagrams.robots", "diagrams.environment"),
+    ("diagrams.tasks", "diagrams.environment"),
     ("diagrams.scenario", "diagrams.robots"),
     ("diagrams.scenario", "diagrams.tasks"),
-    ("diagrams.scenario", "diagrams.surroundings"),
+    ("diagrams.scenario", "diagrams.environment"),
     ("pfsc_drake.systems.following_controller", "pfsc_drake.systems.physics"),
     ("pfsc_drake.systems.following_controller", "pfsc_drake.systems.plants"),
     ("pfsc_drake.systems.following_controller", "pfsc_drake.physics"),
@@ -43,10 +43,10 @@ LAW_KNOWS_NO = [
 ]
 
 
-def test_every_file_is_in_a_room():
+def test_every_file_is_in_a_package():
     # the library's public names, how they are loaded, and the program
     faces = {"pfsc_drake", "pfsc_drake.lazy_names", "pfsc_drake.program"}
-    assert [m for m in imports() if room_of(m) is None and m not in faces] == []
+    assert [m for m in imports() if package_of(m) is None and m not in faces] == []
 
 
 def test_imports_point_downwards():
@@ -54,41 +54,41 @@ def test_imports_point_downwards():
         f"{module} imports {other}"
         for module, imported in imports().items()
         for other in imported & imports().keys()
-        if None not in (room_of(module), room_of(other))
-        and room_of(module) != room_of(other)
-        and floor_of(room_of(other)) <= floor_of(room_of(module))
+        if None not in (package_of(module), package_of(other))
+        and package_of(module) != package_of(other)
+        and layer_of(package_of(other)) <= layer_of(package_of(module))
     ]
     assert wrong == []
 
 
-def test_the_picture_shows_the_house_as_it_is():
+def test_the_picture_is_current():
     """If not: ``make architecture``."""
     drawn = draw()
     assert PICTURE.read_text(encoding="utf-8") == drawn
-    assert all(room in drawn for floor in FLOORS for room in floor)
-    assert {room for pair in arrows() for room in pair} == set(ROOMS)
+    assert all(package in drawn for layer in LAYERS for package in layer)
+    assert {package for pair in arrows() for package in pair} == set(PACKAGES)
 
 
-@pytest.mark.parametrize(("room", "other"), STRANGERS)
-def test_rooms_that_do_not_know_what_is_beside_them(room, other):
+@pytest.mark.parametrize(("package", "other"), STRANGERS)
+def test_packages_that_do_not_know_what_is_beside_them(package, other):
     wrong = [
         f"{module} imports {target}"
         for module, imported in imports().items()
-        if is_inside(module, room)
+        if is_inside(module, package)
         for target in imported
         if is_inside(target, other)
     ]
     assert wrong == []
 
 
-@pytest.mark.parametrize("room", UNKNOWN)
-def test_packages_that_a_room_does_not_know(room):
+@pytest.mark.parametrize("package", UNKNOWN)
+def test_packages_that_a_package_does_not_know(package):
     wrong = [
         f"{module} imports {target}"
         for module, imported in imports().items()
-        if is_inside(module, room)
+        if is_inside(module, package)
         for target in imported
-        if any(is_inside(target, package) for package in UNKNOWN[room])
+        if any(is_inside(target, package) for package in UNKNOWN[package])
     ]
     assert wrong == []
 
@@ -98,7 +98,7 @@ def test_the_law_knows_no_particular_manifold():
     wrong = [
         f"{module} imports {target}"
         for module, imported in imports().items()
-        if any(is_inside(module, room) for room in laws)
+        if any(is_inside(module, package) for package in laws)
         for target in imported
         if any(is_inside(target, known) for known in LAW_KNOWS_NO)
     ]
@@ -106,7 +106,7 @@ def test_the_law_knows_no_particular_manifold():
 
 
 def test_only_what_builds_a_station_knows_a_scenario():
-    """Robots, tasks, surroundings and warnings are given their own parameters."""
+    """Robots, tasks, environments and warnings are given their own parameters."""
     builders = {
         "diagrams.builder",
         "diagrams.controlled_robot",

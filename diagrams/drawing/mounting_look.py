@@ -7,8 +7,8 @@ from pydrake.geometry import Box, Cylinder, Meshcat, Rgba
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from diagrams.environment.mounting import PAD, Mounting, pin_shape
 from diagrams.scenario.plate import PlateParameters
-from diagrams.surroundings.mounting import PAD, Mounting, pin_shape
 from pfsc_drake.geometry.workpiece_bodies import bore_wedges
 from pfsc_drake.robot.delta.shapes import METAL
 from pfsc_drake.systems.drawing.robot_visualizer import Triangles

@@ -33,13 +33,13 @@ from diagrams.scenario.robot import MULTIBODY
 from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, state_at_rest
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
 from pfsc_drake.robot.tool_load import ToolLoad
+from pfsc_drake.systems.plants.applied_wrenches import LinkPushes
 from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
-from pfsc_drake.systems.plants.external_forces import LinkPushes
 from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index
 
 _ROUNDING = 1e-6  # m
@@ -175,7 +175,7 @@ class MultibodyArm(Arm):
     """An arm that Drake's MultibodyPlant moves: (2.42) rigid, (2.65) elastic.
 
     Attributes:
-        contact: What the surroundings do to its tool, if it can touch them.
+        contact: What the environment does to its tool, if it can touch them.
     """
 
     contact: ContactWrench | None = None

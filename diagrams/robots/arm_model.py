@@ -13,7 +13,7 @@ from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import inboard_joints
-from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
+from pfsc_drake.robot.models.robot_parameters import VariantParameters, load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.serial.chain import SerialChain, ToolMass, believed_chain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant

@@ -11,8 +11,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from diagrams.scenario import RobotParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from pfsc_drake.control.estimation.link_errors import MotorEncoders
+from pfsc_drake.controller.believed import Believed, Coefficients
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.believed import Believed, Coefficients
 from pfsc_drake.physics.joint_sensors import EncoderOptions, encoder_resolution
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel

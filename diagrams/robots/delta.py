@@ -31,6 +31,7 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.robot import ANALYTIC, MULTIBODY
 from pfsc_drake.checks import require
+from pfsc_drake.robot.delta.delta_parameters import SHIPPED_ROBOTS
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot, believed_delta
 from pfsc_drake.robot.delta.multibody import (
     DeltaModel,
@@ -38,7 +39,6 @@ from pfsc_drake.robot.delta.multibody import (
     set_delta_positions,
     slide_state_rows,
 )
-from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad

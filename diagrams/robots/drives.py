@@ -13,9 +13,9 @@ from diagrams.scenario import (
 )
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.checks import require, require_whole_fraction
-from pfsc_drake.following.law import safe_state, supervision
-from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.follower import FaultParameters
+from pfsc_drake.controller.law import safe_state, supervision
+from pfsc_drake.controller.options.controller_parameters import ControllerParameters
+from pfsc_drake.controller.options.follower_options import FaultParameters
 from pfsc_drake.physics.driver import DriveLowPass
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.physics.velocity_servo import BusDelay, VelocityServoLaw, joint_inertia, servo_gains

@@ -5,8 +5,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import SensorFailureParameters
 from pfsc_drake.checks import require
+from pfsc_drake.controller.options.controller_parameters import ControllerParameters
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.physics.force_torque_sensor import SensorFailure
 from pfsc_drake.physics.joint_sensors import (
     EncoderOptions,

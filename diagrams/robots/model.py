@@ -16,8 +16,8 @@ from diagrams.scenario import (
 )
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError, suggestion
+from pfsc_drake.robot.delta.delta_parameters import SHIPPED_ROBOTS, load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
 from pfsc_drake.robot.models.files import packages_for, read_with_inclusions, resolve_model
 from pfsc_drake.robot.models.joint_edits import frame_named
 from pfsc_drake.robot.models.model_xml import read_model_xml

@@ -63,7 +63,7 @@ class RobotPart(ABC):
         robot: The robot as it is, N joints.
         belief: The robot as whatever controls it believes it to be.
         coordinates: Where its coordinates stand in the state ``[q, v]`` of its model.
-        contact: What the surroundings do to its tool, if it can touch them.
+        contact: What the environment does to its tool, if it can touch them.
     """
 
     robot: RobotModel

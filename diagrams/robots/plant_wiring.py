@@ -17,7 +17,7 @@ from pydrake.systems.primitives import Adder, MatrixGain
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad
-from pfsc_drake.systems.plants.external_forces import ExternalWrench
+from pfsc_drake.systems.plants.applied_wrenches import ExternalWrench
 from pfsc_drake.systems.plants.reactions import ContactWrench, ToolReaction
 
 

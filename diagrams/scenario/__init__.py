@@ -17,15 +17,15 @@ from diagrams.scenario.simulation import (
     SimulationParameters,
 )
 from diagrams.scenario.streamed import Streamed
-from pfsc_drake.following.options.compliance import ComplianceParameters
-from pfsc_drake.following.options.controller import (
+from pfsc_drake.controller.options.compliance_parameters import ComplianceParameters
+from pfsc_drake.controller.options.controller_parameters import (
     ControllerParameters,
     GainParameters,
     LawGains,
     PostureParameters,
 )
-from pfsc_drake.following.options.follower import BrakeParameters, FaultParameters
-from pfsc_drake.following.options.friction import JointFrictionParameters
+from pfsc_drake.controller.options.follower_options import BrakeParameters, FaultParameters
+from pfsc_drake.controller.options.friction_parameters import JointFrictionParameters
 from pfsc_drake.geometry.shapes.intersection import Intersection
 from pfsc_drake.geometry.shapes.on_surface import OnSurface
 from pfsc_drake.geometry.shapes.path_shapes import BentLemniscate, Circle, Line

@@ -9,9 +9,9 @@ from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.robot import PoseParameters, RobotParameters
 from diagrams.scenario.simulation import SensorFailureParameters
 from pfsc_drake.checks import require
-from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.follower import FaultParameters
-from pfsc_drake.following.options.friction import JointFrictionParameters
+from pfsc_drake.controller.options.controller_parameters import ControllerParameters
+from pfsc_drake.controller.options.follower_options import FaultParameters
+from pfsc_drake.controller.options.friction_parameters import JointFrictionParameters
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.yaml.rules import Numbers, OneOf, Parameters, Range
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pfsc_drake.checks import LARGEST_ANGLE, require
 from pfsc_drake.control.law.swing import Swing
-from pfsc_drake.following.options.motion import ACCELERATION, VELOCITY, MotionLimits
+from pfsc_drake.controller.options.motion_limits import ACCELERATION, VELOCITY, MotionLimits
 from pfsc_drake.yaml.fields import NUMBERS_OR_END, ONE_FOR_ALL, equal
 from pfsc_drake.yaml.rules import Count, Numbers, Parameters, Range
 

@@ -4,7 +4,7 @@ import dataclasses as dc
 from typing import Annotated
 
 from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
-from pfsc_drake.control.obstacles.parameters import WatchParameters
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.physics.moving_obstacle import ObstacleParameters, ObstacleSensorParameters
 from pfsc_drake.yaml.rules import Count, Parameters
 

@@ -30,10 +30,10 @@ from diagrams.scenario.virtual_fixtures import FixtureParameters
 from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
 from pfsc_drake.checks import require, require_one_of
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
-from pfsc_drake.following.options.compliance import ComplianceParameters
-from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.follower import FaultParameters
-from pfsc_drake.following.options.friction import JointFrictionParameters
+from pfsc_drake.controller.options.compliance_parameters import ComplianceParameters
+from pfsc_drake.controller.options.controller_parameters import ControllerParameters
+from pfsc_drake.controller.options.follower_options import FaultParameters
+from pfsc_drake.controller.options.friction_parameters import JointFrictionParameters
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.physics.link_forces import LinkHandParameters
@@ -56,7 +56,7 @@ class Target:
 
 @dc.dataclass
 class Scenario(Parameters):
-    """A run: a robot, a task and surroundings.
+    """A run: a robot, a task and an environment.
 
     Attributes:
         name: Name of the scenario.

@@ -106,7 +106,7 @@ class OperatorParameters:
 
     Attributes:
         inputs: CSV file with what was done, one line per change, see
-            :mod:`diagrams.surroundings.operator`; a live session leaves it empty. Its column
+            :mod:`diagrams.environment.operator`; a live session leaves it empty. Its column
             ``time`` is in s; ``tick``, of older files, counts sampling intervals.
         hand: The hand.
         tuning: How the impedance follows what the person sets.

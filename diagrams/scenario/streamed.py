@@ -4,7 +4,7 @@ import dataclasses as dc
 from typing import Annotated
 
 from pfsc_drake.checks import require
-from pfsc_drake.control.streams.parameters import StreamParameters
+from pfsc_drake.control.streams.stream_parameters import StreamParameters
 from pfsc_drake.yaml.fields import FILE
 from pfsc_drake.yaml.rules import Direction, NotNegative, Numbers, Parameters, Point, Range
 

@@ -3,7 +3,7 @@
 import dataclasses as dc
 
 from pfsc_drake.checks import require
-from pfsc_drake.control.teleoperation.parameters import CouplingParameters
+from pfsc_drake.control.teleoperation.coupling_parameters import CouplingParameters
 from pfsc_drake.physics.channel import ChannelParameters
 from pfsc_drake.physics.leader_clutch import ClutchParameters
 from pfsc_drake.physics.leader_device import LeaderParameters

@@ -7,7 +7,7 @@ from diagrams.scenario.manifolds import GuideShape
 from diagrams.scenario.region_motion import RegionMotion
 from pfsc_drake.checks import require
 from pfsc_drake.control.fixtures.guides import MOST_GUIDES, REACH, STIFFNESS
-from pfsc_drake.following.options.follower import FixtureOptions
+from pfsc_drake.controller.options.follower_options import FixtureOptions
 from pfsc_drake.geometry.shapes.path_shapes import Line
 from pfsc_drake.geometry.shapes.plane import Plane
 from pfsc_drake.geometry.shapes.surface_list import RegionShape

@@ -8,8 +8,8 @@ import numpy as np
 
 from diagrams.scenario.recorded_times import TIME, sampling_instants, time_column, time_text
 from diagrams.scenario.streamed import Streamed
-from pfsc_drake.control.streams.course import POSE, POSITION
 from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender
+from pfsc_drake.control.streams.stream_course import POSE, POSITION
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import read_waypoints
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers

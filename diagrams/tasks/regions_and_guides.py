@@ -10,8 +10,8 @@ import numpy as np
 from diagrams.scenario.manifolds import PathParameters
 from diagrams.scenario.virtual_fixtures import FixtureParameters, RegionParameters
 from diagrams.tasks.task_geometry import make_path
+from pfsc_drake.control.fixtures.fixture_parameters import Fixture
 from pfsc_drake.control.fixtures.guides import Guide
-from pfsc_drake.control.fixtures.parameters import Fixture
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.regions.moving import MovingRegion

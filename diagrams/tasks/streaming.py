@@ -14,10 +14,10 @@ from diagrams.tasks.task_geometry import followed_angles
 from pfsc_drake.checks import require
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
-from pfsc_drake.control.streams.course import POSE, POSITION
+from pfsc_drake.control.streams.stream_course import POSE, POSITION
+from pfsc_drake.controller.tasks.stream_task import StreamTask
+from pfsc_drake.controller.tasks.streamed_path import StreamedPath
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.tasks.stream_task import StreamTask
-from pfsc_drake.following.tasks.streamed_path import StreamedPath
 from pfsc_drake.geometry import zyx_to_quaternion
 from pfsc_drake.physics.waypoint_source import Arrivals, WaypointSource
 from pfsc_drake.robot.robot_model import RobotModel

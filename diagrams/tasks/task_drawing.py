@@ -8,10 +8,10 @@ from diagrams.tasks.drawing import ManifoldDrawing, PathDrawing, SpaceDrawing, S
 from diagrams.tasks.drawn_plane import StreamDrawing
 from diagrams.tasks.regions_and_guides import DrawnFixture
 from diagrams.tasks.streaming import ScenarioStream
-from pfsc_drake.following.tasks.path_task import PathTask
-from pfsc_drake.following.tasks.space_task import SpaceTask
-from pfsc_drake.following.tasks.surface_task import SurfaceTask
-from pfsc_drake.following.tasks.task import Task
+from pfsc_drake.controller.tasks.path_task import PathTask
+from pfsc_drake.controller.tasks.space_task import SpaceTask
+from pfsc_drake.controller.tasks.surface_task import SurfaceTask
+from pfsc_drake.controller.tasks.task import Task
 
 
 @singledispatch

@@ -20,7 +20,7 @@ from pfsc_drake.control.compliance.tuned_impedance import (
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.coordinate import Kind
-from pfsc_drake.following.law_warnings import least_of, slope_at_rest
+from pfsc_drake.controller.law_warnings import least_of, slope_at_rest
 from pfsc_drake.physics.joint_sensors import encoder_resolution
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad

@@ -22,10 +22,10 @@ from experiments.hardware.check import (
 from experiments.hardware.drive_inputs import DriveInputs
 from experiments.results.run_log import RunLog
 from experiments.simulation import SimulationResult
+from pfsc_drake.controller.tasks.space_task import SpaceTask
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
-from pfsc_drake.following.tasks.space_task import SpaceTask
 from pfsc_drake.physics.driver import torque_rates
 from pfsc_drake.robot.robot_model import gravity_function
 

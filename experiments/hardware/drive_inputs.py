@@ -3,9 +3,9 @@
 import numpy as np
 from pydrake.systems.framework import Context
 
+from diagrams.environment.measured_obstacles import TOLD
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
-from diagrams.surroundings.obstacles import TOLD
 from experiments.hardware.check import FASTEST, LEAST_JUMP, TWICE
 from pfsc_drake.drivers.remote_values import Request
 

@@ -8,11 +8,11 @@ from pydrake.lcm import DrakeLcmInterface
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from diagrams.environment.channel_end import ChannelEnd
+from diagrams.environment.leader import Leading, add_leader
 from diagrams.scenario import Scenario
 from diagrams.scenario_task import make_task
 from diagrams.signal_log import add_log
-from diagrams.surroundings.channel_end import ChannelEnd
-from diagrams.surroundings.leader import Leading, add_leader
 from experiments.finished_run import steady_clock
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile

@@ -8,13 +8,13 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from diagrams.environment.operator import PULL
 from diagrams.live_view import LiveFrame, felt_force
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.surroundings.operator import PULL
 from experiments.live.takes import Pen
 from experiments.simulation import SimulationResult, chunk_ticks, configure
-from pfsc_drake.following.fault_description import FoundFault
+from pfsc_drake.controller.fault_description import FoundFault
 from pfsc_drake.physics.operator_hand import ASKED, HOLD, TARGET
 from pfsc_drake.robot.robot_model import pose_function
 

@@ -7,8 +7,8 @@ from contextlib import suppress
 import numpy as np
 from pydrake.geometry import Meshcat
 
+from diagrams.environment.operator import PULL, REGIONS, REQUEST, idle_controls
 from diagrams.live_view import LiveFrame, LiveView
-from diagrams.surroundings.operator import PULL, REGIONS, REQUEST, idle_controls
 from experiments.live.controls import Slider, TunedParameter
 from experiments.live.page_server import Pages
 from pfsc_drake.control.compliance.tuned_impedance import requests_of

@@ -12,7 +12,7 @@ from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.following.tasks.space_task import SpaceTask
+from pfsc_drake.controller.tasks.space_task import SpaceTask
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import singular_posture, singularity_name
 

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
+from diagrams.environment.operator import Operator, controls_text
 from diagrams.scenario import Streamed
 from diagrams.station import Station
-from diagrams.surroundings.operator import Operator, controls_text
 from diagrams.tasks.arrivals import END, NEW_PATH, WAY_POINT, Event, drawn_text, tell
 from diagrams.tasks.drawn_plane import plane_axes
 from diagrams.tasks.streaming import ScenarioStream
 from experiments.finished_run import FinishedRun, RunOutcome, write_outcome
 from experiments.preparation import PreparedRun
 from experiments.simulation import SimulationResult
-from pfsc_drake.control.streams.course import POSITION
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
+from pfsc_drake.control.streams.stream_course import POSITION
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import dump_typed
 from reporting.folder import check_folder, open_results
@@ -56,7 +56,7 @@ class ControlRecord:
         self._rows.append(controls.copy())
 
     def text(self) -> str:
-        """Return the content of a file, see :mod:`diagrams.surroundings.operator`."""
+        """Return the content of a file, see :mod:`diagrams.environment.operator`."""
         return controls_text(
             self._ticks, self._rows, self._operator.regions, self._operator.panel.period
         )

@@ -3,31 +3,31 @@
 from collections.abc import Iterator, Sequence
 
 from experiments.results import (
-    arrival,
-    coordinates,
-    drives,
-    fastest,
-    forces,
-    found_links,
-    friction,
-    guidance,
+    arrival_feature,
+    coordinates_feature,
+    drives_feature,
+    fastest_feature,
+    forces_feature,
+    found_links_feature,
+    friction_feature,
     guidance_audit,
-    guides,
-    hand_limits,
-    holder,
-    joint_limits,
-    joints,
-    link,
-    mounting,
-    obstacles,
-    orientation,
-    posture,
-    pressing,
-    pushes,
-    rest,
-    shape,
-    streaming,
-    teleoperation,
+    guidance_feature,
+    guides_feature,
+    hand_limits_feature,
+    holder_feature,
+    joint_limits_feature,
+    joints_feature,
+    link_feature,
+    mounting_feature,
+    obstacles_feature,
+    orientation_feature,
+    posture_feature,
+    pressing_feature,
+    pushes_feature,
+    rest_feature,
+    shape_feature,
+    streaming_feature,
+    teleoperation_feature,
 )
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
@@ -35,21 +35,34 @@ from reporting import style
 from reporting.registry import FIGURES
 
 # in the order of their metrics
-FEATURES = [
-    *(coordinates.FEATURE, orientation.FEATURE, drives.FEATURE, forces.FEATURE, arrival.FEATURE),
-    *(pressing.FEATURE, guidance.FEATURE, guides.FEATURE, hand_limits.FEATURE),
-    *(guidance_audit.FEATURE, teleoperation.FEATURE, mounting.FEATURE, holder.FEATURE),
-    *(
-        streaming.FEATURE,
-        obstacles.FEATURE,
-        friction.FEATURE,
-        shape.FEATURE,
-        joints.FEATURE,
-        joint_limits.FEATURE,
-    ),
-    *(rest.FEATURE, found_links.FEATURE, link.FEATURE, fastest.FEATURE, posture.FEATURE),
-    pushes.FEATURE,
+_MODULES = [
+    coordinates_feature,
+    orientation_feature,
+    drives_feature,
+    forces_feature,
+    arrival_feature,
+    pressing_feature,
+    guidance_feature,
+    guides_feature,
+    hand_limits_feature,
+    guidance_audit,
+    teleoperation_feature,
+    mounting_feature,
+    holder_feature,
+    streaming_feature,
+    obstacles_feature,
+    friction_feature,
+    shape_feature,
+    joints_feature,
+    joint_limits_feature,
+    rest_feature,
+    found_links_feature,
+    link_feature,
+    fastest_feature,
+    posture_feature,
+    pushes_feature,
 ]
+FEATURES = [module.FEATURE for module in _MODULES]
 
 
 def render_figures(
@@ -79,10 +92,10 @@ def draw_figures(
     if log.time.size == 0:
         return
     draws = {name: draw for feature in FEATURES for name, draw in feature.figures.items()}
-    draws["path"] = lambda log: shape.draw_path(log, outline)
+    draws["path"] = lambda log: shape_feature.draw_path(log, outline)
     known = set(log.signals)
     if fit is not None:
-        draws["surface_fit"] = lambda log: shape.draw_surface_fit(fit)
+        draws["surface_fit"] = lambda log: shape_feature.draw_surface_fit(fit)
         known.add("fitted_surface")
     for name, figure in FIGURES.items():
         if set(figure.needs) <= known and (drawing := draws[name](log)) is not None:

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from diagrams.scenario import Scenario
 from experiments.results.feature import Feature
-from experiments.results.guidance import slots_of
+from experiments.results.guidance_feature import slots_of
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.following.fixtures import free_motion
+from pfsc_drake.controller.fixtures import free_motion
 from reporting.metrics import Metrics
 
 SLOT_WIDTH = 10  # index, h, n (3), u, beta, phi, stiffness, depth

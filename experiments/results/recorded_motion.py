@@ -14,9 +14,9 @@ from diagrams.drawing.recorded import (
 from diagrams.holder_station import HOLDER
 from diagrams.station import Station
 from experiments.results.feature import Raw
-from experiments.results.guidance import region_times
+from experiments.results.guidance_feature import region_times
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.following.tasks.space_task import SpaceTask
+from pfsc_drake.controller.tasks.space_task import SpaceTask
 
 # of the tool's way over what it presses on, where it would be hidden [m]
 _LIFT = 3e-3

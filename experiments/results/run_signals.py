@@ -4,10 +4,10 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.station import Station
-from experiments.results.coordinates import acts_on_truth
+from experiments.results.coordinates_feature import acts_on_truth
 from experiments.results.feature import Raw
 from experiments.results.features import FEATURES
-from experiments.results.holder import seen_poses, workpiece_motion
+from experiments.results.holder_feature import seen_poses, workpiece_motion
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.robot.robot_model import pose_function
 

@@ -16,7 +16,7 @@ from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import COMPLETED, RunRow
-from pfsc_drake.control.obstacles.parameters import WatchParameters
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.physics.moving_obstacle import ObstacleParameters, Stride
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import open_results

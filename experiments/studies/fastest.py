@@ -20,9 +20,9 @@ from experiments.scenario_file import find_scenario, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import RunRow
-from pfsc_drake.control.planning.course import CourseStart
-from pfsc_drake.following.planning.drive_plan import DrivePlan
-from pfsc_drake.following.planning.fastest_motion import FastestPlanner
+from pfsc_drake.control.planning.joint_course import CourseStart
+from pfsc_drake.controller.planning.drive_plan import DrivePlan
+from pfsc_drake.controller.planning.fastest_motion import FastestPlanner
 from pfsc_drake.geometry import FourierCurve
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import open_results

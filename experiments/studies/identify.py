@@ -19,7 +19,7 @@ from identification.excitation.search import SearchOptions, search
 from identification.findings import Findings
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
-from identification.report.page import PageContent, write_page
+from identification.report.identification_page import PageContent, write_page
 from identification.steps import (
     EXCITATION,
     RECORDING,

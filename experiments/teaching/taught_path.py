@@ -13,8 +13,8 @@ from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.checks import require_between
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.controller.options.controller_parameters import LawGains
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.options.controller import LawGains
 from pfsc_drake.geometry import (
     Path,
     Picking,

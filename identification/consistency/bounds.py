@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from identification.consistency.pseudo_inertia import Layout, linear_terms
-from identification.model.parameters import LINK_PARAMETERS, PER_LINK
+from identification.model.dynamic_parameters import LINK_PARAMETERS, PER_LINK
 from identification.model.subject import Subject
 from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError

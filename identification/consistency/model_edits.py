@@ -19,7 +19,7 @@ from identification.consistency.parameter_files import (
     link_faults,
     links_without_tool,
 )
-from identification.model.parameters import link_parameters, moved, true_parameters
+from identification.model.dynamic_parameters import link_parameters, moved, true_parameters
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.model_text import absolute_names

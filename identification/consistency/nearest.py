@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from identification.consistency.bounds import PhysicalBounds
-from identification.consistency.program import PRIOR_WEIGHT, least_squares
+from identification.consistency.semidefinite_program import PRIOR_WEIGHT, least_squares
 from identification.estimation.least_squares import Estimate
 from identification.model.base import BaseParameters
 from pfsc_drake.checks import require, require_numbers
@@ -93,7 +93,7 @@ def nearest_consistent(
 
     Near is meant in the metric of the covariance: the set is the most likely one among the
     consistent ones, but for the small weight of the prior; see
-    :func:`~identification.consistency.program.least_squares`.
+    :func:`~identification.consistency.semidefinite_program.least_squares`.
 
     Args:
         base: Base of the robot, or other combinations of its parameters.
@@ -217,8 +217,9 @@ def estimate_consistent(
 
     All torques that count enter by the factors of the weighted information matrix: with
     ``X = U F``, ``F = diag(values) V' diag(scale)``, ``|F K_b rho - U' b|^2`` and a constant are
-    the weighted squares, see :func:`~identification.consistency.program.least_squares`. Noise is
-    taken for white; for the metric of a covariance of coloured noise take
+    the weighted squares, see
+    :func:`~identification.consistency.semidefinite_program.least_squares`. Noise
+    is taken for white; for the metric of a covariance of coloured noise take
     :func:`nearest_consistent`. Chi squared is by how much the weighted squares grow as the
     parameters are required to be consistent.
 

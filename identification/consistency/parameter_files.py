@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.consistency.pseudo_inertia import Layout, pseudo_inertia
-from identification.model.parameters import (
+from identification.model.dynamic_parameters import (
     link_moments,
     link_parameters,
     moved,
@@ -13,8 +13,8 @@ from identification.model.parameters import (
 )
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.delta.parameters import DeltaParameters
-from pfsc_drake.robot.models.parameters import (
+from pfsc_drake.robot.delta.delta_parameters import DeltaParameters
+from pfsc_drake.robot.models.robot_parameters import (
     ArmParameters,
     BodyParameters,
     FrictionParameters,

@@ -17,9 +17,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.model.parameters import LINK_PARAMETERS, PER_LINK, from_moments, link_moments
+from identification.model.dynamic_parameters import (
+    LINK_PARAMETERS,
+    PER_LINK,
+    from_moments,
+    link_moments,
+)
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.delta.parameters import NUM_ARMS
+from pfsc_drake.robot.delta.delta_parameters import NUM_ARMS
 
 SIZE = 4
 
@@ -90,7 +95,7 @@ class Layout:
 
     Attributes:
         names: Names of the n parameters, see
-            :func:`~identification.model.parameters.parameter_names`.
+            :func:`~identification.model.dynamic_parameters.parameter_names`.
         links: Ten indices of each link, shape (N, 10); (0, 10) for a DELTA robot.
         rotors: Indices of the rotor inertias, shape (N,); empty for a DELTA robot.
         masses: Indices of the slides' masses and the plate's of a DELTA robot, shape (4,); else

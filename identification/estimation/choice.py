@@ -21,7 +21,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
-from identification.estimation.friction import (
+from identification.estimation.friction_terms import (
     KINDS,
     KINDS_WITH_WIDTH,
     FrictionTerm,

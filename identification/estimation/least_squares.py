@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
-from identification.estimation.friction import FrictionTerms
+from identification.estimation.friction_terms import FrictionTerms
 from identification.estimation.identifiability import (
     Factors,
     WeakParameter,

@@ -30,7 +30,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from identification.estimation.friction import FrictionTerm, FrictionTerms
+from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
 from identification.estimation.identifiability import factorize
 from identification.estimation.information import Information
 from identification.estimation.least_squares import Estimate

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.excitation.excitation_program import ExcitationProblem, ExcitationProgram
 from identification.excitation.fourier import fourier_basis
-from identification.excitation.program import ExcitationProblem, ExcitationProgram
 
 # instants per period of the highest harmonic: at first, and where excesses are looked for
 _COARSE_JOINTS, _COARSE_POSTURES, _FINE = 10, 12, 100

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from identification.excitation.criterion import InformationFigures, information
-from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.limits import Given, JointLimits, chosen_limits
-from identification.excitation.local_search import LocalOptimum, LocalSearch
-from identification.excitation.program import (
+from identification.excitation.excitation_program import (
     ExcitationProblem,
     believed_parameters,
     excitation_problem,
     tightened,
 )
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.limits import Given, JointLimits, chosen_limits
+from identification.excitation.local_search import LocalOptimum, LocalSearch
 from identification.excitation.scene import Cell, RobotScene, cell_of
 from identification.excitation.verification import (
     Verification,

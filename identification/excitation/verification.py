@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.excitation.balls import ends, points_of_last_link
-from identification.excitation.clearance import delta_posture_limits, height_of
+from identification.excitation.excitation_program import ExcitationProblem
 from identification.excitation.fourier import FourierTrajectory, fourier_basis
 from identification.excitation.limits import JointLimits, used_shares
 from identification.excitation.local_search import random_start
-from identification.excitation.program import ExcitationProblem
+from identification.excitation.posture_clearance import delta_posture_limits, height_of
 from identification.excitation.scene import Cell, RobotScene
 from identification.excitation.swept_clearance import SweptClearance, swept_clearance
 from identification.model.base import BaseParameters

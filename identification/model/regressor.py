@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from identification.model.parameters import parameter_names, parameter_units
+from identification.model.dynamic_parameters import parameter_names, parameter_units
 from identification.model.subject import Subject
 from pfsc_drake import jets
 from pfsc_drake.compiled.bound_function import BoundFunction
@@ -27,8 +27,8 @@ class Regressor:
     """The regression matrix of a robot with N joints and n parameters.
 
     ``tau_d = Y(q, v, a) rho`` (2.73) with the parameters of
-    :mod:`~identification.model.parameters` and the drive torques ``tau_d`` of (2.42), (2.62) with
-    stiff joints, no external forces::
+    :mod:`~identification.model.dynamic_parameters` and the drive torques ``tau_d`` of (2.42),
+    (2.62) with stiff joints, no external forces::
 
         D(q) a + C(q, v) v + g(q) + f_c sign(v) + f_v v = tau_d
 

@@ -18,7 +18,7 @@ from diagrams.robots.model import is_delta, load_delta_robot, locate_model, read
 from diagrams.scenario import RobotParameters as RobotBlock
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.models.parameters import ArmParameters, BodyParameters, load_parameters
+from pfsc_drake.robot.models.robot_parameters import ArmParameters, BodyParameters, load_parameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

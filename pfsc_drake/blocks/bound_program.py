@@ -5,7 +5,7 @@ import functools
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.stage import Stage
 from pfsc_drake.compiled.bound_function import BoundFunction
 

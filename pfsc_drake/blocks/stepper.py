@@ -6,7 +6,7 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.network import Network
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
 

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.network import Network
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.codegen.manifest import MANIFEST, refuse_foreign, write_own
 from pfsc_drake.compiled.c_source import c_source, parameters
 from pfsc_drake.compiled.operations import Untranslatable

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.assembly import Assembly
 from pfsc_drake.compiled.code import Code, LiteralTable, Tables, Value, Values, elements
+from pfsc_drake.compiled.llvm_assembly import Assembly
 from pfsc_drake.compiled.matrix_instructions import look_up, projected, translate_instruction
 from pfsc_drake.compiled.operations import Untranslatable, literal
 

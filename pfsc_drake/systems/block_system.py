@@ -19,7 +19,7 @@ from pydrake.systems.framework import (
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.bound_program import BoundProgram, stages_of
 from pfsc_drake.blocks.network import TICK, Network, Source
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.stage import Needs, Stage
 
 _ROUNDING = 1e-6  # of a period, by which a time may miss a tick

@@ -23,13 +23,13 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.builder import build_station
 from diagrams.robots.arm import add_arm
-from diagrams.robots.friction import add_friction
+from diagrams.robots.plant_friction import add_friction
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.station_options import belief_source, friction_options
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from experiments.simulation import configure
-from pfsc_drake.systems.plants.external_forces import LinkPushes
+from pfsc_drake.systems.plants.applied_wrenches import LinkPushes
 from pfsc_drake.systems.plants.reactions import JointReaction
 from tests.scenarios import shipped_scenario
 

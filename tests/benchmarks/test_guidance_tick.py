@@ -18,10 +18,10 @@ from experiments.integration import choose_integration
 from experiments.scenario_file import find_scenario
 from experiments.simulation import configure
 from pfsc_drake.control.fixtures.fixture_guidance import LedTool
+from pfsc_drake.control.fixtures.fixture_parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
-from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
 from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.geometry.shapes.sphere import SphereRegion
 from pfsc_drake.yaml.typed import load_file

@@ -6,7 +6,7 @@ import pytest
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.network import Network, Wiring
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
 

@@ -6,7 +6,7 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.blocks.network import Network, Source, Wiring
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.slope import NetworkSlope
 
 

@@ -1,4 +1,4 @@
-"""Robots, tasks and surroundings that no shipped scenario combines."""
+"""Robots, tasks and environments that no shipped scenario combines."""
 
 from pathlib import Path
 

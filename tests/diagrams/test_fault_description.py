@@ -20,7 +20,7 @@ from diagrams.scenario import (
 from diagrams.scenario_task import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.following.fault_description import FaultInstant, FaultScene, describe
+from pfsc_drake.controller.fault_description import FaultInstant, FaultScene, describe
 from pfsc_drake.geometry import matrix_to_zyx, zyx_to_matrix
 from pfsc_drake.geometry.rotation import matrix_to_zyz, zyz_to_matrix
 

@@ -9,7 +9,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.schema import driven
 from diagrams.scenario.turntable import TurntableAxisParameters, TurntableParameters
 from diagrams.turntable_station import turntable_command
-from experiments.results.holder import holder_metrics
+from experiments.results.holder_feature import holder_metrics
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError
 from tests.diagrams.station_run import run_station

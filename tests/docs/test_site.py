@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.making.links import broken_links
+from docs.making.site_links import broken_links
 from tests.docs.documents import PAGES, ROOT
 
 

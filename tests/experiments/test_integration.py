@@ -13,7 +13,7 @@ from experiments.integration import choose_integration
 from experiments.results.run_signals import collect_log
 from experiments.scenario_file import read_scenario
 from experiments.simulation import simulate
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.yaml.typed import load_typed

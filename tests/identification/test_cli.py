@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.cli import main
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.subject import load_subject
 from pfsc_drake.robot.models.files import models_directory
 from tests.one_process import short_experiments

@@ -11,7 +11,7 @@ from identification.findings import find_consistent, find_parameters
 from identification.measurement.periods import average
 from identification.measurement.record import Record
 from identification.model.base import base_parameters
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError

@@ -7,7 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, EventStatus, LeafSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
 from pfsc_drake.blocks.network import Network
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.velocity_servo import BusDelay
 from pfsc_drake.systems.block_system import BlockSystem

@@ -16,7 +16,7 @@ from pfsc_drake.physics.operator_hand import LiveHand, LiveHandParameters, Opera
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.plants.external_forces import ExternalWrench
+from pfsc_drake.systems.plants.applied_wrenches import ExternalWrench
 
 PERIOD = 1e-3
 UPRIGHT = np.eye(3).ravel()

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from pfsc_drake.physics.suction import SuctionGripper, SuctionParameters
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.plants.external_forces import AppliedForces
+from pfsc_drake.systems.plants.applied_wrenches import AppliedForces
 
 MASS, SIZE, PERIOD = 0.8, (0.24, 0.16, 0.01), 1e-3
 DOWN = RotationMatrix.MakeXRotation(np.pi)

@@ -9,10 +9,10 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ZeroOrderHold
 
 from pfsc_drake.control.fixtures.fixture_guidance import LedTool
+from pfsc_drake.control.fixtures.fixture_parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
 from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
-from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
 from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.robot.robot_model import tool_motion_function
 from pfsc_drake.systems.block_system import BlockSystem

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.linearization import RestSlope
+from diagrams.period_map import RestSlope
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.station_options import belief_source

@@ -12,8 +12,8 @@ from pydrake.systems.framework import Context, Diagram, LeafSystem
 
 from diagrams.builder import build_station
 from diagrams.integration import continuous_modes
-from diagrams.linearization import PeriodDerivative, RestSlope
 from diagrams.one_period_map import OnePeriodMap
+from diagrams.period_map import PeriodDerivative, RestSlope
 from diagrams.robots.arm import Arm
 from diagrams.robots.arm_model import believe_arm
 from diagrams.scenario import Scenario

@@ -14,7 +14,7 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceStatus,
 )
 from pfsc_drake.control.compliance.path_ends import PathEnds
-from pfsc_drake.control.fixtures.program import SLOTS, program_function
+from pfsc_drake.control.fixtures.contact_program import SLOTS, program_function
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits, limit_kinds, tightest_function
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import Manifold, indices, manifold_force_function

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
 from pfsc_drake.blocks.network import Network, Wiring
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.wiring_blocks import Sum
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.estimation.link_deviation import LinkErrors, StateUncertainty

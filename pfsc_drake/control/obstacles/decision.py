@@ -6,8 +6,8 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.cases import all_of, where
-from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 
 # of the planned pace, below which nobody asks for less than a pause
 SLOWEST = 0.05

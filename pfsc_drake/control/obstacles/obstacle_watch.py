@@ -16,10 +16,10 @@ from pfsc_drake.control.obstacles.clearance import (
     nearness_function,
 )
 from pfsc_drake.control.obstacles.decision import SLOWEST, decision_function
-from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.reach import Reach
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import ArmOutline, outline_points

@@ -6,10 +6,10 @@ import casadi as ca
 
 from pfsc_drake.blocks.block import Values
 from pfsc_drake.blocks.cases import all_finite, where
-from pfsc_drake.control.streams.course import POSE, POSITION, Course, picked
 from pfsc_drake.control.streams.growth import Fields, Growth
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
-from pfsc_drake.control.streams.parameters import StreamParameters
+from pfsc_drake.control.streams.stream_course import POSE, POSITION, Course, picked
+from pfsc_drake.control.streams.stream_parameters import StreamParameters
 
 # what a piece is at: none begun; way points make it longer; it gets its end; it has its end
 RESTING, GROWING, ENDING, ENDED = range(4)

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.control.streams.course import POSE, POSITION, Course, picked
-from pfsc_drake.control.streams.parameters import StreamParameters
+from pfsc_drake.control.streams.stream_course import POSE, POSITION, Course, picked
+from pfsc_drake.control.streams.stream_parameters import StreamParameters
 
 # of the spacing of way points, by which every step of control points goes forward
 _FORWARD = 0.1

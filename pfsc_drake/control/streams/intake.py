@@ -18,10 +18,10 @@ from pfsc_drake.control.streams.acceptance import (
     Counts,
     Offer,
 )
-from pfsc_drake.control.streams.course import POSE, Course, picked
 from pfsc_drake.control.streams.growth import Growth, chosen, no_direction
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointLayout
-from pfsc_drake.control.streams.parameters import StreamParameters
+from pfsc_drake.control.streams.stream_course import POSE, Course, picked
+from pfsc_drake.control.streams.stream_parameters import StreamParameters
 from pfsc_drake.errors import require
 from pfsc_drake.geometry.manifold_point import PathPointLayout
 

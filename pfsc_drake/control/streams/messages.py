@@ -5,7 +5,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pfsc_drake.control.streams.course import POSE, POSITION
+from pfsc_drake.control.streams.stream_course import POSE, POSITION
 from pfsc_drake.errors import InputError, require
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, is_finite, where
-from pfsc_drake.control.streams.course import POSE, Course, picked
+from pfsc_drake.control.streams.stream_course import POSE, Course, picked
 from pfsc_drake.geometry import ProjectionStatus
 from pfsc_drake.geometry.foot import GOES_ON, MINIMUM, step_function
 from pfsc_drake.geometry.manifold_point import PathPointLayout, alpha_function

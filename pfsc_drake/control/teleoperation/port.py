@@ -10,8 +10,8 @@ import scipy.linalg
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.control.teleoperation.coordinates import LINEAR, TURNING, MovedBody, MovedPoint
+from pfsc_drake.control.teleoperation.coupling_parameters import CouplingParameters, PortLimits
 from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE, UNITS
-from pfsc_drake.control.teleoperation.parameters import CouplingParameters, PortLimits
 
 SIDES = ("leader", "follower")
 # s: within which a wave that could not be paid is sent later, and for which a tank lasts for that

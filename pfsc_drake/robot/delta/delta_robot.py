@@ -10,8 +10,8 @@ import numpy as np
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
+from pfsc_drake.robot.delta.delta_parameters import NUM_ARMS, DeltaParameters
 from pfsc_drake.robot.delta.kinematics import RodMotion, joint_coordinates, rod_motion
-from pfsc_drake.robot.delta.parameters import NUM_ARMS, DeltaParameters
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
 

@@ -13,7 +13,7 @@ import numpy as np
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.delta.parameters import NUM_ARMS, DeltaGeometry, DeltaParameters
+from pfsc_drake.robot.delta.delta_parameters import NUM_ARMS, DeltaGeometry, DeltaParameters
 
 
 def direct_kinematics(geometry: DeltaGeometry, q: Sequence[ca.SX]) -> ca.SX:

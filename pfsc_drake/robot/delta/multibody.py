@@ -16,8 +16,8 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.delta.delta_parameters import DeltaParameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.delta.parameters import DeltaParameters
 from pfsc_drake.robot.delta.shapes import BASE, PLATE, robot_parts, slide_origins
 
 # radius of the ball whose inertia stands for each body's; nothing turns, so that it has no effect

@@ -11,8 +11,8 @@ import numpy as np
 from pydrake.geometry import Box, Capsule, Cylinder, Rgba, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
+from pfsc_drake.robot.delta.delta_parameters import NUM_ARMS, DeltaGeometry, DeltaParameters
 from pfsc_drake.robot.delta.kinematics import rod_vectors
-from pfsc_drake.robot.delta.parameters import NUM_ARMS, DeltaGeometry, DeltaParameters
 
 BASE, PLATE = "base", "end_effector"
 

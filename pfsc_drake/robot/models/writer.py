@@ -24,7 +24,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.robot.models.parameters import (
+from pfsc_drake.robot.models.robot_parameters import (
     ArmParameters,
     BodyParameters,
     VariantParameters,

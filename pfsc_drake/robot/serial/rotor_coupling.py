@@ -22,7 +22,7 @@ import numpy as np
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.models.parameters import ArmParameters
+from pfsc_drake.robot.models.robot_parameters import ArmParameters
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.newton_euler import inverse_dynamics, link_motions, mass_matrix
 

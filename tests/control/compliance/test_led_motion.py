@@ -14,7 +14,7 @@ from pfsc_drake.control.compliance.impedance_parameters import (
     ImpedanceParameters,
     Profile,
 )
-from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
+from pfsc_drake.control.fixtures.fixture_parameters import RobotLimitParameters
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits, limit_kinds
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold

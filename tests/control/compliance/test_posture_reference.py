@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.network import Network
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.posture_impedance import (
     NullSpaceImpedance,

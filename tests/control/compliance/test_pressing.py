@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.blocks.network import Network
-from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter

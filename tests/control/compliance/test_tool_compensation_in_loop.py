@@ -22,7 +22,7 @@ from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
-from pfsc_drake.systems.plants.external_forces import ExternalWrench
+from pfsc_drake.systems.plants.applied_wrenches import ExternalWrench
 from pfsc_drake.systems.plants.reactions import JointReaction, reaction_index, tool_load_from_plant
 
 PERIOD = 1e-3

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import quad
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.estimation.friction import FrictionKalmanFilter, FrictionNoise
+from pfsc_drake.control.estimation.friction_filter import FrictionKalmanFilter, FrictionNoise
 from pfsc_drake.control.estimation.momentum import MomentumModel, drive_momentum
 from pfsc_drake.errors import InputError
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.estimation.friction import FrictionModel
+from pfsc_drake.control.estimation.friction_filter import FrictionModel
 from pfsc_drake.errors import InputError
 
 F_C, F_V = np.array([12.0, 0.0, 5.0]), np.array([6.0, 9.0, 0.0])

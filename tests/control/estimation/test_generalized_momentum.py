@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from pfsc_drake.control.estimation.momentum import drive_momentum, link_momentum
+from pfsc_drake.robot.delta.delta_parameters import load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.delta.parameters import load_delta_parameters
 
 DRIVE = np.array([120.0, -300.0, 80.0])
 FRICTION, TAU_EXT = np.array([30.0, -50.0, 12.0]), np.array([-25.0, 40.0, 15.0])

@@ -9,7 +9,7 @@ from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
-from pfsc_drake.following.law_warnings import _transversal_gains
+from pfsc_drake.controller.law_warnings import _transversal_gains
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
 from tests.control.manifolds.surfaces import SITUATIONS, frame, surface

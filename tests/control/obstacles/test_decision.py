@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pfsc_drake.control.obstacles.decision import decision_function
-from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 
 STEP, BEHIND, COUNT = 0.1, 4, 12
 PACE = WaitingPace(2, 20.0, 0.05)

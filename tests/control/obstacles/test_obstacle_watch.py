@@ -10,9 +10,9 @@ from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.waiting_reference import WaitingReference
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
-from pfsc_drake.control.obstacles.parameters import WatchParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink

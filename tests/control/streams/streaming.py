@@ -9,10 +9,10 @@ from pydrake.systems.framework import DiagramBuilder
 from pfsc_drake.blocks.block import Block, Port
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.pace import PacedReference
-from pfsc_drake.control.streams.course import Course
 from pfsc_drake.control.streams.intake import WaypointIntake
 from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender
 from pfsc_drake.control.streams.projector import StreamedProjector
+from pfsc_drake.control.streams.stream_course import Course
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse
 

@@ -6,7 +6,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import BSpline
 
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
-from pfsc_drake.control.streams.parameters import StreamParameters
+from pfsc_drake.control.streams.stream_parameters import StreamParameters
 from pfsc_drake.errors import InputError
 from tests.control.streams.streaming import PERIOD, make_stream, sent_at
 

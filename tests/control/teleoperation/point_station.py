@@ -13,14 +13,14 @@ from pfsc_drake.blocks.network import Network, Wiring
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.blocks.wiring_blocks import Constant, Linear, Sum
 from pfsc_drake.control.fixtures.fixture_guidance import LedTool
+from pfsc_drake.control.fixtures.fixture_parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
-from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
+from pfsc_drake.control.teleoperation.coupling_parameters import CouplingParameters, PortLimits
+from pfsc_drake.control.teleoperation.led_point import FixtureReaction
 from pfsc_drake.control.teleoperation.message import MESSAGE
-from pfsc_drake.control.teleoperation.parameters import CouplingParameters, PortLimits
 from pfsc_drake.control.teleoperation.port import RECORD, TeleoperationPort
-from pfsc_drake.control.teleoperation.reaction import FixtureReaction
 from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.physics.channel import ChannelParameters, message_ages
 from pfsc_drake.physics.leader_clutch import Clutch

@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
-from pfsc_drake.control.teleoperation.parameters import (
+from pfsc_drake.control.teleoperation.coupling_parameters import (
     CouplingParameters,
     PortLimits,
     PortTankParameters,
     RotationParameters,
 )
+from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
 from pfsc_drake.control.teleoperation.port import RECORD, TURNING_RECORD, TeleoperationPort
 from pfsc_drake.errors import InputError
 

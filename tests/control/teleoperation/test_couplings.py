@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.teleoperation.parameters import CouplingParameters
+from pfsc_drake.control.teleoperation.coupling_parameters import CouplingParameters
 from pfsc_drake.physics.channel import ChannelParameters, message_ages
 from tests.control.teleoperation import point_station
 from tests.control.teleoperation.point_station import PERIOD, PointStation, PointTeleoperation, of

@@ -7,12 +7,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
-from pfsc_drake.control.teleoperation.parameters import (
+from pfsc_drake.control.teleoperation.coupling_parameters import (
     CouplingParameters,
     PortLimits,
     PortTankParameters,
 )
+from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
 from pfsc_drake.control.teleoperation.port import RECORD, TeleoperationPort
 from pfsc_drake.errors import InputError
 

@@ -12,8 +12,8 @@ from diagrams.drawing.mounting_look import (
     mounting_look,
     ring_surface,
 )
+from diagrams.environment.mounting import Mounting
 from diagrams.scenario.plate import PlateParameters
-from diagrams.surroundings.mounting import Mounting
 from pfsc_drake.geometry.workpiece_bodies import bore_wedges
 
 X_WM, X_WF = RigidTransform([0.7, -0.4, 0.5]), RigidTransform([0.8, 0.3, 0.6])

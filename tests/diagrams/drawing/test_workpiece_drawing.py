@@ -7,9 +7,9 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station, build_station_replay, draw_station
 from diagrams.drawing.recorded import RecordedMotion
+from diagrams.environment.workpieces import NotchedWorkpiece, notch_surface
 from diagrams.scenario import Keyframe, Line
 from diagrams.scenario.workpiece import BallParameters, NotchParameters
-from diagrams.surroundings.workpieces import NotchedWorkpiece, notch_surface
 from experiments.scenario_file import SCENARIO_DIRECTORY
 
 PERIOD = 0.04

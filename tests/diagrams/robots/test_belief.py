@@ -174,7 +174,7 @@ def test_what_controls_is_made_of_the_belief(load_scenario, tmp_path, name, law)
 
 def _heavier(model, folder):
     """Write a model like a shipped one with heavier links, and return its file."""
-    from pfsc_drake.robot.models.parameters import load_parameters
+    from pfsc_drake.robot.models.robot_parameters import load_parameters
     from pfsc_drake.robot.models.writer import write_sdf
 
     robot = load_parameters("comau_racer_1_4")

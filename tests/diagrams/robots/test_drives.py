@@ -11,7 +11,7 @@ from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory, resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.robot_model import gravity_function
 
 KNOWN = load_parameters("comau_racer_1_4").friction

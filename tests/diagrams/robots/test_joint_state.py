@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from experiments.results.found_links import found_links_metrics
+from experiments.results.found_links_feature import found_links_metrics
 from experiments.results.run_signals import collect_log
 from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate

@@ -7,8 +7,8 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, ContactModel
 from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
+from diagrams.environment.workpieces import add_rigid_surface, add_soft_ball
 from diagrams.scenario.workpiece import SoftBall
-from diagrams.surroundings.workpieces import add_rigid_surface, add_soft_ball
 
 
 def contact_force(ball):

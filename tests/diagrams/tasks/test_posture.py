@@ -11,8 +11,8 @@ from diagrams.scenario import ControllerParameters, GainParameters, LawGains, Po
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.posture import range_weight
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.controller.law import make_law
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.law import make_law
 from pfsc_drake.jets import Jet
 from pfsc_drake.yaml.fields import OneForAll
 from tests.control.conftest import BENT_7

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from diagrams.scenario.region_motion import Shift, Swinging
 from diagrams.scenario.virtual_fixtures import RegionParameters
 from diagrams.scenario_task import make_task
+from pfsc_drake.controller.fixtures import near_expression, scheduled_regions
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.fixtures import near_expression, scheduled_regions
 from pfsc_drake.geometry.shapes.plane import Plane
 from tests.scenarios import shipped_scenario
 

@@ -9,9 +9,9 @@ from diagrams.scenario_task import make_task
 from diagrams.tasks.drawn_plane import border, plane_axes
 from diagrams.tasks.streaming import ScenarioStream
 from experiments.scenario_file import SCENARIO_DIRECTORY
-from pfsc_drake.control.streams.parameters import StreamParameters
+from pfsc_drake.control.streams.stream_parameters import StreamParameters
+from pfsc_drake.controller.tasks.streamed_path import StreamedPath
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.tasks.streamed_path import StreamedPath
 from tests.scenarios import shipped_scenario
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.results.teleoperation import teleoperation_metrics
+from experiments.results.teleoperation_feature import teleoperation_metrics
 from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
 from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
 from tests.experiments.hardware.test_drive import Loop

@@ -13,11 +13,11 @@ from experiments.hardware.simulated_robot import SimulatedRobot, Transport
 from experiments.hardware.slow_motion import JointTour, move_slowly
 from experiments.hardware.statics import check_statics
 from experiments.scenario_file import find_scenario
+from pfsc_drake.controller.options.friction_parameters import JointFrictionParameters
 from pfsc_drake.drivers.driver_rules import DriverOptions
 from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus, dialect
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.robot.robot_model import gravity_function, mass_function
 from tests.experiments.hardware.test_drive import panda
 

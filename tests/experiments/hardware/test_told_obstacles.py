@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario.obstacles import CrossingParameters
-from pfsc_drake.control.obstacles.parameters import WatchParameters
+from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.drivers.remote_values import Request, decode_values, encode_values
 from tests.experiments.hardware.test_drive import Loop, panda
 

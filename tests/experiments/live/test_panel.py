@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from diagrams.surroundings.operator import columns
+from diagrams.environment.operator import columns
 from experiments.live.controls import Slider, TunedParameter
 from experiments.live.page_server import Pages
 from experiments.live.panel import Command, Panel, Scene

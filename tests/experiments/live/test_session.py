@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from diagrams.surroundings.operator import read_controls
+from diagrams.environment.operator import read_controls
 from experiments.cli import main
 from experiments.live.live_simulation import RealTimePace
 from experiments.live.page_server import Pages

@@ -7,13 +7,13 @@ import numpy as np
 
 from diagrams.station import Station
 from experiments.live.status import LiveStatus
+from pfsc_drake.control.fixtures.contact_program import SLOTS
 from pfsc_drake.control.fixtures.guides import GuideRecord
-from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.following.tasks.space_task import SpaceTask
+from pfsc_drake.controller.tasks.space_task import SpaceTask
 from tests.control.conftest import Robot
 
 COORDINATES = PathManifold(2, oriented=False).coordinates

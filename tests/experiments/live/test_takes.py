@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagrams.surroundings.operator import idle_controls
+from diagrams.environment.operator import idle_controls
 from experiments.live.live_simulation import _ticks_per_step
 from experiments.live.takes import ControlRecord, TakeFolders
 from experiments.simulation import chunk_ticks

@@ -11,12 +11,12 @@ from diagrams.scenario.robot import ServoParameters
 from diagrams.scenario.virtual_fixtures import FixtureParameters
 from experiments.results.guidance_audit import GuidanceRules, audit, guidance_warnings, observed_lag
 from experiments.results.run_log import RunLog
+from pfsc_drake.control.fixtures.contact_program import MOST_NEAR, SLOTS
+from pfsc_drake.control.fixtures.fixture_parameters import GuidanceParameters
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.near_regions import ScheduledRegions
-from pfsc_drake.control.fixtures.parameters import GuidanceParameters
-from pfsc_drake.control.fixtures.program import MOST_NEAR, SLOTS
 from pfsc_drake.control.fixtures.record import SLOT
-from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.controller.options.controller_parameters import ControllerParameters
 from pfsc_drake.geometry.shapes.sphere import SphereRegion
 from reporting.registry import METRICS
 from tests.control.fixtures.point_robot import (

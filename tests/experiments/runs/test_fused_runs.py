@@ -18,7 +18,7 @@ from tests.scenarios import shipped_scenario
 pytestmark = pytest.mark.slow
 
 DURATION = 0.1
-# a law, a robot, a manifold, a task, surroundings or sensors that none before has
+# a law, a robot, a manifold, a task, an environment or sensors that none before has
 COMPILED = {
     *("pfc_elastic_6r", "pfc_viscoelastic_3r", "pfc_panda_7r", "pfc_scara_4r", "pfc_delta_notch"),
     *("pfc_on_surface_6r", "pfc_tool_axis_6r", "pfc_stream_6r", "pfc_crossing_6r", "pfc_two_arms"),

@@ -5,7 +5,7 @@ import pytest
 
 from identification.consistency.bounds import load_bounds
 from identification.consistency.nearest import Prediction, nearest_consistent
-from identification.consistency.program import PRIOR_WEIGHT
+from identification.consistency.semidefinite_program import PRIOR_WEIGHT
 from identification.excitation.fourier import FourierTrajectory
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject

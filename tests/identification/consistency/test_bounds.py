@@ -5,9 +5,9 @@ import pytest
 
 from identification.consistency.bounds import bounds_from_geometry, link_intervals, load_bounds
 from identification.consistency.parameter_files import inconsistencies
-from identification.consistency.program import check_prior, prior_from_bounds
 from identification.consistency.pseudo_inertia import spread
-from identification.model.parameters import parameter_names, true_parameters
+from identification.consistency.semidefinite_program import check_prior, prior_from_bounds
+from identification.model.dynamic_parameters import parameter_names, true_parameters
 from pfsc_drake.errors import InputError
 
 

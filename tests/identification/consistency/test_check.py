@@ -7,7 +7,7 @@ from identification.consistency.parameter_files import (
     inconsistencies,
     require_consistent,
 )
-from identification.model.parameters import parameter_names, true_parameters
+from identification.model.dynamic_parameters import parameter_names, true_parameters
 from pfsc_drake.errors import InputError
 
 

@@ -9,11 +9,11 @@ from scipy.optimize import minimize_scalar
 from identification.consistency.bounds import bounds_from_geometry, load_bounds
 from identification.consistency.nearest import estimate_consistent, nearest_consistent
 from identification.consistency.parameter_files import inconsistencies
-from identification.estimation.friction import FrictionTerm, FrictionTerms
+from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.excitation.fourier import FourierTrajectory
 from identification.model.base import base_parameters
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 

@@ -8,7 +8,7 @@ import pytest
 from diagrams.robots.model import read_robot
 from identification.consistency.writing import write_model
 from identification.model.base import random_motion
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError

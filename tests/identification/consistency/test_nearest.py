@@ -8,7 +8,7 @@ import pytest
 from identification.consistency.nearest import Prediction, nearest_consistent, refuse_far
 from identification.consistency.pseudo_inertia import pseudo_inertia, spread
 from identification.excitation.fourier import FourierTrajectory
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
 from tests.identification.model.closed_form_base import load_printed_identification

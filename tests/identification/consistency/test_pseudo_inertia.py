@@ -10,7 +10,7 @@ from identification.consistency.pseudo_inertia import (
     pseudo_inertia,
     spread,
 )
-from identification.model.parameters import link_parameters
+from identification.model.dynamic_parameters import link_parameters
 
 
 def cloud(seed, points=12):

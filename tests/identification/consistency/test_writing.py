@@ -12,11 +12,11 @@ from diagrams.scenario import RobotParameters, Scenario
 from experiments.scenario_file import find_scenario
 from identification.consistency.writing import write_model
 from identification.model.base import random_motion
-from identification.model.parameters import parameter_names, true_parameters
+from identification.model.dynamic_parameters import parameter_names, true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.yaml.typed import load_file
 
 ROBOTS = ["comau", "panda"]

@@ -10,7 +10,7 @@ from identification.excitation.fourier import FourierTrajectory, shipped_excitat
 from identification.measurement.periods import average
 from identification.measurement.record import Record
 from identification.model.base import base_parameters
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from tests.identification.model.closed_form_base import load_printed_identification

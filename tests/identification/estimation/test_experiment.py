@@ -12,7 +12,7 @@ from identification.excitation.fourier import FourierTrajectory
 from identification.measurement.experiment import run_experiment
 from identification.measurement.periods import average
 from identification.model.base import base_parameters
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.estimation.friction import FrictionTerm, FrictionTerms
+from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.repetitions import Repetitions
 from pfsc_drake.errors import InputError

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from identification.estimation.friction import FrictionTerm, FrictionTerms
+from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.results import load_estimate, save_estimate

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from identification.estimation.friction import FrictionTerm, FrictionTerms
+from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.validation import compare_with_truth, predict, refuse_implausible
 from pfsc_drake.errors import InputError

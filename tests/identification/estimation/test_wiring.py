@@ -9,7 +9,7 @@ import pytest
 from identification.estimation.wiring import find_mistake, unchecked
 from identification.excitation.fourier import FourierTrajectory
 from identification.model.base import base_parameters
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 

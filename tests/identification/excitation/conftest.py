@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from identification.excitation.excitation_program import believed_parameters, excitation_problem
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import chosen_limits
-from identification.excitation.program import believed_parameters, excitation_problem
 from identification.excitation.scene import RobotScene, cell_of, load_cell
 from identification.excitation.verification import verify
 from identification.model.base import base_parameters

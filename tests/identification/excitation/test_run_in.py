@@ -6,7 +6,7 @@ import pytest
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import chosen_limits
 from identification.excitation.run_in import rest_to_rest
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from pfsc_drake.errors import InputError
 
 

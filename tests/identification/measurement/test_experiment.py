@@ -15,7 +15,7 @@ from identification.measurement.imperfections import Imperfections, shipped_impe
 from identification.measurement.periods import average, friction_trend
 from identification.measurement.servo import Servo
 from identification.measurement.synchronization import check_torque_lag, torque_lag
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError

@@ -10,7 +10,7 @@ from identification.measurement.servo import (
     friction_torques,
     rigid_torques,
 )
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError

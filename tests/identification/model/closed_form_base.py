@@ -25,7 +25,7 @@ import numpy as np
 
 from identification.consistency.bounds import shipped_or_own
 from identification.model.base import BaseParameters
-from identification.model.parameters import (
+from identification.model.dynamic_parameters import (
     LINK_PARAMETERS,
     PER_LINK,
     moved,

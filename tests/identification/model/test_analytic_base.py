@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.model.base import base_parameters
-from identification.model.parameters import link_parameters, moved
+from identification.model.dynamic_parameters import link_parameters, moved
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError

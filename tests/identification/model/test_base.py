@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.model.base import base_parameters, combination, random_motion
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 
 

@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from identification.model.parameters import parameter_names, true_parameters
+from identification.model.dynamic_parameters import parameter_names, true_parameters
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from tests.identification.model.closed_form_base import analytic_base, load_printed_identification
 
 # Tab. B.2 with the errata (rows 1, 2, 12, 18, 22); `m4+` stands for m_4 + m_5 + m_6

@@ -8,7 +8,7 @@ from pydrake.math import RollPitchYaw
 
 from identification.consistency.model_edits import urdf_text
 from identification.model.base import base_parameters
-from identification.model.parameters import true_parameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject, round_rotation
 

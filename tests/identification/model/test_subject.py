@@ -6,7 +6,7 @@ import pytest
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 
 COMAU = "comau_racer_1_4"
 

@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 
 from identification.estimation.repetitions import ParameterRow, TorqueRow
-from identification.report.page import parameter_table, torque_table
+from identification.report.identification_page import parameter_table, torque_table
 from reporting.page import Table
 from reporting.terminal import print_table
 

@@ -8,8 +8,8 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
+from pfsc_drake.robot.delta.delta_parameters import load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot, believed_delta
-from pfsc_drake.robot.delta.parameters import load_delta_parameters
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import pose_function
 

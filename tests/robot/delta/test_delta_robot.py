@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pfsc_drake.jets import Jet
+from pfsc_drake.robot.delta.delta_parameters import load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.delta.parameters import load_delta_parameters
 from pfsc_drake.robot.robot_model import gravity_function, gravity_torque
 
 ROBOT = DeltaRobot(load_delta_parameters())

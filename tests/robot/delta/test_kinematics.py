@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
+from pfsc_drake.robot.delta.delta_parameters import load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.kinematics import rod_independence
-from pfsc_drake.robot.delta.parameters import load_delta_parameters
 
 ROBOT = DeltaRobot(load_delta_parameters())
 GEOMETRY = ROBOT.parameters.geometry

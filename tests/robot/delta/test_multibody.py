@@ -14,13 +14,13 @@ from pydrake.systems.primitives import TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.delta.delta_parameters import load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.multibody import (
     add_delta_plant,
     set_delta_positions,
     slide_state_rows,
 )
-from pfsc_drake.robot.delta.parameters import load_delta_parameters
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
 PARAMETERS = load_delta_parameters()

@@ -9,8 +9,8 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 

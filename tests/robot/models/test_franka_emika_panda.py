@@ -14,7 +14,7 @@ from pydrake.multibody.tree import (
 )
 
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 

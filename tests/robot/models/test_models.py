@@ -13,7 +13,7 @@ from pydrake.multibody.tree import (
 )
 
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 
 COMAU = load_parameters("comau_racer_1_4")
 ROBOTS = {

@@ -12,7 +12,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.robot.models import writer
 from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
+from pfsc_drake.robot.models.robot_parameters import VariantParameters, load_parameters
 from pfsc_drake.robot.models.visuals import Appearance
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.yaml.typed import load_file

@@ -12,7 +12,7 @@ from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, SpatialInert
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.rigid_rotors import (
     rigid_dynamics_function,

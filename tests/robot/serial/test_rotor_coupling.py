@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.newton_euler import mass_matrix
 from pfsc_drake.robot.serial.rotor_coupling import (

@@ -10,7 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory, resolve_model
-from pfsc_drake.robot.models.parameters import RotorParameters, load_parameters
+from pfsc_drake.robot.models.robot_parameters import RotorParameters, load_parameters
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
 

@@ -7,8 +7,8 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from pfsc_drake.robot.delta.delta_parameters import load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.delta.parameters import load_delta_parameters
 from pfsc_drake.robot.delta.shapes import robot_parts, rod_poses, rod_shape, slide_origins
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, turn_scene_over
 

@@ -17,7 +17,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.robot_parameters import load_parameters
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.physics.velocity_servo import VelocityServo

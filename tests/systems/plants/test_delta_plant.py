@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
+from pfsc_drake.robot.delta.delta_parameters import load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.delta.parameters import load_delta_parameters
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
 M_Q, M_Y, GRAVITY = 1.1, 1.85, 9.81

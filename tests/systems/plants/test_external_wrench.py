@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.plants.external_forces import ExternalWrench
+from pfsc_drake.systems.plants.applied_wrenches import ExternalWrench
 
 WRENCH = np.array([12.0, -30.0, 20.0, 1.0, -2.0, 3.0])
 

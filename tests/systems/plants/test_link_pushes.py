@@ -11,7 +11,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames, place_on_link
-from pfsc_drake.systems.plants.external_forces import LinkPushes
+from pfsc_drake.systems.plants.applied_wrenches import LinkPushes
 
 # links and frames, and points in their axes [m]
 POINTS = {

@@ -1,0 +1,204 @@
+"""What takes part in mounting plates beside the robot; hands on the tool."""
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
+
+from diagrams.environment.mounting import Mounting, add_plate_plant, tool_transform
+from diagrams.robots.part import RobotPart
+from diagrams.scenario.plate import PlateParameters
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
+from pfsc_drake.controller.sensed_force import Payload
+from pfsc_drake.controller.tasks.task import StartPoint, Task
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.physics.mounting_hand import MountingHand
+from pfsc_drake.physics.operator_hand import OperatorHand, ToolMotion
+from pfsc_drake.physics.suction import SuctionGripper, holding_cups
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.plants.applied_wrenches import AppliedForces
+
+
+def add_hand(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    task: Task,
+    parameters: HandParameters,
+    period: float,
+    joint_state: OutputPort,
+) -> OutputPort:
+    """Add a hand on the tool, which sees where that really is.
+
+    Its wrench is held together with all other forces, one sampling time more of delay.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        task: What it is to do, for targets in coordinates of its manifold.
+        parameters: The hand.
+        period: Sampling time [s].
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+
+    Returns:
+        The wrench on the tool point, world axes, shape (6,) [N, Nm].
+
+    Raises:
+        InputError: If a target is off the path, or the reaction delay no multiple of the
+            sampling time.
+    """
+    hand = connect_hand(builder, robot, task, parameters, period, joint_state, OperatorHand)
+    return hand.GetOutputPort("wrench")
+
+
+def connect_hand(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    task: Task,
+    parameters: HandParameters,
+    period: float,
+    joint_state: OutputPort,
+    make: Callable[[HandParameters, float, Place], OperatorHand],
+) -> BlockSystem:
+    """Add a hand of some kind that sees where the tool really is.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        task: Task whose coordinates the hand may be told in.
+        parameters: The hand.
+        period: Sampling time [s].
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+        make: Makes it of its properties, the sampling time [s] and what tells where coordinates
+            of the manifold are.
+
+    Raises:
+        InputError: If a target is off the path, or the reaction delay no multiple of the
+            sampling time.
+    """
+    if parameters.frame == "manifold":
+        for i, place in enumerate(parameters.places()[1]):
+            task.check_place(place, f"hand.waypoints[{i}].position")
+    try:
+        block = make(parameters, period, task.target)
+    except InputError as error:
+        raise InputError(f"hand.{error}") from None
+    hand = builder.AddNamedSystem("operator_hand", BlockSystem(block, period))
+    view = builder.AddNamedSystem("hand_view", BlockSystem(ToolKinematics(robot), period))
+    builder.Connect(joint_state, view.GetInputPort("joint_state"))
+    builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
+    return hand
+
+
+def add_mounting(
+    builder: DiagramBuilder,
+    mounting: Mounting,
+    part: RobotPart,
+    task: Task,
+    hand: HandParameters | None,
+    period: float,
+    start: StartPoint,
+    joint_state: OutputPort,
+) -> tuple[list[OutputPort], dict[str, OutputPort]]:
+    """Add plates, gripper and operator.
+
+    Args:
+        builder: Builder of the diagram.
+        mounting: Where the plates come from and go.
+        part: The robot.
+        task: What it is to do.
+        hand: Hand of an operator who mounts them, if one does.
+        period: Sampling time [s].
+        start: Where its tool starts.
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+
+    Returns:
+        Wrenches on the tool point, world axes, each (6,) [N, Nm], and signals for the log:
+        ``plate_state``, ``plate_contact``, ``held``, ``gripper_wrench``, with an operator
+        ``hand_wrench`` and ``phase``.
+
+    Raises:
+        InputError: If the operator's hand does not suit the task.
+    """
+    plate, robot = mounting.parameters, part.robot
+    places, gravity = mounting.plates(start), part.gravity
+    world = add_plate_plant(builder, plate, mounting.X_WM, mounting.X_WF, places, gravity)
+    motion = builder.AddNamedSystem("tool_motion", BlockSystem(ToolMotion(robot), period))
+    builder.Connect(joint_state, motion.GetInputPort("joint_state"))
+    held = None
+    if plate.start != "magazine":
+        X_PT = places[0].inverse() @ tool_transform(start)
+        # one that lies in the frame bears its weight itself
+        weight = plate.mass * gravity * (plate.start == "held")
+        load = places[0].rotation().matrix().T @ weight
+        held = holding_cups(plate.suction, 0, X_PT.rotation().matrix(), X_PT.translation(), load)
+    half_size = np.array(plate.size[:2]) / 2.0
+    cups = SuctionGripper(plate.suction, half_size, len(world.bodies), held)
+    gripper = builder.AddNamedSystem("gripper", BlockSystem(cups, period))
+    state = world.plant.get_state_output_port()
+    builder.Connect(motion.GetOutputPort("tool_motion"), gripper.GetInputPort("tool_motion"))
+    builder.Connect(state, gripper.GetInputPort("plate_state"))
+    applied = builder.AddNamedSystem("plate_pushes", AppliedForces(world.bodies))
+    builder.Connect(gripper.GetOutputPort("pushes"), applied.get_input_port())
+    builder.Connect(applied.get_output_port(), world.plant.get_applied_spatial_force_input_port())
+    signals = {
+        "plate_state": state,
+        "plate_contact": world.contact.GetOutputPort("forces"),
+        "held": gripper.GetOutputPort("held"),
+        "gripper_wrench": gripper.GetOutputPort("wrench"),
+    }
+    wrenches = [gripper.GetOutputPort("wrench")]
+    if plate.operator is None:
+        builder.Connect(_scheduled_vacuum(builder, plate), gripper.GetInputPort("vacuum"))
+        return wrenches, signals
+    assert hand is not None  # where an operator mounts, a hand is given
+    operator = _add_operator(builder, mounting, robot, task, hand, period, joint_state)
+    builder.Connect(gripper.GetOutputPort("held"), operator.GetInputPort("held"))
+    builder.Connect(operator.GetOutputPort("vacuum"), gripper.GetInputPort("vacuum"))
+    signals["hand_wrench"] = operator.GetOutputPort("wrench")
+    signals["phase"] = operator.GetOutputPort("phase")
+    return [*wrenches, operator.GetOutputPort("wrench")], signals
+
+
+def _scheduled_vacuum(builder: DiagramBuilder, plate: PlateParameters) -> OutputPort:
+    """Return a vacuum that ends at a time."""
+    if np.isinf(plate.release):
+        always = builder.AddNamedSystem("vacuum", ConstantVectorSource([1.0]))
+        return always.get_output_port()
+    times = plate.release * np.arange(3.0)
+    ending = PiecewisePolynomial.ZeroOrderHold(times, np.array([[1.0, 0.0, 0.0]]))
+    return builder.AddNamedSystem("vacuum", TrajectorySource(ending)).get_output_port()
+
+
+def _add_operator(
+    builder: DiagramBuilder,
+    mounting: Mounting,
+    robot: RobotModel,
+    task: Task,
+    parameters: HandParameters,
+    period: float,
+    joint_state: OutputPort,
+) -> BlockSystem:
+    operator, pin_length = mounting.parameters.operator, mounting.parameters.pins.length
+    goal = mounting.X_WF.translation(), mounting.X_WF.rotation().matrix()
+
+    def make(hand: HandParameters, period: float, place: Place) -> MountingHand:
+        assert operator is not None
+        return MountingHand(hand, operator, goal, pin_length, period, place)
+
+    return connect_hand(builder, robot, task, parameters, period, joint_state, make)
+
+
+def payload_of(mounting: Mounting, gravity: np.ndarray) -> Payload:
+    """Return the compensation of a plate behind a force/torque sensor while it is held.
+
+    Args:
+        mounting: The plates.
+        gravity: [m/s^2], world axes, shape (3,).
+    """
+    plate = mounting.parameters
+    return Payload(plate.believed_mass, np.array([0.0, 0.0, plate.size[2] / 2.0]), gravity)

@@ -1,0 +1,117 @@
+"""How a tool yields to forces, and how those are known without a sensor."""
+
+import dataclasses as dc
+from typing import Annotated
+
+import numpy as np
+
+from pfsc_drake.checks import require, require_between
+from pfsc_drake.control.compliance.impedance_parameters import (
+    CoordinateImpedance,
+    ImpedanceParameters,
+    SlowEnds,
+)
+from pfsc_drake.control.compliance.pressing import PressParameters
+from pfsc_drake.control.fixtures.fixture_parameters import RobotLimitParameters
+from pfsc_drake.yaml.rules import NotNegative, OneOf, Parameters, Positive
+
+SOURCES = ("sensor", "observed")
+# of what a hand feels: least and most mass, most damping, most stiffness, and their units
+_OF_PLACES = (1e-3, 1e4, 1e7, 1e9, "kg", "N s/m", "N/m")
+_OF_ANGLES = (1e-6, 1e4, 1e6, 1e8, "kg m^2", "Nm s/rad", "Nm/rad")
+_BOUNDS = {"tangential": _OF_PLACES, "transversal": _OF_PLACES, "rotational": _OF_ANGLES}
+
+
+@dc.dataclass
+class ObservedForceParameters(Parameters):
+    """Forces on the tool from the torques in the joints, without a sensor.
+
+    Attributes:
+        rate: Rate of the observer [1/s].
+        damping: Damping of the inverse of the Jacobian in singular postures.
+        force_dead_band: [N]; friction and model errors are taken for forces below it.
+        torque_dead_band: [Nm].
+    """
+
+    rate: Positive = 100.0
+    damping: NotNegative = 0.02
+    force_dead_band: NotNegative = 0.0
+    torque_dead_band: NotNegative = 0.0
+
+
+@dc.dataclass
+class ComplianceParameters(Parameters):
+    """How the tool yields to measured forces (3.42), (3.44); what is not given stays rigid.
+
+    Attributes:
+        source: Where the forces come from: the ``sensor``, or ``observed`` from how the joints
+            move, for robots that can be moved at their links.
+        observed: How they are observed.
+        tangential: Tangential of eta.
+        transversal: Transversal of xi_1 and xi_2.
+        rotational: Rotational of the angles, three or those of the tool's axis; oriented paths
+            only.
+        with_turning: Whether torques act along eta where the path's orientation turns.
+        press: With which force a tool presses on a surface, whose transversal coordinate has no
+            stiffness then. None without the block.
+        limits: How far the tool follows a hand along a path or a surface, to where the robot
+            itself cannot go on; in space see ``fixtures.limits``.
+    """
+
+    source: Annotated[str, OneOf(SOURCES)] = "sensor"
+    observed: ObservedForceParameters = dc.field(default_factory=ObservedForceParameters)
+    tangential: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
+    transversal: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
+    rotational: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
+    with_turning: bool = False
+    press: PressParameters | None = None
+    limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for kind, bounds in _BOUNDS.items():
+            _require_bearable(kind, getattr(self, kind), *bounds)
+        stiffness = self.transversal.stiffness
+        free = not stiffness.at and stiffness.value == 0.0
+        allowed = "null unless transversal.stiffness.value is 0, which lets the force decide"
+        require(self.press is None or free, "press", "given", allowed)
+
+    @property
+    def needs_sensor(self) -> bool:
+        """Whether anything yields to what a sensor measures."""
+        return self.is_given and self.source == "sensor"
+
+    @property
+    def is_given(self) -> bool:
+        """Whether any coordinate yields."""
+        kinds = (self.tangential, self.transversal, self.rotational)
+        return any(kind.stiffness.at or np.isfinite(kind.stiffness.value) for kind in kinds)
+
+    def impedance(self) -> ImpedanceParameters:
+        """Return the impedance of all coordinates."""
+        return ImpedanceParameters(self.tangential, self.transversal, self.rotational)
+
+
+def _require_bearable(
+    kind: str,
+    said: CoordinateImpedance,
+    lightest: float,
+    heaviest: float,
+    most_damped: float,
+    stiffest: float,
+    *units: str,
+) -> None:
+    """Refuse numbers that are far from all that a hand feels; infinite stiffness is allowed."""
+    for number in said.mass.values or [said.mass.value]:
+        require_between(f"{kind}.mass", number, lightest, heaviest, units[0])
+    damping = said.damping
+    if isinstance(damping, SlowEnds):
+        dampings = [damping.most]
+    else:
+        dampings = damping.values or [damping.value]
+    for number in dampings:
+        require_between(f"{kind}.damping", number, 0.0, most_damped, units[1])
+    for number in said.stiffness.values or [said.stiffness.value]:
+        good = number <= stiffest or number == np.inf
+        allowed = f"0 to {stiffest:g} {units[2]}, or .inf for position control"
+        require(good, f"{kind}.stiffness", number, allowed)
