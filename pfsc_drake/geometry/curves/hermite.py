@@ -26,7 +26,9 @@ def hermite_curve(places: np.ndarray, derivatives: np.ndarray) -> PiecewisePolyn
     order = np.arange(k + 1)
     binomials = np.array([[_binomial(i, j) for i in range(2 * k + 2)] for j in order])
     missing = end - np.einsum("ji,sid->sjd", binomials[:, : k + 1], begin)
-    upper = np.einsum("ij,sjd->sid", np.linalg.inv(binomials[:, k + 1 :]), missing)
+    # of determinant 1: its inverse is of whole numbers
+    inverse = np.rint(np.linalg.inv(binomials[:, k + 1 :]))
+    upper = np.einsum("ij,sjd->sid", inverse, missing)
     unit = np.concatenate([begin, upper], axis=1)
     coefficients = unit / step[:, None, None] ** np.arange(2 * k + 2)[:, None]
     return PiecewisePolynomialCurve(places, coefficients, closed=False, known_smoothness=k)
