@@ -25,18 +25,7 @@ from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import add_log
 from diagrams.site import Site
 from diagrams.station import Station
-from diagrams.station_options import (
-    add_robot,
-    check_obstacles,
-    check_trajectory,
-    choose_mounting,
-    following_options,
-    friction_options,
-    make_spring,
-    make_workpiece,
-    outside,
-    teleoperation_options,
-)
+from diagrams.station_options import StationOptions
 from diagrams.station_parts import PARTS
 from diagrams.station_start import find_start
 from diagrams.tasks.task_drawing import drawing_of
@@ -87,13 +76,13 @@ def build_station(
     Raises:
         InputError: If the scenario cannot be built.
     """
-    builder = DiagramBuilder()
+    builder, chosen = DiagramBuilder(), StationOptions(scenario, folder)
     check_carrier(scenario, simulated=not (remote or parametric or with_slope))
     task = make_task(scenario, folder, progress) if like is None else like.task
-    workpiece, mounting = make_workpiece(scenario, task), choose_mounting(scenario, task)
-    spring = make_spring(scenario, workpiece) if with_slope else None
+    workpiece, mounting = chosen.workpiece(task), chosen.mounting(task)
+    spring = chosen.spring(workpiece) if with_slope else None
     touched = workpiece if spring is None else None
-    part = add_robot(builder, scenario, folder, touched, remote=remote)
+    part = chosen.add_robot(builder, touched, remote=remote)
     if with_slope and part.robot.is_massless:
         allowed = "a model with masses for margins, which are about its dynamics"
         require(False, "robot.model", scenario.robot.model, allowed)
@@ -101,32 +90,29 @@ def build_station(
         assert isinstance(part, Arm)
         part = replace(part, belief=part.belief.with_symbols())
     check_joints(scenario, task, part.robot.dimension)
-    carrier = _add_carrier(builder, scenario, task, folder, progress, like)
+    carrier = _add_carrier(builder, chosen, task, progress, like)
     frame = None if carrier is None else carrier.frame
     start = (
         find_start(scenario.start, task, part, workpiece, mounting, frame)
         if like is None
         else like.controlled.begun
     )
-    check_obstacles(scenario, task, part)
-    check_trajectory(scenario)
-    placed = part, task, task.manifold, outside(scenario), start[0]
+    chosen.check(task)
+    placed = part, task, task.manifold, chosen.outside, start[0]
     at_tool = scenario.operator is not None and scenario.teleoperation is None
     around = Environment(*placed, at_tool, mounting, spring)
     robot = add_controlled_robot(
         builder,
-        scenario,
+        chosen,
         part,
         task,
         start,
-        _options(scenario, part, around, carrier),
-        friction_options(scenario, folder),
-        duration=scenario.duration,
+        _options(chosen, part, around, carrier),
         progress=progress,
         like=None if like is None else like.controlled,
     )
     around = replace(around, manifold=robot.controller.law.linearization.manifold)
-    site = Site(builder, scenario, folder, robot, around, remote=remote, carrier=carrier)
+    site = Site(builder, chosen, robot, around, remote=remote, carrier=carrier)
     for add_part in PARTS:
         add_part(site)
     site.connect()
@@ -140,16 +126,16 @@ def build_station(
 
 def _add_carrier(
     builder: DiagramBuilder,
-    scenario: Scenario,
+    chosen: StationOptions,
     task: Task,
-    folder: FilePath,
     progress: Progress | None,
     like: Station | None,
 ) -> Holder | Turntable | None:
     """Add the robot or the turntable that carries the workpiece, if one does."""
+    scenario = chosen.scenario
     if scenario.holder is not None:
         order, built = task.manifold.layout.order, None if like is None else like.holder
-        return add_holder(builder, scenario, order, folder, progress, built)
+        return add_holder(builder, chosen, order, progress, built)
     if scenario.turntable is not None:
         scenario.turntable.check()
         return Turntable(scenario.turntable)
@@ -157,19 +143,20 @@ def _add_carrier(
 
 
 def _options(
-    scenario: Scenario,
+    chosen: StationOptions,
     part: RobotPart,
     around: Environment,
     carrier: Holder | Turntable | None,
 ) -> FollowerOptions:
     """Return the options of the robot's controller."""
+    scenario = chosen.scenario
     remote, extensions = isinstance(part, RemoteArm), list[Extension]()
     if scenario.needs_sensor:
         load, sensor = part.believed_load(scenario.sensor.joint), scenario.sensor
         extensions.append(SensedForce(load, sensor.measurement_range, sensor))
         if around.mounting is not None:
             extensions.append(payload_of(around.mounting, part.gravity))
-    extensions += teleoperation_options(scenario, around.task)
+    extensions += chosen.teleoperated(around.task)
     if isinstance(carrier, Turntable):
         extensions.append(carrier.known_motion)
     crossing, operator = scenario.obstacles, scenario.operator
@@ -179,7 +166,7 @@ def _options(
         obstacles = ObstacleOptions(shapes, crossing.watch, crossing.elbow)
     switches = len(scenario.switched_regions)
     return replace(
-        following_options(scenario),
+        chosen.follower,
         override=remote and around.task.is_planned,
         stop_request=remote or isinstance(carrier, Holder),
         obstacles=obstacles,

@@ -13,10 +13,11 @@ from diagrams.oscillation import oscillation_before
 from diagrams.robots.belief import believed_robot
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor, check_sides
 from diagrams.robots.part import RobotPart
-from diagrams.robots.plant_friction import FrictionOptions, believed_friction
+from diagrams.robots.plant_friction import believed_friction
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.signal_log import SignalLog
+from diagrams.station_options import StationOptions
 from diagrams.station_warnings import controller_warnings
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.controller.controller import Controller
@@ -28,6 +29,8 @@ from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import BlockAccess
+
+_NAME = "controller"
 
 
 @dataclass
@@ -166,15 +169,12 @@ class ControlledRobot:
 
 def add_controlled_robot(
     builder: DiagramBuilder,
-    scenario: Scenario,
+    chosen: StationOptions,
     part: RobotPart,
     task: Task,
     start: tuple[StartPoint, np.ndarray],
     options: FollowerOptions,
-    rubbing: FrictionOptions,
     *,
-    name: str = "controller",
-    duration: float = 0.0,
     progress: Progress | None = None,
     like: ControlledRobot | None = None,
 ) -> ControlledRobot:
@@ -182,25 +182,22 @@ def add_controlled_robot(
 
     Args:
         builder: Builder of the diagram, with the robot.
-        scenario: What is chosen of the robot.
+        chosen: Options of the robot's parts.
         part: The robot.
         task: Task of its tool.
         start: Start of the tool, and state of the robot's model there.
         options: Options of the controller.
-        rubbing: Friction of the plant.
-        name: Name of the controller.
-        duration: Duration of the run [s]; 0 for that of the reference.
         progress: Receives the fraction done and the name of the step.
         like: The same but for the model or the integration, if it has been built.
 
     Raises:
         InputError: If the controller cannot be built.
     """
-    believed, chosen = part.belief.robot, scenario.controller
-    remote, period = isinstance(part, RemoteArm), chosen.sampling_time
-    friction = believed_friction(part, chosen.friction.believed, rubbing)
+    believed, scenario, period = part.belief.robot, chosen.scenario, chosen.period
+    remote, parameters = isinstance(part, RemoteArm), scenario.controller
+    friction = believed_friction(part, parameters.friction.believed, chosen.friction)
     if not remote:
-        check_sides(believed, chosen, scenario.encoders)
+        check_sides(believed, parameters, scenario.encoders)
     with naming_reference():
         controller = Controller(
             task,
@@ -208,12 +205,12 @@ def add_controlled_robot(
             options,
             start[0],
             (part.coordinates.link_rows @ start[1])[: part.robot.dimension],
-            duration=duration,
+            duration=scenario.duration,
             progress=progress,
             like=None if like is None else like.controller,
             logged=True,
         )
-    controller.set_name(name)
+    controller.set_name(_NAME)
     true_state = part.joint_state(builder)
     measured = add_joint_state(
         builder,
@@ -224,7 +221,7 @@ def add_controlled_robot(
         period,
         scenario.encoder_period,
     )
-    builder.AddNamedSystem(name, controller)
+    builder.AddNamedSystem(_NAME, controller)
     controller.connect(builder, "joint_state", measured)
     if controller.HasInputPort("joint_torque"):
         torque = _joint_torque(builder, part, scenario.encoders, period, true_state)

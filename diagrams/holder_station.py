@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path as FilePath
 from typing import cast
 
 import numpy as np
@@ -23,7 +22,7 @@ from diagrams.scenario import DriverParameters, HolderParameters, Scenario
 from diagrams.scenario.pair import holder_scenario
 from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import SignalLog
-from diagrams.station_options import belief_source, following_options, friction_options
+from diagrams.station_options import StationOptions
 from diagrams.station_start import find_start
 from pfsc_drake.checks import require
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -96,9 +95,8 @@ class Holder:
 
 def add_holder(
     builder: DiagramBuilder,
-    scenario: Scenario,
+    station: StationOptions,
     order: int,
-    folder: FilePath,
     progress: Progress | None = None,
     like: Holder | None = None,
 ) -> Holder:
@@ -108,17 +106,18 @@ def add_holder(
 
     Args:
         builder: Builder of the diagram.
-        scenario: The scenario, with a holder.
+        station: Options of the station, with a holder.
         order: Relative degree of the other robot's law, for which the motion is needed.
-        folder: Where relative file names start.
         progress: Receives the fraction done and the name of the step.
         like: The same but for the integration, if it has been built.
 
     Raises:
         InputError: If it cannot be built, or does not suit the other robot.
     """
+    scenario, folder = station.scenario, station.folder
     holder, own = scenario.holder, holder_scenario(scenario)
     assert holder is not None
+    chosen = StationOptions(own, folder)
     model = scenario.robot.model
     require(not is_delta(model), "robot.model", model, "a serial arm where there is a holder")
     named, before = PrefixingBuilder(builder, HOLDER), None if like is None else like.robot
@@ -126,27 +125,26 @@ def add_holder(
     with naming_holder():
         _check(holder, period, order)
         task = make_task(own, folder, progress) if before is None else before.task
-        part = add_arm(named, holding(belief_source(own, folder), holder.workpiece))
+        part = add_arm(named, holding(chosen.belief_source, holder.workpiece))
         check_joints(own, task, part.robot.dimension)
         start = find_start(own.start, task, part) if before is None else before.begun
         senses = reacts and own.controller.external_torque.source == "measured"
         derivatives = cast(Derivatives, holder.derivatives)
         frame = CarriedFrame(order, derivatives, holder.highest, _placement(holder))
         options = dc.replace(
-            following_options(own),
+            chosen.follower,
             carries=True,
             stop_request=True,
             known_forces=("wrench_ext",) if reacts else (),
             extensions=[MeasuredReaction(), frame] if senses else [frame],
         )
-        rubbing = friction_options(own, folder)
-        robot = add_controlled_robot(named, own, part, task, start, options, rubbing, like=before)
+        robot = add_controlled_robot(named, chosen, part, task, start, options, like=before)
     robot.scenario = _alone(own)
     signals = robot.signals
     drive = {"drive": signals["drive"], "joint_state": signals["joint_state"]}
     add_drives(named, part, None, DriverParameters(), period, drive, start[1])
     stops = [signals["stop_category"]]
-    logged = add_friction(named, part, robot.true_state, rubbing, stops)
+    logged = add_friction(named, part, robot.true_state, chosen.friction, stops)
     logged |= {name: signals[name] for name in robot.controller.logged}
     logged |= robot.logged_states
     reaction = None

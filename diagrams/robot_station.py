@@ -17,13 +17,7 @@ from diagrams.robots.part import RobotPart
 from diagrams.robots.plant_friction import add_friction
 from diagrams.scenario import DriverParameters, Scenario, Streamed
 from diagrams.scenario_task import check_joints, make_task
-from diagrams.station_options import (
-    add_robot,
-    friction_options,
-    make_workpiece,
-    outside,
-    servo_options,
-)
+from diagrams.station_options import StationOptions
 from diagrams.station_start import find_start
 from pfsc_drake.checks import require
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
@@ -149,10 +143,11 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     known = not isinstance(scenario.path.shape, Streamed)
     beforehand = "a path that is known beforehand, where the controller is elsewhere"
     require(known, "path.shape", "!Streamed", beforehand)
-    builder, period = DiagramBuilder(), scenario.controller.sampling_time
+    builder, chosen = DiagramBuilder(), StationOptions(scenario, folder)
+    period = chosen.period
     task = make_task(scenario, folder)
-    workpiece = make_workpiece(scenario, task)
-    part = add_robot(builder, scenario, folder, workpiece)
+    workpiece = chosen.workpiece(task)
+    part = chosen.add_robot(builder, workpiece)
     n = part.robot.dimension
     check_joints(scenario, task, n)
     start, initial_state = find_start(scenario.start, task, part, workpiece)
@@ -174,7 +169,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     projector = BlockSystem(task.projecting, period)
     builder.AddNamedSystem(task.projector_name, projector)
     builder.Connect(tool.GetOutputPort("tool_pose"), projector.GetInputPort("tool_pose"))
-    around = Environment(part, task, task.manifold, outside(scenario), start)
+    around = Environment(part, task, task.manifold, chosen.outside, start)
     point = projector.GetOutputPort("manifold_point")
     forces = around.add(builder, {"true_state": true_state, "manifold_point": point})
     torque = wrench = None
@@ -192,10 +187,10 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     beyond_the_link = DriverParameters(delay=late * period)
     drive = {"drive": command.get_output_port(), "joint_state": joint_state}
     signals, _ = add_drives(
-        builder, part, servo_options(scenario), beyond_the_link, period, drive, initial_state
+        builder, part, chosen.servo, beyond_the_link, period, drive, initial_state
     )
     stops = [signals["servo_stop_category"]] if "servo_stop_category" in signals else []
-    add_friction(builder, part, true_state, friction_options(scenario, folder), stops)
+    add_friction(builder, part, true_state, chosen.friction, stops)
     measured = _name(joint_state)
     if scenario.simulation.fused:
         fuse_blocks(builder)

@@ -1,6 +1,6 @@
 """The task of a scenario."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -20,7 +20,6 @@ from diagrams.tasks.task_geometry import (
     surface_of_path,
 )
 from pfsc_drake.checks import require, require_numbers
-from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest, straight_lines, together
 from pfsc_drake.control.manifolds.space import SpaceManifold
@@ -54,9 +53,9 @@ def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = 
         InputError: If the manifold or the motion along it cannot be made, or regions are given that
             have no effect.
     """
-    manifold = scenario.controller.manifold
+    manifold, chosen = scenario.controller.manifold, _ScenarioTasks(scenario, folder, progress)
     if manifold == "space":
-        return _space_task(scenario, folder, progress)
+        return chosen.space_task()
     for key, why in {"regions": "kept out of regions", "guides": "pulled to guides"}.items():
         given = getattr(scenario.fixtures, key, [])
         allowed = (
@@ -64,45 +63,128 @@ def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = 
         )
         require(not given, f"fixtures.{key}", f"{len(given)} given", allowed)
     if manifold == "surface":
-        return _surface_task(scenario, folder, progress)
+        return chosen.surface_task()
     if isinstance(scenario.path.shape, Streamed):
         allowed = "path where way points come while the tool moves"
         require(manifold == "path", "controller.manifold", manifold, allowed)
         known = scenario.path, scenario.controller, scenario.start, scenario.duration
         return stream_task(*known, folder)
-    return _path_task(scenario, folder, progress)
+    return chosen.path_task()
 
 
-def _path_task(scenario: Scenario, folder: FilePath, progress: Progress | None) -> PathTask:
-    parameters, law, start = scenario.path, scenario.controller.law, scenario.start
-    surface = surface_of_path(parameters, scenario.surface)
-    said: OrientationParameters | SurfaceOrientationParameters
-    if surface is None:
-        path, said = make_path(parameters, law, folder, progress), parameters.orientation
-    else:
-        path = make_path_on_surface(parameters, surface, law, folder, progress)
-        said = surface.orientation
-    points = scenario.reference.arc_lengths(path.length)
-    for eta in points:
-        if not is_on(path, eta):
-            closed = closing_gap(path) is not None
+@dataclass
+class _ScenarioTasks:
+    """A scenario, the folder of its files, and the display of progress."""
+
+    scenario: Scenario
+    folder: FilePath
+    progress: Progress | None
+
+    def path_task(self) -> PathTask:
+        """Return the task of a tool on a path."""
+        scenario, folder, progress = self.scenario, self.folder, self.progress
+        parameters, law, start = scenario.path, scenario.controller.law, scenario.start
+        surface = surface_of_path(parameters, scenario.surface)
+        said: OrientationParameters | SurfaceOrientationParameters
+        if surface is None:
+            path, said = make_path(parameters, law, folder, progress), parameters.orientation
+        else:
+            path = make_path_on_surface(parameters, surface, law, folder, progress)
+            said = surface.orientation
+        points = scenario.reference.arc_lengths(path.length)
+        for eta in points:
+            if not is_on(path, eta):
+                closed = closing_gap(path) is not None
+                raise InputError(
+                    f"reference.points: {eta:g} m; the path is open and "
+                    f"{path.length:.6g} m long{_LOOKS_CLOSED if closed else ''}"
+                )
+        task = PathTask(
+            path,
+            rest_to_rest(points, **_limits(scenario.reference)),
+            RELATIVE_DEGREE[law],
+            followed_angles(said),
+            tracks=scenario.controller.manifold == "trajectory",
+            offset=start.offset,
+            rotation_deg=start.rotation_deg,
+            max_alpha=scenario.controller.max_alpha,
+        )
+        task.warnings += path_warnings(path, task.shape)
+        task.warnings += _euler_warnings_along(path, task, "path" if surface is None else "surface")
+        return task
+
+    def surface_task(self) -> SurfaceTask:
+        """Return the task of a tool on a surface."""
+        scenario = self.scenario
+        parameters, start, law = scenario.surface, scenario.start, scenario.controller.law
+        if parameters is None:
             raise InputError(
-                f"reference.points: {eta:g} m; the path is open and "
-                f"{path.length:.6g} m long{_LOOKS_CLOSED if closed else ''}"
+                "controller.manifold = surface: there is none; write surface: {shape: !Plane {..}}"
             )
-    task = PathTask(
-        path,
-        rest_to_rest(points, **_limits(scenario.reference)),
-        RELATIVE_DEGREE[law],
-        followed_angles(said),
-        tracks=scenario.controller.manifold == "trajectory",
-        offset=start.offset,
-        rotation_deg=start.rotation_deg,
-        max_alpha=scenario.controller.max_alpha,
-    )
-    task.warnings += path_warnings(path, task.shape)
-    task.warnings += _euler_warnings_along(path, task, "path" if surface is None else "surface")
-    return task
+        try:
+            made = make_surface(parameters.shape, law, self.folder, self.progress)
+        except InputError as error:
+            raise InputError(f"surface.shape: {error}") from None
+        manifold = make_surface_manifold(RELATIVE_DEGREE[law], parameters)
+        motion = _surface_motion(scenario.reference)
+        if start.theta and not start.position:
+            require_numbers("start.theta", start.theta, 2)
+        task = SurfaceTask(
+            made.surface,
+            manifold,
+            motion,
+            parameters.orientation.quaternion,
+            theta=start.theta,
+            offset=start.offset[0],
+            position=start.position,
+            rotation_deg=start.rotation_deg,
+            max_alpha=scenario.controller.max_alpha,
+        )
+        task.fit = made.fit
+        task.warnings += made.notes
+        task.warnings += _euler_warnings_at_start(task)
+        return task
+
+    def space_task(self) -> SpaceTask:
+        """Return the task of a tool that is guided through space."""
+        scenario, folder, progress = self.scenario, self.folder, self.progress
+        parameters, start = scenario.fixtures or FixtureParameters(), scenario.start
+        period, duration = scenario.controller.sampling_time, scenario.duration
+        admittance = free_motion(scenario.compliance, period)
+        lead = make_lead(
+            RELATIVE_DEGREE[scenario.controller.law],
+            parameters,
+            period,
+            lag=parameters.lag_behind(scenario.servo.bandwidth),
+            delay=scenario.servo.bus_delay,
+        )
+        said, given = parameters.orientation, start.position
+        place = SpaceManifold(
+            RELATIVE_DEGREE[scenario.controller.law], said.quaternion, **followed_angles(said)
+        )
+        allowed = "the tool point where it starts [m], 3 numbers"
+        require(bool(given), "start.position", given, allowed)
+        first = np.array(given, dtype=float)
+        require(duration > 0.0, "duration", duration, "a positive number [s]")
+        fixtures, warnings = make_fixtures(parameters, first, folder, progress)
+        task = SpaceTask(
+            place,
+            first,
+            fixtures,
+            admittance,
+            lead,
+            parameters,
+            make_guides(parameters, folder, progress),
+            rotation_deg=start.rotation_deg,
+            duration=duration,
+        )
+        task.warnings += warnings
+        if place.is_oriented:
+            R_d = place.orientation(place.point(given)[None])
+            task.warnings += euler_warnings(
+                place.tool.euler, R_d, "fixtures", lambda _: "everywhere"
+            )
+        return task
 
 
 def _limits(reference: ReferenceParameters) -> dict[str, float]:
@@ -121,37 +203,6 @@ def _euler_warnings_along(path: Path, task: PathTask, block: str) -> list[str]:
     theta = np.linspace(*path.position.domain, _ORIENTATIONS)
     eta, R_d = path.arc_length(theta), path.orientation.rotation_matrix(theta)
     return euler_warnings(euler, R_d, block, lambda i: f"at eta = {eta[i]:.4g} m")
-
-
-def _surface_task(scenario: Scenario, folder: FilePath, progress: Progress | None) -> SurfaceTask:
-    parameters, start, law = scenario.surface, scenario.start, scenario.controller.law
-    if parameters is None:
-        raise InputError(
-            "controller.manifold = surface: there is none; write surface: {shape: !Plane {..}}"
-        )
-    try:
-        made = make_surface(parameters.shape, law, folder, progress)
-    except InputError as error:
-        raise InputError(f"surface.shape: {error}") from None
-    manifold = make_surface_manifold(RELATIVE_DEGREE[law], parameters)
-    motion = _surface_motion(scenario.reference)
-    if start.theta and not start.position:
-        require_numbers("start.theta", start.theta, 2)
-    task = SurfaceTask(
-        made.surface,
-        manifold,
-        motion,
-        parameters.orientation.quaternion,
-        theta=start.theta,
-        offset=start.offset[0],
-        position=start.position,
-        rotation_deg=start.rotation_deg,
-        max_alpha=scenario.controller.max_alpha,
-    )
-    task.fit = made.fit
-    task.warnings += made.notes
-    task.warnings += _euler_warnings_at_start(task)
-    return task
 
 
 def _surface_motion(reference: ReferenceParameters) -> PiecewisePolynomialCurve:
@@ -183,53 +234,6 @@ def _euler_warnings_at_start(task: SurfaceTask) -> list[str]:
         return []
     return euler_warnings(
         euler, task.place.orientation(point[None]), "surface", lambda _: "at the start"
-    )
-
-
-def _space_task(scenario: Scenario, folder: FilePath, progress: Progress | None) -> SpaceTask:
-    parameters, start = scenario.fixtures or FixtureParameters(), scenario.start
-    period, duration = scenario.controller.sampling_time, scenario.duration
-    admittance, lead = free_motion(scenario.compliance, period), choose_lead(scenario)
-    said, given = parameters.orientation, start.position
-    place = SpaceManifold(
-        RELATIVE_DEGREE[scenario.controller.law], said.quaternion, **followed_angles(said)
-    )
-    allowed = "the tool point where it starts [m], 3 numbers"
-    require(bool(given), "start.position", given, allowed)
-    first = np.array(given, dtype=float)
-    require(duration > 0.0, "duration", duration, "a positive number [s]")
-    fixtures, warnings = make_fixtures(parameters, first, folder, progress)
-    task = SpaceTask(
-        place,
-        first,
-        fixtures,
-        admittance,
-        lead,
-        parameters,
-        make_guides(parameters, folder, progress),
-        rotation_deg=start.rotation_deg,
-        duration=duration,
-    )
-    task.warnings += warnings
-    if place.is_oriented:
-        R_d = place.orientation(place.point(given)[None])
-        task.warnings += euler_warnings(place.tool.euler, R_d, "fixtures", lambda _: "everywhere")
-    return task
-
-
-def choose_lead(scenario: Scenario) -> Lead:
-    """Return the filter between the requested velocity and a tool that is guided through space.
-
-    Args:
-        scenario: The scenario.
-    """
-    parameters = scenario.fixtures or FixtureParameters()
-    return make_lead(
-        RELATIVE_DEGREE[scenario.controller.law],
-        parameters,
-        scenario.controller.sampling_time,
-        lag=parameters.lag_behind(scenario.servo.bandwidth),
-        delay=scenario.servo.bus_delay,
     )
 
 

@@ -1,7 +1,6 @@
 """A station while it is built: its systems, and their signals by name."""
 
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
@@ -10,6 +9,7 @@ from diagrams.environment.acting_forces import Environment
 from diagrams.environment.operator import Operator
 from diagrams.holder_station import Holder
 from diagrams.scenario import Scenario
+from diagrams.station_options import StationOptions
 from diagrams.turntable_station import Turntable
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.controller.controller import Controller
@@ -36,8 +36,7 @@ class Site:
 
     Attributes:
         builder: Builder of the diagram.
-        scenario: The scenario.
-        folder: Where its relative file names start.
+        options: Options of its parts.
         robot: The robot with its controller.
         around: All that acts on the robot.
         remote: Whether the robot is in another process.
@@ -52,8 +51,7 @@ class Site:
     """
 
     builder: DiagramBuilder
-    scenario: Scenario
-    folder: FilePath
+    options: StationOptions
     robot: ControlledRobot
     around: Environment
     remote: bool = False
@@ -64,6 +62,11 @@ class Site:
     pen: OperatorPanel | None = None
     leader: TeleoperationEnd | None = None
     servo: ServoAccess | None = None
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return self.options.scenario
 
     @property
     def task(self) -> Task:

@@ -1,5 +1,6 @@
-"""Choices of a scenario for the parts of a station: robot, drives, workpiece, forces."""
+"""Options of the parts of a station, from a scenario."""
 
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 from pydrake.systems.framework import DiagramBuilder
@@ -31,266 +32,221 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
-def servo_lag(scenario: Scenario) -> float:
-    """Return the lag between what a law asks of a tool that follows, and where the tool is [s].
+@dataclass
+class StationOptions:
+    """Options of the parts of a station, from a scenario.
 
-    Args:
-        scenario: The scenario.
-    """
-    if RELATIVE_DEGREE[scenario.controller.law] > 1:
-        return 0.0
-    return 1.0 / scenario.servo.bandwidth + scenario.servo.bus_delay
-
-
-def make_workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
-    """Return what a tool presses on or runs in, if there is anything.
-
-    Args:
-        scenario: The scenario.
-        task: What the tool is to do.
-
-    Raises:
-        InputError: If the workpiece does not suit the task or the sampling time.
-    """
-    period = scenario.controller.sampling_time
-    if scenario.workpiece is not None:
-        require(scenario.notch is None, "notch", "given", "null where there is a workpiece")
-        require_whole_fraction("workpiece.time_step", scenario.workpiece.time_step, period)
-        if not isinstance(task, SurfaceTask):
-            raise InputError("workpiece = given: must be null where the task is no surface")
-        return PressedWorkpiece(task.surface, task.place, scenario.workpiece)
-    if scenario.notch is None:
-        return None
-    require_whole_fraction("notch.time_step", scenario.notch.time_step, period)
-    if not isinstance(task, PathTask):
-        raise InputError("notch = given: must be null where the task is no path")
-    return NotchedWorkpiece(task.path, scenario.notch)
-
-
-def make_spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:
-    """Return what a workpiece that is pressed on is to the tool, if there is one.
-
-    Args:
-        scenario: The scenario.
-        workpiece: What the tool touches, if anything.
-    """
-    press = scenario.compliance.press
-    if press is None or press.force == 0.0 or not isinstance(workpiece, PressedWorkpiece):
-        return None
-    period = scenario.controller.sampling_time
-    return SurfaceSpring(workpiece.touch, workpiece.stiffness(press.force), period)
-
-
-def add_robot(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    folder: FilePath,
-    workpiece: Workpiece | None,
-    *,
-    remote: bool = False,
-) -> RobotPart:
-    """Add the robot of a scenario, with what its controller believes of it.
-
-    Args:
-        builder: Builder of the diagram.
-        scenario: The scenario.
-        folder: Where its relative file names start.
-        workpiece: What the tool may touch, if anything.
-        remote: Whether it stands elsewhere.
-
-    Raises:
-        InputError: If the robot cannot be read, or cannot do what the scenario asks of it.
-    """
-    source, controller = belief_source(scenario, folder), scenario.controller
-    if remote:
-        model = scenario.robot.model
-        require(not is_delta(model), "robot.model", model, "an arm, where it stands elsewhere")
-        return add_remote_arm(builder, source, has_sensor=scenario.needs_sensor)
-    if not is_delta(scenario.robot.model):
-        arm = add_arm(builder, source, workpiece)
-        if arm.robot.is_massless:
-            check_massless(scenario)
-        return arm
-    step = free_step(controller.sampling_time, scenario.simulation.max_step)
-    part = add_delta(builder, source, step, workpiece)
-    # what cannot be read is said before what it could not do
-    _check_delta(scenario)
-    return part
-
-
-def belief_source(scenario: Scenario, folder: FilePath) -> BeliefSource:
-    """Return where a scenario's controller has from what it believes of the robot.
-
-    Args:
+    Attributes:
         scenario: The scenario.
         folder: Where its relative file names start.
     """
-    controller = scenario.controller
-    return BeliefSource(
-        scenario.robot,
-        controller.model,
-        scenario.model_error,
-        folder,
-        by_velocity=not controller.law_record.commands_torque,
-    )
 
+    scenario: Scenario
+    folder: FilePath
 
-def friction_options(scenario: Scenario, folder: FilePath) -> FrictionOptions:
-    """Return what brakes the drives of a scenario's plant.
+    @property
+    def period(self) -> float:
+        """Sampling time of the controller [s]."""
+        return self.scenario.controller.sampling_time
 
-    Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
-    """
-    return FrictionOptions(
-        scenario.friction,
-        scenario.drive_friction,
-        scenario.faults.brakes,
-        scenario.simulation,
-        scenario.controller.sampling_time,
-        folder,
-    )
+    @property
+    def belief_source(self) -> BeliefSource:
+        """Origin of the nominal model of the robot."""
+        scenario, controller = self.scenario, self.scenario.controller
+        return BeliefSource(
+            scenario.robot,
+            controller.model,
+            scenario.model_error,
+            self.folder,
+            by_velocity=not controller.law_record.commands_torque,
+        )
 
+    @property
+    def friction(self) -> FrictionOptions:
+        """Friction and holding brakes of the plant's drives."""
+        scenario, brakes = self.scenario, self.scenario.faults.brakes
+        kinds = scenario.friction, scenario.drive_friction, brakes
+        return FrictionOptions(*kinds, scenario.simulation, self.period, self.folder)
 
-def servo_options(scenario: Scenario) -> ServoOptions | None:
-    """Return the velocity servos of a scenario's joints; None where its law commands torques.
+    @property
+    def servo(self) -> ServoOptions | None:
+        """Velocity servos of the joints; None where the law commands torques."""
+        scenario = self.scenario
+        if scenario.controller.law_record.commands_torque:
+            return None
+        return ServoOptions(scenario.servo, scenario.controller, scenario.faults, scenario.encoders)
 
-    Args:
-        scenario: The scenario.
-    """
-    if scenario.controller.law_record.commands_torque:
-        return None
-    return ServoOptions(scenario.servo, scenario.controller, scenario.faults, scenario.encoders)
+    @property
+    def outside(self) -> Outside:
+        """Forces on the robot from outside."""
+        scenario = self.scenario
+        hand = scenario.hand if scenario.teleoperation is None else None
+        forces = scenario.forces, scenario.hold_back, scenario.pushes, hand
+        return Outside(*forces, scenario.needs_sensor, self.period)
 
+    @property
+    def follower(self) -> FollowerOptions:
+        """Options of the controller that are those of a user's diagram."""
+        scenario = self.scenario
+        return FollowerOptions(
+            controller=scenario.controller,
+            faults=scenario.faults,
+            transition=scenario.start.transition,
+            compliance=scenario.compliance,
+            swings=scenario.reference.swings,
+            reference=scenario.reference,
+        )
 
-def _check_delta(scenario: Scenario) -> None:
-    """Refuse what is said of robots that turn their tool or bend."""
-    law, start, surface = scenario.controller.law, scenario.start, scenario.surface
-    drives = "the drives of a DELTA robot are stiff and take forces"
-    require(law == "rigid", "controller.law", law, f"rigid, {drives}")
-    one = "none; one pose of the slides belongs to each position"
-    require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
-    turned = "none; a DELTA robot only translates"
-    require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
-    keyframes = scenario.path.orientation.keyframes
-    require(not keyframes, "path.orientation.keyframes", len(keyframes), turned)
-    if surface is not None:
-        kind = surface.orientation.kind
-        require(kind == "none", "surface.orientation.kind", kind, turned)
+    def workpiece(self, task: Task) -> Workpiece | None:
+        """Return the workpiece that a tool presses on or runs in, if there is one.
 
+        Args:
+            task: Task of the tool.
 
-def choose_mounting(scenario: Scenario, task: Task) -> Mounting | None:
-    """Return where a scenario's plates come from and go, if it has any.
+        Raises:
+            InputError: If the workpiece does not suit the task or the sampling time.
+        """
+        pressed, notch = self.scenario.workpiece, self.scenario.notch
+        if pressed is not None:
+            require(notch is None, "notch", "given", "null where there is a workpiece")
+            require_whole_fraction("workpiece.time_step", pressed.time_step, self.period)
+            if not isinstance(task, SurfaceTask):
+                raise InputError("workpiece = given: must be null where the task is no surface")
+            return PressedWorkpiece(task.surface, task.place, pressed)
+        if notch is None:
+            return None
+        require_whole_fraction("notch.time_step", notch.time_step, self.period)
+        if not isinstance(task, PathTask):
+            raise InputError("notch = given: must be null where the task is no path")
+        return NotchedWorkpiece(task.path, notch)
 
-    Args:
-        scenario: The scenario.
-        task: What the tool is to do.
+    def spring(self, workpiece: Workpiece | None) -> SurfaceSpring | None:
+        """Return a workpiece that is pressed on as a spring, if there is one.
 
-    Raises:
-        InputError: If the plates do not suit the task, or something else is touched.
-    """
-    if scenario.plate is None:
-        return None
-    for key in ("notch", "workpiece"):
-        given = getattr(scenario, key) is not None
-        require(not given, key, "given", "null where there is a plate")
-    return make_mounting(
-        scenario.plate,
-        task,
-        has_hand=scenario.hand is not None,
-        period=scenario.controller.sampling_time,
-    )
+        Args:
+            workpiece: What the tool touches, if anything.
+        """
+        press = self.scenario.compliance.press
+        if press is None or press.force == 0.0 or not isinstance(workpiece, PressedWorkpiece):
+            return None
+        return SurfaceSpring(workpiece.touch, workpiece.stiffness(press.force), self.period)
 
+    def mounting(self, task: Task) -> Mounting | None:
+        """Return origin and destination of a scenario's plates, if it has any.
 
-def outside(scenario: Scenario) -> Outside:
-    """Return what acts on a scenario's robot from outside.
+        Args:
+            task: Task of the tool.
 
-    Args:
-        scenario: The scenario.
-    """
-    return Outside(
-        scenario.forces,
-        scenario.hold_back,
-        scenario.pushes,
-        scenario.hand if scenario.teleoperation is None else None,
-        scenario.needs_sensor,
-        scenario.controller.sampling_time,
-    )
+        Raises:
+            InputError: If the plates do not suit the task, or something else is touched.
+        """
+        scenario = self.scenario
+        if scenario.plate is None:
+            return None
+        for key in ("notch", "workpiece"):
+            given = getattr(scenario, key) is not None
+            require(not given, key, "given", "null where there is a plate")
+        has_hand = scenario.hand is not None
+        return make_mounting(scenario.plate, task, has_hand=has_hand, period=self.period)
 
+    def teleoperated(self, task: Task) -> list[Teleoperated]:
+        """Return the follower's side of a teleoperation, if there is one.
 
-def following_options(scenario: Scenario) -> FollowerOptions:
-    """Return what a scenario chooses of its controller.
+        Args:
+            task: Task of the tool.
 
-    Args:
-        scenario: The scenario.
-    """
-    return FollowerOptions(
-        controller=scenario.controller,
-        faults=scenario.faults,
-        transition=scenario.start.transition,
-        compliance=scenario.compliance,
-        swings=scenario.reference.swings,
-        reference=scenario.reference,
-    )
+        Raises:
+            InputError: If nothing complies, or the tank does not suit the follower.
+        """
+        parameters, compliance = self.scenario.teleoperation, self.scenario.compliance
+        if parameters is None:
+            return []
+        allowed = "null where nothing yields to what a sensor measures (compliance)"
+        require(compliance.needs_sensor, "teleoperation", "given", allowed)
+        turns = ComplianceParameters(rotational=compliance.rotational).is_given
+        allowed = "null where the tool's orientation is stiff (compliance.rotational)"
+        require(parameters.rotation is None or turns, "teleoperation.rotation", "given", allowed)
+        return [teleoperated(parameters, task, self._servo_lag, self.period)]
 
+    def add_robot(
+        self, builder: DiagramBuilder, workpiece: Workpiece | None, *, remote: bool = False
+    ) -> RobotPart:
+        """Add the robot, with the nominal model that its controller has.
 
-def check_trajectory(scenario: Scenario) -> None:
-    """Refuse what a point that moves along a path with time cannot have.
+        Args:
+            builder: Builder of the diagram.
+            workpiece: What the tool may touch, if anything.
+            remote: Whether the robot is in another process.
 
-    Args:
-        scenario: The scenario.
+        Raises:
+            InputError: If the robot cannot be read, or does not suit the scenario.
+        """
+        scenario, model, source = self.scenario, self.scenario.robot.model, self.belief_source
+        if remote:
+            require(not is_delta(model), "robot.model", model, "an arm, where it stands elsewhere")
+            return add_remote_arm(builder, source, has_sensor=scenario.needs_sensor)
+        if not is_delta(model):
+            arm = add_arm(builder, source, workpiece)
+            if arm.robot.is_massless:
+                check_massless(scenario)
+            return arm
+        step = free_step(self.period, scenario.simulation.max_step)
+        part = add_delta(builder, source, step, workpiece)
+        # what cannot be read is said before what it could not do
+        self._check_delta()
+        return part
 
-    Raises:
-        InputError: If it has that.
-    """
-    if scenario.controller.manifold != "trajectory":
-        return
-    swings, transition = scenario.reference.swings, scenario.start.transition
-    allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
-    require(not swings, "reference.swings", f"{len(swings)} given", allowed)
-    allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
-    require(transition == 0.0, "start.transition", transition, allowed)
+    def check(self, task: Task) -> None:
+        """Refuse obstacles where progress cannot wait for them, and what a moving point excludes.
 
+        Args:
+            task: Task of the tool.
 
-def check_obstacles(scenario: Scenario, task: Task, part: RobotPart) -> None:
-    """Refuse obstacles where progress cannot wait for them.
+        Raises:
+            InputError: If so.
+        """
+        scenario, swings = self.scenario, self.scenario.reference.swings
+        if scenario.obstacles is not None:
+            given, allowed = scenario.compliance.is_given, "left out where progress waits"
+            require(not given, "compliance", "given", allowed)
+            waits = task.is_planned and not task.manifold.follows_time
+            allowed = (
+                "null unless controller.manifold is path or surface, on which progress can wait"
+            )
+            require(waits, "obstacles", "given", allowed)
+            require(not swings, "reference.swings", "given", "none where there are obstacles")
+        if scenario.controller.manifold == "trajectory":
+            coordinates = "whose coordinates are those of space"
+            allowed = f"none with controller.manifold = trajectory, {coordinates}"
+            require(not swings, "reference.swings", f"{len(swings)} given", allowed)
+            transition = scenario.start.transition
+            allowed = (
+                "0 with controller.manifold = trajectory, whose reference is a point that moves"
+            )
+            require(transition == 0.0, "start.transition", transition, allowed)
 
-    Args:
-        scenario: The scenario.
-        task: Its task.
-        part: The robot.
+    @property
+    def _servo_lag(self) -> float:
+        """Lag between the command of a law and a tool that follows it [s]."""
+        if RELATIVE_DEGREE[self.scenario.controller.law] > 1:
+            return 0.0
+        servo = self.scenario.servo
+        return 1.0 / servo.bandwidth + servo.bus_delay
 
-    Raises:
-        InputError: If so.
-    """
-    if scenario.obstacles is None:
-        return
-    given, allowed = scenario.compliance.is_given, "left out where progress waits"
-    require(not given, "compliance", "given", allowed)
-    waits = task.is_planned and not task.manifold.follows_time
-    allowed = "null unless controller.manifold is path or surface, on which progress can wait"
-    require(waits, "obstacles", "given", allowed)
-    swings = scenario.reference.swings
-    require(not swings, "reference.swings", "given", "none where there are obstacles")
-
-
-def teleoperation_options(scenario: Scenario, task: Task) -> list[Teleoperated]:
-    """Return the follower's side of a scenario's teleoperation, if there is one.
-
-    Args:
-        scenario: The scenario.
-        task: Its task.
-
-    Raises:
-        InputError: If nothing complies, or the tank does not suit the follower.
-    """
-    parameters = scenario.teleoperation
-    if parameters is None:
-        return []
-    allowed = "null where nothing yields to what a sensor measures (compliance)"
-    require(scenario.compliance.needs_sensor, "teleoperation", "given", allowed)
-    turns = ComplianceParameters(rotational=scenario.compliance.rotational).is_given
-    allowed = "null where the tool's orientation is stiff (compliance.rotational)"
-    require(parameters.rotation is None or turns, "teleoperation.rotation", "given", allowed)
-    period = scenario.controller.sampling_time
-    return [teleoperated(parameters, task, servo_lag(scenario), period)]
+    def _check_delta(self) -> None:
+        """Refuse what only robots that turn their tool or bend have."""
+        scenario, start, surface = self.scenario, self.scenario.start, self.scenario.surface
+        law, drives = (
+            scenario.controller.law,
+            "the drives of a DELTA robot are stiff and take forces",
+        )
+        require(law == "rigid", "controller.law", law, f"rigid, {drives}")
+        one = "none; one pose of the slides belongs to each position"
+        require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
+        turned = "none; a DELTA robot only translates"
+        require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
+        keyframes = scenario.path.orientation.keyframes
+        require(not keyframes, "path.orientation.keyframes", len(keyframes), turned)
+        if surface is not None:
+            kind = surface.orientation.kind
+            require(kind == "none", "surface.orientation.kind", kind, turned)

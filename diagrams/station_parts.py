@@ -17,7 +17,6 @@ from diagrams.robots.force_sensor import add_force_sensor
 from diagrams.robots.plant_friction import add_friction
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.site import Site
-from diagrams.station_options import friction_options, servo_options
 from diagrams.tasks.streaming import ScenarioStream
 from diagrams.turntable_station import Turntable
 from pfsc_drake.blocks.wiring_blocks import Hold
@@ -76,7 +75,9 @@ def _operator(site: Site) -> None:
     scenario = site.scenario
     if scenario.operator is not None:
         regions = scenario.switched_regions
-        operator = add_operator(site.builder, scenario.operator, regions, site.period, site.folder)
+        operator = add_operator(
+            site.builder, scenario.operator, regions, site.period, site.options.folder
+        )
         site.operator, site.signals = operator, site.signals | operator.requests
 
 
@@ -115,7 +116,7 @@ def _drives(site: Site) -> None:
     scenario, part = site.scenario, site.robot.part
     if site.remote:
         return
-    servos, state = servo_options(scenario), site.robot.initial_state
+    servos, state = site.options.servo, site.robot.initial_state
     signals, site.servo = add_drives(
         site.builder, part, servos, scenario.driver, site.period, site.signals, state
     )
@@ -125,7 +126,7 @@ def _drives(site: Site) -> None:
 def _friction(site: Site) -> None:
     categories = ("stop_category", "servo_stop_category")
     stops = [site.signals[name] for name in categories if name in site.signals]
-    rubbing = friction_options(site.scenario, site.folder)
+    rubbing = site.options.friction
     part, state = site.robot.part, site.signals["true_state"]
     site.show(**add_friction(site.builder, part, state, rubbing, [] if site.remote else stops))
 

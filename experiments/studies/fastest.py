@@ -15,7 +15,7 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.scenario_task import make_task
 from diagrams.station import Station
-from diagrams.station_options import following_options
+from diagrams.station_options import StationOptions
 from experiments.scenario_file import find_scenario, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
@@ -227,7 +227,8 @@ def _planner(settings: Scenario, station: Station, folder: Path) -> FastestPlann
     """Return what plans the motion of a station anew."""
     task = make_task(settings, folder)
     start = CourseStart(station.start_posture, station.start.place)
-    return FastestPlanner(following_options(settings), task, station.law, start, None)
+    options = StationOptions(settings, folder).follower
+    return FastestPlanner(options, task, station.law, start, None)
 
 
 def _moving(plan: DrivePlan | None) -> float:

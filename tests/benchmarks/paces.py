@@ -26,7 +26,7 @@ from diagrams.robots.arm import add_arm
 from diagrams.robots.plant_friction import add_friction
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.station_options import belief_source, friction_options
+from diagrams.station_options import StationOptions
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from experiments.simulation import configure
 from pfsc_drake.systems.plants.applied_wrenches import LinkPushes
@@ -100,7 +100,7 @@ def _replay(
     world: dict[str, np.ndarray] | None,
 ) -> Callable[[], Simulator]:
     builder, period = DiagramBuilder(), settings.controller.sampling_time
-    part = add_arm(builder, belief_source(settings, SCENARIO_DIRECTORY))
+    part = add_arm(builder, StationOptions(settings, SCENARIO_DIRECTORY).belief_source)
 
     def told(values: np.ndarray, ahead: float = 0.0) -> OutputPort:
         begins = times[: len(values)] - ahead
@@ -117,7 +117,9 @@ def _replay(
     else:
         part.connect_drives(builder, sampled(torque))
         joint_state = part.joint_state(builder)
-        add_friction(builder, part, joint_state, friction_options(settings, SCENARIO_DIRECTORY))
+        add_friction(
+            builder, part, joint_state, StationOptions(settings, SCENARIO_DIRECTORY).friction
+        )
         # the log shows at a tick what has acted until then
         forces = {k: sampled(world[k][1:]) for k in ("wrench_ext", "push_wrench") if k in world}
         if "push_wrench" in forces:

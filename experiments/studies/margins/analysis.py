@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context
 from diagrams.period_map import RestSlope
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
-from diagrams.station_options import belief_source
+from diagrams.station_options import StationOptions
 from experiments.studies.margins.box import (
     Error,
     ErrorBox,
@@ -149,7 +149,7 @@ def _believable(
 
 def _check_belief(part: RobotPart, settings: Scenario, folder: Path) -> None:
     joint = settings.sensor.joint if settings.needs_sensor else None
-    part.check_belief(belief_source(settings, folder), joint)
+    part.check_belief(StationOptions(settings, folder).belief_source, joint)
 
 
 @dataclass

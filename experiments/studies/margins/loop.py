@@ -18,7 +18,7 @@ from diagrams.robots.arm import Arm
 from diagrams.robots.arm_model import believe_arm
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.station_options import belief_source
+from diagrams.station_options import StationOptions
 from experiments.simulation import configure
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
@@ -109,7 +109,9 @@ class StationLoop:
         part = self.station.part
         assert isinstance(part, Arm)  # others are not parametrized
         other = copy(self)
-        other.parameters = believe_arm(part.true, belief_source(settings, folder))[0].parameters
+        other.parameters = believe_arm(part.true, StationOptions(settings, folder).belief_source)[
+            0
+        ].parameters
         return other
 
     def configure(self, simulator: Simulator) -> None:

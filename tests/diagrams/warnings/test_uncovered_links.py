@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robots.arm import add_arm
-from diagrams.station_options import belief_source
+from diagrams.station_options import StationOptions
 from diagrams.warnings.uncovered_links import uncovered_links
 from pfsc_drake.control.obstacles.obstacle_watch import ArmAhead
 from pfsc_drake.robot.serial.outline import arm_outline
@@ -69,7 +69,7 @@ def _looking(model, tmp_path, load_scenario):
     settings = load_scenario("pfc_panda_7r")
     settings.robot = type(settings.robot)(str(file), tool_frame="tip")
     settings.model_error = type(settings.model_error)()
-    part = add_arm(DiagramBuilder(), belief_source(settings, Path()))
+    part = add_arm(DiagramBuilder(), StationOptions(settings, Path()).belief_source)
     drawn = draw_robot(part.model, part.tool, settings.robot, Path()).parts
 
     def look(radius):
