@@ -133,7 +133,6 @@ def test_a_robot_with_servos():
     settings.controller.law, settings.controller.gains = "velocity_servo", {}
     settings.start.transition, settings.reference.dwell = 0.3, 0.3
     settings.controller.gains = shipped_scenario("pfc_scara_4r").controller.gains
-    settings.controller.poles = "auto"
     loop = Loop(settings).begin().run(1.0)
     assert loop.drive.mode is ControlMode.VELOCITY
     assert loop.fault is None
