@@ -35,7 +35,8 @@ from experiments.studies.margins.margins_page import Margins
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import dialect
 from pfsc_drake.errors import InputError, WriteError
-from pfsc_drake.yaml.typed import load_typed, typed_data
+from pfsc_drake.yaml.dumping import typed_data
+from pfsc_drake.yaml.typed import load_typed
 from reporting.notebook import NotebookProgress, in_notebook
 from reporting.progress import NoProgress, ProgressDisplay
 

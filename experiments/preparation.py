@@ -16,8 +16,9 @@ from experiments.results.requirements import check_targets
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.checks import require
 from pfsc_drake.errors import InputError, nearest_file, shortened
+from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.reading import resolve_files
-from pfsc_drake.yaml.typed import dump_typed, load_typed
+from pfsc_drake.yaml.typed import load_typed
 from reporting.progress import ProgressListener
 
 MAX_TICKS = 1_000_000  # of the controller; 1000 s at 1 kHz

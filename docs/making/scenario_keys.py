@@ -12,9 +12,9 @@ import numpy as np
 
 from diagrams.scenario import Scenario
 from docs.making.text import attribute, cell, description, table
+from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.fields import AUTO_OR_MANY, FILE, NAME_OR_FILE, ONE_OR_MANY, Field, fields_of
 from pfsc_drake.yaml.rules import OneOf, rules_of
-from pfsc_drake.yaml.typed import typed_data
 
 _PLAIN = {bool: "true or false", int: "whole number", float: "number", str: "text"}
 _SEVERAL = {

@@ -29,8 +29,9 @@ from pfsc_drake.drivers.layout import UdpmAddress
 from pfsc_drake.drivers.link import ControllerEnd, RequestEnd
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.reading import resolve_files
-from pfsc_drake.yaml.typed import dump_typed, load_typed
+from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import check_folder, open_results
 from reporting.interruption import noticed_interruption
 from reporting.progress import ProgressListener

@@ -20,7 +20,7 @@ from experiments.simulation import SimulationResult
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
 from pfsc_drake.control.streams.stream_course import POSITION
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.typed import dump_typed
+from pfsc_drake.yaml.dumping import dump_typed
 from reporting.folder import check_folder, open_results
 from reporting.progress import ProgressListener
 

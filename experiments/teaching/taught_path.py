@@ -24,8 +24,9 @@ from pfsc_drake.geometry import (
     path_from_waypoints,
     pick_waypoints,
 )
+from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml
-from pfsc_drake.yaml.typed import load_file, typed_data
+from pfsc_drake.yaml.typed import load_file
 
 
 @dc.dataclass(frozen=True)

@@ -18,7 +18,8 @@ from identification.options import make_folder, write_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.visuals import Appearance
 from pfsc_drake.robot.models.writer import write_sdf
-from pfsc_drake.yaml.typed import dump_typed, load_file
+from pfsc_drake.yaml.dumping import dump_typed
+from pfsc_drake.yaml.typed import load_file
 
 PARAMETERS_FILE = "parameters.yaml"
 

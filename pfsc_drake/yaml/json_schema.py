@@ -17,9 +17,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.fields import Field, attribute_text, fields_of
 from pfsc_drake.yaml.rules import Numbers, Range, rules_of
-from pfsc_drake.yaml.typed import typed_data
 
 _SCALARS = {bool: "boolean", int: "integer", float: "number", str: "string", Path: "string"}
 _MARKUP = re.compile(r":\w+(?::\w+)*:`~?(?:[\w.]*\.)?([^`]+)`|``([^`]+)``")

@@ -1,4 +1,4 @@
-"""Typed YAML: files and data into dataclasses, with errors a person can act on, and back.
+"""Typed YAML: files and data into dataclasses, with errors a person can act on.
 
 The format is that of Drake's ``yaml_load_typed``, whose messages name neither file nor key: what a
 file does not say keeps its default, in blocks within blocks, too; a tag chooses a member of a
@@ -9,7 +9,6 @@ union; text that is a number is one. Beyond it a single number or a word may sta
 import collections.abc
 import dataclasses
 import re
-import sys
 import types
 import typing
 from contextlib import suppress
@@ -18,26 +17,27 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pfsc_drake.checks import NUMBER, is_number
-from pfsc_drake.errors import InputError, did_you_mean, gathered_refusals, in_one_line, shortened
+from pfsc_drake.checks import is_number
+from pfsc_drake.errors import InputError, did_you_mean, gathered_refusals, in_one_line
 from pfsc_drake.yaml.fields import Field, OneForAll, fields_of
-from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml, read_yaml
+from pfsc_drake.yaml.misfits import (
+    MAX_INTEGER,
+    SCALARS,
+    Place,
+    alternatives,
+    decimal_comma,
+    expectation,
+    range_of_type,
+    shown,
+    spelled,
+)
+from pfsc_drake.yaml.reading import TAG_KEY, read_yaml
 from pfsc_drake.yaml.rules import check_value
 
 Schema = TypeVar("Schema")
-Place = tuple[Any, ...]  # keys and indices, e.g. ("controller", "gains", "eta", 1)
 
 _MOST_MISFITS = 50  # of one file
 _INTEGER = re.compile(r"[-+]?[0-9]{1,19}")
-_LONG_INTEGER = re.compile(r"[-+]?[0-9]+")
-_MAX_INTEGER = 2**63 - 1
-_SCALARS: dict[Any, str] = {
-    bool: "true or false",
-    int: "an integer",
-    float: "a number",
-    str: "text",
-    Path: "a path (text)",
-}
 # of calculations with numbers that are out of bounds
 _CONSEQUENCES = (ArithmeticError, ValueError, MemoryError)
 # in place of a value that is refused
@@ -107,7 +107,7 @@ class _Reader:
         """
         fields = fields_of(schema)
         if not isinstance(data, dict):
-            return self._misfit(data, place, _expected(schema))
+            return self._misfit(data, place, expectation(schema))
         if TAG_KEY in data:
             return self._misfit(data[TAG_KEY], place, "a mapping without a tag")
         values = {}
@@ -121,7 +121,7 @@ class _Reader:
             if name not in data and field.required:
                 here = (*place, name)
                 values[name] = self._note(
-                    f"missing key '{spelled(here)}': expected {_expected(field.kind)}"
+                    f"missing key '{spelled(here)}': expected {expectation(field.kind)}"
                 )
         return self._made(schema, values, place, base)
 
@@ -169,7 +169,7 @@ class _Reader:
         if field.takes_a_number and not isinstance(item, list):
             word = form.get("empty_word")
             single = f"a number, {word}" if word else "a number"
-            return self._misfit(item, place, f"{single} or {_expected(field.kind)}")
+            return self._misfit(item, place, f"{single} or {expectation(field.kind)}")
         # what is not said stays in a block or a mapping
         old = None
         if isinstance(item, dict):
@@ -190,10 +190,10 @@ class _Reader:
         origin, arguments = typing.get_origin(kind), typing.get_args(kind)
         if dataclasses.is_dataclass(kind):
             return self.block(kind, data, place, old)
-        if kind in _SCALARS:
+        if kind in SCALARS:
             found = _scalar(kind, data)
             if found is _REFUSED:
-                self._misfit(data, place, _expected(kind) + _range(kind, data))
+                self._misfit(data, place, expectation(kind) + range_of_type(kind, data))
             return found
         if origin in (typing.Union, types.UnionType):
             return self._union(arguments, data, place, old)
@@ -202,7 +202,7 @@ class _Reader:
             return rows if rows is _REFUSED else np.array(rows, dtype=float)
         if origin is list:
             if not isinstance(data, list):
-                return self._misfit(data, place, _expected(kind))
+                return self._misfit(data, place, expectation(kind))
             items = [self.value(arguments[0], x, (*place, i), None) for i, x in enumerate(data)]
             return _REFUSED if any(item is _REFUSED for item in items) else items
         if origin in (dict, collections.abc.Mapping):
@@ -212,13 +212,13 @@ class _Reader:
     def _mapping(self, kind: Any, data: Any, place: Place, old: dict[str, Any]) -> Any:
         """Return a mapping of names; those that it has already stay."""
         if not isinstance(data, dict):
-            return self._misfit(data, place, _expected(kind))
+            return self._misfit(data, place, expectation(kind))
         found, item_kind = dict(old), typing.get_args(kind)[1]
         for name, item in data.items():
             if isinstance(name, str):
                 found[name] = self.value(item_kind, item, (*place, name), old.get(name))
             else:
-                what = f"key '{spelled((*place, str(name)))}' is {_shown(name)}"
+                what = f"key '{spelled((*place, str(name)))}' is {shown(name)}"
                 found[name] = self._note(f"{what}: expected a key that is text")
         return _REFUSED if any(item is _REFUSED for item in found.values()) else found
 
@@ -245,7 +245,7 @@ class _Reader:
             return data
         found = _scalar(choices[0], data)
         if found is _REFUSED:
-            self._misfit(data, place, " or ".join(_alternatives(members)))
+            self._misfit(data, place, " or ".join(alternatives(members)))
         return found
 
     def _untagged(self, choices: list[Any], data: Any, place: Place, old: Any) -> Any:
@@ -262,7 +262,7 @@ class _Reader:
     def _rows(self, data: Any, place: Place) -> Any:
         """Return a vector, or a matrix as a list of equally long rows, as lists of numbers."""
         if not isinstance(data, list):
-            return self._misfit(data, place, _expected(np.ndarray))
+            return self._misfit(data, place, expectation(np.ndarray))
         lengths = {len(row) if isinstance(row, list) else -1 for row in data}
         if len(lengths) > 1:
             return self._misfit(data, place, "rows of equal length")
@@ -282,14 +282,14 @@ class _Reader:
 
     def _unknown(self, data: dict[Any, Any], name: Any, place: Place, known: Any) -> Any:
         """Note a key that does not exist."""
-        hint = _decimal_comma(data, name) or did_you_mean(name, known)
-        what = f"unknown key '{spelled((*place[:-1], str(name)))}' = {_shown(data[name])}"
+        hint = decimal_comma(data, name) or did_you_mean(name, known)
+        what = f"unknown key '{spelled((*place[:-1], str(name)))}' = {shown(data[name])}"
         return self._note(f"{what}: {hint}allowed: {', '.join(known) or 'no keys'}")
 
     def _misfit(self, value: Any, place: Place, expected: str, hint: str = "") -> Any:
         """Note a value that does not fit."""
         where = f"key '{spelled(place)}'" if place else "the root"
-        return self._note(f"{where} is {_shown(value)}: {hint}expected {expected}")
+        return self._note(f"{where} is {shown(value)}: {hint}expected {expected}")
 
     def _note(self, message: str) -> Any:
         if len(self.misfits) < _MOST_MISFITS:
@@ -305,7 +305,7 @@ def _scalar(kind: Any, value: Any) -> Any:
     if kind is int:
         whole = given is int or (given is float and value.is_integer())
         whole = whole or (given is str and bool(_INTEGER.fullmatch(value)))
-        return int(value) if whole and abs(int(value)) <= _MAX_INTEGER else _REFUSED
+        return int(value) if whole and abs(int(value)) <= MAX_INTEGER else _REFUSED
     if kind is bool and given is str:
         return {"true": True, "false": False}.get(value, _REFUSED)
     if kind is Path and given is str:
@@ -318,37 +318,6 @@ def _is_number(item: Any) -> bool:
     return type(item) in (int, float, str) and is_number(item)
 
 
-def _decimal_comma(mapping: dict[Any, Any], name: Any) -> str:
-    """Return what to write for ``{velocity: 0,3}``, where YAML reads a key 3 without value."""
-    names = list(mapping)
-    place = names.index(name)
-    if type(name) is not int or mapping[name] is not None or not place:
-        return ""
-    before = names[place - 1]
-    if type(mapping[before]) is not int:
-        return ""
-    return f"a decimal comma? write {before}: {mapping[before]}.{name} "
-
-
-def spelled(place: Place) -> str:
-    """Returns a place as a path of keys, e.g. ``controller.gains.eta[1]``."""
-    text = ""
-    for step in place:
-        text += f"[{step}]" if type(step) is int and text else f".{step}" if text else f"{step}"
-    return text
-
-
-def _range(kind: Any, value: Any) -> str:
-    """What numbers a field allows, where a number was refused for its size."""
-    if isinstance(value, str):
-        beyond = bool((NUMBER if kind is float else _LONG_INTEGER).fullmatch(value))
-    else:
-        beyond = type(value) is int or (type(value) is float and value.is_integer())
-    if kind is float and beyond:
-        return f" of magnitude up to {sys.float_info.max:.2g}"
-    return f" of magnitude up to {_MAX_INTEGER}" if kind is int and beyond else ""
-
-
 def _require_no_subclasses(choices: list[Any]) -> None:
     """Raises NotImplementedError at a member of a union that is a subclass of another one.
 
@@ -359,107 +328,3 @@ def _require_no_subclasses(choices: list[Any]) -> None:
     for kind in kinds:
         if any(base is not kind and issubclass(kind, base) for base in kinds):
             raise NotImplementedError(f"{kind.__name__} is a subclass of what it stands beside")
-
-
-def _expected(kind: Any) -> str:
-    """What a field allows, in words."""
-    if kind in _SCALARS:
-        return _SCALARS[kind]
-    if kind is np.ndarray:
-        return "a list of numbers"
-    if kind is types.NoneType:
-        return "null"
-    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (typing.Union, types.UnionType):
-        return " or ".join(_alternatives(arguments))
-    if origin is list:
-        return f"a list (each item {_expected(arguments[0])})"
-    if origin in (dict, collections.abc.Mapping):
-        return f"a mapping (each value {_expected(arguments[1])})"
-    return f"a mapping with the keys {', '.join(fields_of(kind))}"
-
-
-def _alternatives(members: tuple[Any, ...]) -> list[str]:
-    """What each member of a union allows, in words."""
-    several = sum(dataclasses.is_dataclass(member) for member in members) > 1
-    return [
-        f"!{member.__name__} {{...}}"
-        if several and isinstance(member, type) and dataclasses.is_dataclass(member)
-        else _expected(member)
-        for member in members
-    ]
-
-
-def _shown(value: Any) -> str:
-    """A value as written in YAML, shortened to fit a line."""
-    if value is None:
-        return "empty (null)"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int) and abs(value) > _MAX_INTEGER:
-        return f"an integer of {value.bit_length()} bits"
-    try:
-        return shortened(repr(value))
-    except ValueError:  # an integer inside, of more digits than Python writes
-        return f"a {type(value).__name__}"
-
-
-def dump_typed(value: Any) -> str:
-    """Returns a dataclass as YAML text; :func:`pfsc_drake.yaml.typed.load_typed` undoes it."""
-    return dump_yaml(typed_data(value))
-
-
-def typed_data(value: Any) -> dict[str, Any]:
-    """Returns a dataclass as plain data, as :func:`pfsc_drake.yaml.reading.read_yaml` gives it.
-
-    Every key is there; a mapping that is a later member of a union has its tag.
-
-    Args:
-        value: Instance of a dataclass whose fields have the types that
-            :func:`pfsc_drake.yaml.typed.load_typed` names.
-
-    Raises:
-        TypeError: If a value is of none of the types that its field allows.
-    """
-    hints = typing.get_type_hints(type(value))
-    return {
-        field.name: _plain(getattr(value, field.name), hints[field.name])
-        for field in dataclasses.fields(value)
-    }
-
-
-def _plain(value: Any, schema: Any) -> Any:
-    """Returns a value of a field as scalars, lists and mappings."""
-    origin, arguments = typing.get_origin(schema), typing.get_args(schema)
-    if origin in (typing.Union, types.UnionType):
-        return _member(value, arguments)
-    if isinstance(value, OneForAll):
-        return value[0]
-    if origin is list:
-        return [_plain(item, arguments[0]) for item in value]
-    if origin is dict:
-        return {key: _plain(item, arguments[1]) for key, item in value.items()}
-    if dataclasses.is_dataclass(schema):
-        if type(value) is not schema:
-            raise TypeError(f"{type(value).__name__} where {schema} is declared")
-        return typed_data(value)
-    if schema is np.ndarray:
-        return np.asarray(value, dtype=float).tolist()
-    return str(value) if schema is Path else schema(value)
-
-
-def _member(value: Any, members: tuple[Any, ...]) -> Any:
-    """Returns a value of a union, with a tag unless it is of its first member or null."""
-    if value is None and type(None) in members:
-        return None
-    choices = [member for member in members if member is not type(None)]
-    if len(choices) == 1:
-        return _plain(value, choices[0])
-    if type(value) is int and float in choices and int not in choices:
-        return float(value)
-    if type(value) not in choices:
-        raise TypeError(f"{type(value).__name__} is none of {members}")
-    plain = _plain(value, type(value))
-    if dataclasses.is_dataclass(value) and type(value) is not choices[0]:
-        plain[TAG_KEY] = f"!{type(value).__name__}"
-    return plain

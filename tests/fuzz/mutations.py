@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 
 from diagrams.scenario import Scenario
 from experiments.scenario_file import read_scenario
+from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.reading import TAG_KEY
-from pfsc_drake.yaml.typed import load_typed, typed_data
+from pfsc_drake.yaml.typed import load_typed
 
 Place = tuple[str | int, ...]
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from pfsc_drake.yaml.dumping import dump_typed, typed_data
 from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml
-from pfsc_drake.yaml.typed import dump_typed, load_typed, typed_data
+from pfsc_drake.yaml.typed import load_typed
 
 
 @dataclass

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError, require
+from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.fields import (
     AUTO_OR_MANY,
     NUMBERS_OR_END,
@@ -20,7 +21,7 @@ from pfsc_drake.yaml.fields import (
 )
 from pfsc_drake.yaml.reading import parse_yaml
 from pfsc_drake.yaml.rules import Parameters, Range
-from pfsc_drake.yaml.typed import dump_typed, load_typed
+from pfsc_drake.yaml.typed import load_typed
 
 
 @dataclass

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from pydrake.common.yaml import yaml_load_typed
 
 from pfsc_drake import InputError
+from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.fields import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import load_file, load_typed, typed_data
+from pfsc_drake.yaml.typed import load_file, load_typed
 
 
 @dataclass

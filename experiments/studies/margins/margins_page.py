@@ -25,7 +25,8 @@ from experiments.studies.margins.words import (
     metrics_of,
     sentences,
 )
-from pfsc_drake.yaml.typed import dump_typed, load_typed
+from pfsc_drake.yaml.dumping import dump_typed
+from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import check_folder, open_results
 from reporting.metrics import Metrics
 from reporting.notebook import metrics_table

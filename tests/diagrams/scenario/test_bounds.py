@@ -12,8 +12,9 @@ import pytest
 from diagrams.scenario import Scenario
 from docs.making.scenario_keys import blocks
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.fields import fields_of, ranges_of
-from pfsc_drake.yaml.typed import load_typed, typed_data
+from pfsc_drake.yaml.typed import load_typed
 
 OWNERS = [Scenario, *blocks()]
 HOW = (

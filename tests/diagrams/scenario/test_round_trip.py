@@ -13,8 +13,9 @@ from diagrams.scenario import Scenario
 from experiments.scenario_file import read_scenario, scenario_names
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import dump_typed, load_typed
+from pfsc_drake.yaml.typed import load_typed
 
 Variant = tuple[type, str, Any]
 
