@@ -1,1 +1,1 @@
-"""What results look like: figures, pages, folders, tables and the terminal."""
+"""Figures, pages, folders, tables and the terminal."""

@@ -1,1 +1,1 @@
-"""What surrounds a robot: hands, forces, workpieces."""
+"""Environment of a robot: operators, forces, workpieces, obstacles."""

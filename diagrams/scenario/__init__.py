@@ -1,4 +1,4 @@
-"""What a scenario file says: its schema, one file per block."""
+"""Format of scenario files, one file per block."""
 
 from diagrams.scenario.holder import HeldWorkpieceParameters, HolderParameters, SolidParameters
 from diagrams.scenario.manifolds import PathParameters, SurfaceParameters

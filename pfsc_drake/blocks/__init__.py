@@ -1,1 +1,1 @@
-"""Components as blocks: ports, states, and expressions of what they put out and remember."""
+"""Components as blocks: ports, states, expressions of outputs and updates."""

@@ -1,1 +1,1 @@
-"""Controllers as C99 source, for whatever has no Python."""
+"""Controllers as C99 source."""

@@ -1,1 +1,1 @@
-"""What a controller knows: manifolds, laws, compliance, estimation."""
+"""Control without Drake: manifolds, laws, compliance, estimation."""

@@ -1,1 +1,1 @@
-"""Whole controllers, from the joint state to the drives."""
+"""One controller: tasks, options, assembly."""

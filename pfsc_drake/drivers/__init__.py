@@ -1,1 +1,1 @@
-"""What robots and controllers tell each other over LCM, as Drake's own drivers do."""
+"""Messages of robot drivers over LCM."""

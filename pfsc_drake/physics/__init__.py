@@ -1,1 +1,1 @@
-"""What a controller meets and does not know: friction, drives, sensors, hands, forces."""
+"""Simulated physics: friction, drives, sensors, operators, forces."""

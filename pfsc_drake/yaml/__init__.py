@@ -1,1 +1,1 @@
-"""Typed YAML with messages for people."""
+"""Typed YAML: rules, reader, JSON schema."""
