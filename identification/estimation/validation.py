@@ -133,14 +133,6 @@ class TruthTest:
     degrees_of_freedom: int
     p_value: float
 
-    def consistent(self, level: float = 0.01) -> bool:
-        """Return whether the errors are as large as predicted.
-
-        Args:
-            level: Probability to deny it though they are.
-        """
-        return self.p_value > level
-
 
 def compare_with_truth(estimate: Estimate, truth: np.ndarray, friction: bool = True) -> TruthTest:
     """Compare an estimate with the true parameters.
@@ -159,15 +151,20 @@ def compare_with_truth(estimate: Estimate, truth: np.ndarray, friction: bool = T
     errors = (estimate.base_parameters - checked_truth(estimate, truth))[counts]
     value = mahalanobis(errors, estimate.covariance[np.ix_(counts, counts)])
     size = len(errors)
-    below = float(chi2.cdf(value, size))
     return TruthTest(
         [names[i] for i in counts],
         errors,
         errors / estimate.standard_deviation[counts],
         value,
         size,
-        2.0 * min(below, float(chi2.sf(value, size))),
+        two_sided(value, size),
     )
+
+
+def two_sided(chi_squared: float, freedom: int) -> float:
+    """Return the probability of a chi-squared at least as far from the middle, on either side."""
+    below, above = chi2.cdf(chi_squared, freedom), chi2.sf(chi_squared, freedom)
+    return 2.0 * min(float(below), float(above))
 
 
 def mahalanobis(errors: np.ndarray, covariance: np.ndarray) -> float:

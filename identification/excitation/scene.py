@@ -136,25 +136,6 @@ class Pair:
     name: str
 
 
-@dataclass(frozen=True, eq=False)
-class Clearance:
-    """Distances along a motion.
-
-    Attributes:
-        distance: Least distance of each sample [m], shape (K,); negative where shapes overlap,
-            infinite if there is nothing to touch.
-        pair: Names of what is nearest in the worst sample; empty if there is nothing.
-    """
-
-    distance: np.ndarray
-    pair: str
-
-    @property
-    def least(self) -> float:
-        """Least distance of all [m]."""
-        return float(self.distance.min(initial=np.inf))
-
-
 class RobotScene:
     """A serial robot and its cell.
 
@@ -198,18 +179,6 @@ class RobotScene:
     def inspector(self) -> SceneGraphInspector:
         """What the scene graph knows of the shapes."""
         return self._scene.model_inspector()
-
-    def clearance(self, q: np.ndarray) -> Clearance:
-        """Return the least distances of a motion, as Drake computes them.
-
-        Args:
-            q: Joint positions [rad or m], shape (K, N).
-        """
-        table = self.distances(q)
-        if not self.pairs:
-            return Clearance(np.full(len(q), np.inf), "")
-        worst = int(np.argmin(table.min(axis=0)))
-        return Clearance(table.min(axis=1), self.pairs[worst].name)
 
     def distances(self, q: np.ndarray, numbers: np.ndarray | None = None) -> np.ndarray:
         """Return the distances of pairs [m], shape (K, n).
