@@ -1,8 +1,7 @@
 """The steps of an identification on files, as the command line has them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from identification.consistency.nearest import ConsistentParameters, refuse_far
@@ -118,33 +117,28 @@ def simulate_runs(
         progress: Receives the fraction done and what is done.
     """
     make_folder(folder)
+    experiment = (robot, subject.tool, trajectory, imperfections, folder)
     runs = len(seeds)
     if runs == 1:
-        return [_run(subject, trajectory, imperfections, folder, seeds[0], progress)]
+        return [_run(experiment, seeds[0], subject, progress)]
     progress(0.0, f"simulating {runs} runs")
-    simulate = partial(_run, trajectory=trajectory, imperfections=imperfections, folder=folder)
     files = []
     with side_by_side(None, runs) as run:
-        for file in run(_simulate, (robot, subject.tool, simulate), seeds):
+        for file in run(_run, experiment, seeds):
             files.append(file)
             progress(len(files) / runs, f"{len(files)} of {runs} runs")
     return sorted(files, key=lambda file: int(file.stem.split("_")[1]))
 
 
-def _simulate(experiment: tuple[str, bool, Callable[..., Path]], seed: int) -> Path:
-    """Simulate a run in a process of its own, which loads the robot anew."""
-    robot, tool, simulate = experiment
-    return simulate(load_subject(robot, tool=tool), seed=seed, progress=lambda _, __: None)
-
-
 def _run(
-    subject: Subject,
-    trajectory: FourierTrajectory,
-    imperfections: Imperfections | None,
-    folder: Path,
+    experiment: tuple[str, bool, FourierTrajectory, Imperfections | None, Path],
     seed: int,
-    progress: Progress,
+    subject: Subject | None = None,
+    progress: Progress | None = None,
 ) -> Path:
+    """Simulate a run, in a process of its own with the robot loaded anew."""
+    robot, tool, trajectory, imperfections, folder = experiment
+    subject = subject or load_subject(robot, tool=tool)
     measured = run_experiment(subject, trajectory, imperfections, seed=seed, progress=progress)
     file = folder / f"run_{seed}.h5"
     write_record(file, measured.record, subject)

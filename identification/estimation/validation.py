@@ -148,7 +148,16 @@ def compare_with_truth(estimate: Estimate, truth: np.ndarray, friction: bool = T
     """
     names = estimate.short_names
     counts = [i for i, name in enumerate(names) if friction or ".f_" not in name]
-    errors = (estimate.base_parameters - checked_truth(estimate, truth))[counts]
+    values = np.asarray(truth, dtype=float)
+    if values.shape != estimate.base_parameters.shape:
+        raise InputError(
+            f"{estimate.robot}: truth of shape {values.shape}; must be "
+            f"{estimate.base_parameters.shape}, base parameters as the estimate has them"
+        )
+    if not np.isfinite(values).all():
+        name = names[int(np.argmin(np.isfinite(values)))]
+        raise InputError(f"{estimate.robot}: the true {name} is not known; all must be")
+    errors = (estimate.base_parameters - values)[counts]
     value = mahalanobis(errors, estimate.covariance[np.ix_(counts, counts)])
     size = len(errors)
     return TruthTest(
@@ -173,20 +182,6 @@ def mahalanobis(errors: np.ndarray, covariance: np.ndarray) -> float:
     correlation = covariance / np.outer(deviation, deviation)
     scaled = errors / deviation
     return float(scaled @ np.linalg.solve(correlation, scaled))
-
-
-def checked_truth(estimate: Estimate, truth: np.ndarray) -> np.ndarray:
-    """Return true base parameters, or refuse those of another robot or unknown ones."""
-    values = np.asarray(truth, dtype=float)
-    if values.shape != estimate.base_parameters.shape:
-        raise InputError(
-            f"{estimate.robot}: truth of shape {values.shape}; must be "
-            f"{estimate.base_parameters.shape}, base parameters as the estimate has them"
-        )
-    if not np.isfinite(values).all():
-        name = estimate.short_names[int(np.argmin(np.isfinite(values)))]
-        raise InputError(f"{estimate.robot}: the true {name} is not known; all must be")
-    return values
 
 
 def refuse_implausible(estimate: Estimate) -> None:

@@ -82,22 +82,6 @@ class Cell(Parameters):
             raise InputError(f"tool_above = {self.tool_above}; must be a number [m]")
 
 
-def load_cell(cell: str | Path | None, robot: str | Path) -> Cell:
-    """Return the cell of a file, or that of a shipped robot.
-
-    Args:
-        cell: YAML file; None for the one shipped with the robot, or an empty one.
-        robot: Name of the robot.
-
-    Raises:
-        InputError: If the file cannot be read or does not fit; one line that names it.
-    """
-    if cell is None:
-        shipped = models_directory() / Path(robot).stem / "cell.yaml"
-        return load_file(Cell, shipped) if shipped.is_file() else Cell()
-    return load_file(Cell, cell)
-
-
 WORLD = -1  # link of what does not move
 # shapes that are near in each of so many postures are so by design
 _POSTURES = 100
@@ -287,7 +271,11 @@ def cell_of(subject: Subject, cell: Cell | str | Path | None) -> Cell:
     """
     if isinstance(cell, Cell):
         return cell
-    return load_cell(cell, subject.name if subject.block is None else subject.block.model)
+    if cell is not None:
+        return load_file(Cell, cell)
+    model = subject.name if subject.block is None else subject.block.model
+    shipped = models_directory() / Path(model).stem / "cell.yaml"
+    return load_file(Cell, shipped) if shipped.is_file() else Cell()
 
 
 def obstacle_shape(obstacle: Obstacle) -> tuple[RigidTransform, DrakeShape]:

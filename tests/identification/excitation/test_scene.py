@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.excitation.balls import cover
-from identification.excitation.scene import Cell, Obstacle, RobotScene, load_cell
+from identification.excitation.scene import Cell, Obstacle, RobotScene, cell_of
 from pfsc_drake.errors import InputError
 
 
@@ -55,4 +55,4 @@ def test_refuses(comau, delta, tmp_path):
     file = tmp_path / "cell.yaml"
     file.write_text("obstacles:\n  - {name: x, kind: pyramid}\n")
     with pytest.raises(InputError, match=r"cell\.yaml"):
-        load_cell(file, "comau_racer_1_4")
+        cell_of(comau, file)
