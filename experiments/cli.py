@@ -16,7 +16,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.command_options import grouped
 from experiments.hardware_commands import drive_command, lead_command, robot_command
 from experiments.run_commands import (
     compare_command,
@@ -34,7 +33,7 @@ from experiments.study_commands import (
     teach_command,
 )
 from reporting.provenance import version_line
-from reporting.terminal import run_app
+from reporting.terminal import grouped, run_app
 
 _COMMANDS: dict[str, Callable[..., None]] = {
     "list": list_command,

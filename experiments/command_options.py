@@ -1,14 +1,11 @@
 """Arguments and options that several commands take, by groups, and how their text is read."""
 
-import dataclasses
-import functools
 import glob
-import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -113,37 +110,6 @@ class Bus:
         str,
         typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone)."),
     ] = "panda"
-
-
-def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """Return a command with the fields of its groups as options of its own.
-
-    Args:
-        command: A function; each parameter that is a dataclass is a group.
-    """
-    groups: dict[str, type] = {}
-    options: list[inspect.Parameter] = []
-    for parameter in inspect.signature(command).parameters.values():
-        kind = parameter.annotation
-        if isinstance(kind, type) and dataclasses.is_dataclass(kind):
-            groups[parameter.name] = kind
-            options += inspect.signature(kind).parameters.values()
-        else:
-            options.append(parameter)
-
-    @functools.wraps(command)
-    def called(**values: Any) -> None:
-        for name, group in groups.items():
-            own = [field.name for field in dataclasses.fields(group)]
-            values[name] = group(**{option: values.pop(option) for option in own})
-        command(**values)
-
-    # arguments first, as they are shown
-    options.sort(key=lambda option: option.default is not option.empty)
-    flat = [option.replace(kind=option.KEYWORD_ONLY) for option in options]
-    called.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
-    called.__annotations__ = {option.name: option.annotation for option in flat}
-    return called
 
 
 def folder_or(out: Path | None, name: str) -> Path:

@@ -10,26 +10,21 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from identification.consistency.nearest import refuse_far
 from identification.consistency.writing import WrittenModel
 from identification.estimation.least_squares import Estimate
-from identification.estimation.validation import refuse_implausible
 from identification.findings import Findings
 from identification.measurement.columns import Reading
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
-from identification.options import check_folder
-from identification.pages import write_identification
-from identification.report.identification_page import torque_table
+from identification.options import Known, Shown
+from identification.output import check_folder
+from identification.pages import identify
+from identification.report.tables import torque_table
 from identification.steps import (
     MeasuredFiles,
-    bounds_of,
-    consistent_set,
-    estimate_files,
+    find_model,
     load_excitation,
     simulate_runs,
-    stored_findings,
-    write_consistent,
 )
 from pfsc_drake.errors import WriteError
 from reporting.progress import fraction_display
@@ -116,7 +111,7 @@ def simulate(
         InputError: If there is no such robot, or no motion of it.
     """
     subject, folder = _begin(robot, out, tool)
-    trajectory = load_excitation(subject, None if excitation is None else Path(excitation))
+    trajectory = load_excitation(subject, _path(excitation))
     faults = shipped_imperfections(subject.family)
     faults = faults.realistic() if realistic else faults
     with _progress("experiment", quiet) as progress:
@@ -168,18 +163,22 @@ def estimate(
     subject, folder = _begin(robot, out, tool)
     files = MeasuredFiles(
         [Path(one) for one in ([records] if isinstance(records, str | Path) else records)],
-        None if validation is None else Path(validation),
+        _path(validation),
         Reading(dict(names or {}), dict(units or {}), dict(scales or {})),
         period,
         skip,
         bandwidth,
     )
     with _progress(subject.name, quiet) as progress:
-        findings, other = estimate_files(
-            subject, files, choose=not plain, simulated=simulated, progress=progress
+        findings, report = identify(
+            subject,
+            files,
+            folder,
+            Shown(_path(bounds)),
+            plain=plain,
+            simulated=simulated,
+            progress=progress,
         )
-    known = None if bounds is None else Path(bounds)
-    report = write_identification(subject, findings, other, folder, files.paths, known, None)
     if report.problem is not None:
         raise WriteError(report.problem)
     return Identification(robot, folder, findings)
@@ -213,12 +212,7 @@ def consistent_model(
         else (Path(found), robot)
     )
     subject, folder = _begin(robot, out, tool)
-    findings = stored_findings(subject, place, None, simulated=False)
-    refuse_implausible(findings.estimate)
-    known = bounds_of(subject, None if bounds is None else Path(bounds))
-    nearest = consistent_set(findings, known, direct)
-    refuse_far(nearest, str(place))
-    return write_consistent(subject, nearest, folder)
+    return find_model(subject, place, Known(_path(bounds)), direct, folder)[1]
 
 
 def _begin(robot: str, out: str | Path, tool: bool) -> tuple[Subject, Path]:
@@ -228,6 +222,10 @@ def _begin(robot: str, out: str | Path, tool: bool) -> tuple[Subject, Path]:
     subject = load_subject(robot, tool=tool)
     check_folder(folder)
     return subject, folder
+
+
+def _path(file: str | Path | None) -> Path | None:
+    return None if file is None else Path(file)
 
 
 @contextmanager

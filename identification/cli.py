@@ -15,31 +15,27 @@ from rich.console import Console
 
 from identification.elastic.command import elastic_command
 from identification.options import (
-    Bounds,
-    Excitation,
-    Names,
-    Records,
+    Evaluation,
+    Known,
+    Measured,
+    Model,
+    Motion,
     Robot,
-    Scales,
-    Simulated,
+    Shown,
     Tool,
-    Units,
     Validation,
-    check_folder,
-    read_integer,
+    Wording,
     read_number,
     read_pairs,
-    read_range,
-    read_reading,
 )
+from identification.output import check_folder
 from reporting.progress import fraction_display
-from reporting.terminal import interruptible, run_app, show_page
+from reporting.terminal import grouped, interruptible, run_app, show_page
 
 if TYPE_CHECKING:
     from identification.model.subject import Subject
 
-# of an excitation's search, and of an experiment
-MOST_STARTS, MOST_RUNS = 1000, 1000
+MOST_RUNS = 1000  # of an experiment
 
 app = typer.Typer(
     add_completion=False,
@@ -49,19 +45,12 @@ app = typer.Typer(
 
 
 @app.command("excite")
+@grouped
 def excite_command(
     robot: Robot,
+    *,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_excitation")] = None,
-    criterion: Annotated[
-        str, typer.Option(help="D: largest determinant; condition: smallest condition number.")
-    ] = "D",
-    harmonics: Annotated[str, typer.Option(help="Of the fundamental frequency.")] = "1,3,5",
-    period: Annotated[float, typer.Option(help="Of the motion [s].")] = 10.0,
-    periods: Annotated[int, typer.Option(min=1, help="How often it is to be run.")] = 5,
-    starts: Annotated[
-        int, typer.Option(min=1, max=MOST_STARTS, help="Random motions to start from.")
-    ] = 16,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first one.")] = 0,
+    motion: Motion,
     limits: Annotated[
         list[str] | None,
         typer.Option(
@@ -76,11 +65,11 @@ def excite_command(
 ) -> None:
     """Find a motion that shows all parameters within all limits."""
     from identification.excitation.limits import chosen_limits
-    from identification.excitation.search import SearchOptions, search
-    from identification.steps import RECORDING, check_duration, save_excitation
+    from identification.excitation.search import search
+    from identification.steps import RECORDING, save_excitation
 
     with interruptible():
-        check_duration(period, periods)
+        motion.check_duration()
         console, subject, folder = _begin(robot, tool, out, "excitation")
         within = chosen_limits(
             subject,
@@ -89,11 +78,10 @@ def excite_command(
                 for name, values in read_pairs(limits, "--limit")
             },
         )
-        numbers = [read_integer(number, "--harmonics") for number in harmonics.split(",")]
+        options = motion.search_options()
         with fraction_display(console, "excitation") as progress:
-            options = SearchOptions(criterion, numbers, period, starts, seed)
             found = search(subject, options, within, cell, progress)
-        save_excitation(subject, found, folder, periods, within)
+        save_excitation(subject, found, folder, motion.periods, within)
         console.print(
             f"log det {found.information.log_determinant:.2f}, condition number "
             f"{found.information.condition_number:.0f}, {found.information.base_parameters} "
@@ -141,46 +129,43 @@ def simulate_command(
 
 
 @app.command("estimate")
+@grouped
 def estimate_command(
     robot: Robot,
-    records: Records,
-    validation: Validation = None,
+    measured: Measured,
+    *,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_identification")] = None,
-    period: Annotated[
-        float | None, typer.Option(help="Of the motion [s], if the files do not state it.")
-    ] = None,
-    skip: Annotated[int, typer.Option(min=0, help="Periods at the start to leave out.")] = 1,
-    bandwidth: Annotated[
-        float | None, typer.Option(help="Of the motion [Hz]. Default: what torques tell")
-    ] = None,
-    plain: Annotated[
-        bool, typer.Option("--plain", help="Coulomb and viscous friction only.")
-    ] = False,
-    bounds: Bounds = None,
-    excitation: Excitation = None,
-    units: Units = None,
-    names: Names = None,
-    scales: Scales = None,
-    simulated: Simulated = False,
-    tool: Tool = False,
+    evaluation: Evaluation,
+    shown: Shown,
+    wording: Wording,
+    model: Model,
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
-    from identification.pages import write_identification
-    from identification.report.identification_page import parameter_table, torque_table
-    from identification.steps import MeasuredFiles, estimate_files
+    from identification.pages import identify
+    from identification.report.tables import parameter_table, torque_table
+    from identification.steps import MeasuredFiles
     from reporting.terminal import print_table
 
     with interruptible():
-        console, subject, folder = _begin(robot, tool, out, "identification")
-        reading = read_reading(names, units, scales)
-        files = MeasuredFiles(records, validation, reading, period, skip, bandwidth)
-        with fraction_display(console, subject.name) as progress:
-            findings, other = estimate_files(
-                subject, files, choose=not plain, simulated=simulated, progress=progress
-            )
-        report = write_identification(
-            subject, findings, other, folder, files.paths, bounds, excitation
+        console, subject, folder = _begin(robot, model.tool, out, "identification")
+        files = MeasuredFiles(
+            measured.records,
+            measured.validation,
+            wording.reading(),
+            evaluation.period,
+            evaluation.skip,
+            evaluation.bandwidth,
         )
+        with fraction_display(console, subject.name) as progress:
+            findings, report = identify(
+                subject,
+                files,
+                folder,
+                shown,
+                plain=evaluation.plain,
+                simulated=model.simulated,
+                progress=progress,
+            )
         print_table(console, parameter_table(findings, words=False), most=12)
         print_table(console, torque_table(findings))
         for note in findings.notes:
@@ -189,45 +174,26 @@ def estimate_command(
 
 
 @app.command("consistent")
+@grouped
 def consistent_command(
     robot: Robot,
     identification: Annotated[
         Path, typer.Argument(help="identification.h5, or the folder that it is in.")
     ],
+    *,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_model")] = None,
-    bounds: Bounds = None,
-    total_mass: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW:HIGH",
-            help="Mass of all links [kg], of a robot of which nothing else is known.",
-        ),
-    ] = None,
-    margin: Annotated[
-        float, typer.Option(help="With it: how far bodies reach beyond their joints [m].")
-    ] = 0.1,
+    known: Known,
     direct: Annotated[
         bool, typer.Option("--direct", help="In one step from the first run's torques.")
     ] = False,
     tool: Tool = False,
 ) -> None:
     """Find the physically consistent parameters, and write parameter file, SDF and URDF."""
-    from identification.consistency.bounds import bounds_from_geometry
-    from identification.consistency.nearest import refuse_far
-    from identification.estimation.validation import refuse_implausible
-    from identification.steps import bounds_of, consistent_set, stored_findings, write_consistent
+    from identification.steps import find_model
 
     with interruptible():
         console, subject, folder = _begin(robot, tool, out, "model")
-        findings = stored_findings(subject, identification, None, simulated=False)
-        refuse_implausible(findings.estimate)
-        if total_mass is None:
-            known = bounds_of(subject, bounds)
-        else:
-            known = bounds_from_geometry(subject, read_range(total_mass, "--total-mass"), margin)
-        found = consistent_set(findings, known, direct)
-        refuse_far(found, str(identification))
-        written = write_consistent(subject, found, folder)
+        found, written = find_model(subject, identification, known, direct, folder)
         console.print(
             f"chi squared {found.chi_squared:.4g} of {len(found.base_values)} base parameters",
             highlight=False,
@@ -237,27 +203,27 @@ def consistent_command(
 
 
 @app.command("report")
+@grouped
 def report_command(
     robot: Robot,
     folder: Annotated[Path, typer.Argument(help="Folder with identification.h5.")],
+    *,
     validation: Validation = None,
-    bounds: Bounds = None,
-    excitation: Excitation = None,
-    simulated: Simulated = False,
-    tool: Tool = False,
+    shown: Shown,
+    model: Model,
     out: Annotated[Path | None, typer.Option(help="Default: FOLDER_report")] = None,
 ) -> None:
     """Write the page of an identification anew, with what else there is to see on it."""
     from identification.pages import write_stored
 
     with interruptible():
-        subject = _load(robot, tool)
+        subject = _load(robot, model.tool)
         target = out or folder.with_name(f"{folder.name}_report")
-        report = write_stored(subject, folder, validation, bounds, excitation, simulated, target)
+        report = write_stored(subject, folder, validation, shown, model.simulated, target)
         raise typer.Exit(show_page("report", report))
 
 
-app.command("elastic")(elastic_command)
+app.command("elastic")(grouped(elastic_command))
 
 
 @app.command("information")

@@ -2,24 +2,33 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from identification.consistency.bounds import PhysicalBounds
-from identification.consistency.nearest import ConsistentParameters, nearest_consistent
+from identification.consistency.nearest import (
+    ConsistentParameters,
+    estimate_consistent,
+    nearest_consistent,
+)
 from identification.estimation.choice import FrictionChoice, choose_friction
 from identification.estimation.friction_terms import FrictionTerms
 from identification.estimation.information import MeasuredMotion
 from identification.estimation.least_squares import Estimate, estimate
 from identification.estimation.repetitions import Repetitions
+from identification.estimation.results import FILE_NAME, load_estimate
 from identification.estimation.validation import (
     PredictedTorque,
     TruthTest,
     compare_with_truth,
     predict,
 )
+from identification.measurement.periods import AveragedMotion
 from identification.model.base import BaseParameters
+from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
+from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 
@@ -113,18 +122,45 @@ def true_base(found: Estimate, parameters: np.ndarray) -> np.ndarray:
     )
 
 
-def find_consistent(runs: Repetitions, bounds: PhysicalBounds) -> ConsistentParameters:
-    """Return the consistent parameters nearest to the mean of repeated runs.
+def stored_findings(
+    subject: Subject, path: Path, other: AveragedMotion | None, simulated: bool
+) -> Findings:
+    """Return the findings that ``identification.h5`` holds.
 
     Args:
-        runs: Estimates of the same parameters.
+        subject: The robot.
+        path: The file, or the folder that it is in.
+        other: A motion to predict, if any.
+        simulated: Whether the robot's model is the truth.
+
+    Raises:
+        InputError: If the file cannot be read, or is of another robot.
+    """
+    file = path / FILE_NAME if path.is_dir() else path
+    runs = load_estimate(file)
+    first = runs.estimates[0]
+    if first.robot != subject.name:
+        raise InputError(f"{file}: of {first.robot}; must be of {subject.name}")
+    prediction = None if other is None else predict(first, Regressor(subject), other)
+    truth = true_base(first, true_parameters(subject)) if simulated else None
+    return Findings(runs, None, prediction, truth)
+
+
+def consistent_set(
+    findings: Findings, bounds: PhysicalBounds, direct: bool
+) -> ConsistentParameters:
+    """Return the consistent set of what was found.
+
+    Args:
+        findings: Base parameters.
         bounds: What is known of the bodies.
+        direct: Whether in one step from the first motion, in place of the mean of the runs.
 
     Raises:
         InputError: If no bodies within the bounds have the estimated parameters.
     """
-    first = runs.estimates[0]
-    robot = first.robot_base
+    if direct:
+        return estimate_consistent(findings.estimate, bounds)
+    runs, robot = findings.runs, findings.estimate.robot_base
     own = slice(0, robot.rank)
-    covariance = runs.covariance_of_mean[own, own]
-    return nearest_consistent(robot, runs.mean[own], covariance, bounds)
+    return nearest_consistent(robot, runs.mean[own], runs.covariance_of_mean[own, own], bounds)

@@ -1,68 +1,65 @@
 """Pages of an identification in folders."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from identification.consistency.bounds import PhysicalBounds
+from identification.consistency.bounds import PhysicalBounds, bounds_of
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.recording import record_excitation
 from identification.excitation.scene import cell_of
-from identification.findings import Findings
+from identification.findings import Findings, consistent_set, stored_findings
 from identification.measurement.experiment import prepare_motion
 from identification.measurement.files import read_record
 from identification.measurement.periods import AveragedMotion, friction_trend
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
+from identification.options import Shown
 from identification.report.identification_page import PageContent, write_page
-from identification.steps import RECORDING, bounds_of, consistent_set, stored_findings
+from identification.steps import RECORDING, MeasuredFiles, estimate_files
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
 from reporting.folder import ResultsFolder, open_results
 from reporting.page import Report
 
 
-def write_identification(
+def identify(
     subject: Subject,
-    findings: Findings,
-    other: AveragedMotion | None,
+    files: MeasuredFiles,
     folder: Path,
-    inputs: Sequence[Path],
-    bounds: Path | None,
-    excitation: Path | None,
-) -> Report:
-    """Write ``identification.h5`` and a page.
+    shown: Shown,
+    *,
+    plain: bool,
+    simulated: bool,
+    progress: Progress,
+) -> tuple[Findings, Report]:
+    """Estimate base parameters from files, and write ``identification.h5`` and a page.
 
     Args:
         subject: The robot.
-        findings: What was estimated.
-        other: Motion that was not used.
+        files: Files with measured motions.
         folder: Where.
-        inputs: Files that it is from.
-        bounds: What is known of the links; None for what is shipped, if anything.
-        excitation: Coefficients of the motion, to see the robot move.
+        shown: What the page shows beside the estimate.
+        plain: Whether there is Coulomb and viscous friction only.
+        simulated: Whether the robot's model is the truth.
+        progress: Receives the fraction done and what is done.
     """
-    with open_results(folder, "identification", inputs) as results:
+    findings, other = estimate_files(
+        subject, files, choose=not plain, simulated=simulated, progress=progress
+    )
+    with open_results(folder, "identification", files.paths) as results:
         save_estimate(folder / FILE_NAME, findings.estimate, findings.runs)
-        content = PageContent(
-            subject,
-            findings,
-            other_t=None if other is None else other.t,
-            consistent=_consistent(subject, findings, bounds),
-            recording=_recording(subject, excitation, results),
-            warnings=_warnings(findings),
-        )
-        return write_page(results, content)
+        warnings = _warnings(findings)
+        return findings, _write(results, subject, findings, other, shown, warnings)
 
 
 def write_stored(
     subject: Subject,
     source: Path,
     validation: Path | None,
-    bounds: Path | None,
-    excitation: Path | None,
+    shown: Shown,
     simulated: bool,
     folder: Path,
 ) -> Report:
@@ -72,8 +69,7 @@ def write_stored(
         subject: The robot.
         source: Folder with ``identification.h5``, or the file.
         validation: Record of a motion that was not used.
-        bounds: What is known of the links; None for what is shipped, if anything.
-        excitation: Coefficients of the motion, to see the robot move.
+        shown: What the page shows beside the estimate.
         simulated: Whether the robot's model is the truth.
         folder: Where to write.
     """
@@ -82,14 +78,26 @@ def write_stored(
         other = prepare_motion(read_record(validation, subject), Regressor(subject))
     findings = stored_findings(subject, source, other, simulated)
     with open_results(folder, "identification") as results:
-        content = PageContent(
-            subject,
-            findings,
-            other_t=None if other is None else other.t,
-            consistent=_consistent(subject, findings, bounds),
-            recording=_recording(subject, excitation, results),
-        )
-        return write_page(results, content)
+        return _write(results, subject, findings, other, shown, [])
+
+
+def _write(
+    results: ResultsFolder,
+    subject: Subject,
+    findings: Findings,
+    other: AveragedMotion | None,
+    shown: Shown,
+    warnings: list[str],
+) -> Report:
+    content = PageContent(
+        subject,
+        findings,
+        other_t=None if other is None else other.t,
+        consistent=_consistent(subject, findings, shown.bounds),
+        recording=_recording(subject, shown.excitation, results),
+        warnings=warnings,
+    )
+    return write_page(results, content)
 
 
 def _recording(subject: Subject, file: Path | None, results: ResultsFolder) -> str | None:

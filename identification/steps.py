@@ -1,16 +1,13 @@
 """The steps of an identification on files, as the command line has them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
-from identification.consistency.bounds import PhysicalBounds, load_bounds
-from identification.consistency.nearest import ConsistentParameters, estimate_consistent
+from identification.consistency.nearest import ConsistentParameters, refuse_far
 from identification.consistency.writing import WrittenModel, write_model
 from identification.estimation.residuals import choose_bandwidth
-from identification.estimation.results import FILE_NAME, load_estimate
-from identification.estimation.validation import predict, refuse_implausible
+from identification.estimation.validation import refuse_implausible
 from identification.estimation.wiring import unchecked
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import JointLimits
@@ -18,7 +15,12 @@ from identification.excitation.recording import record_excitation
 from identification.excitation.run_in import rest_to_rest
 from identification.excitation.scene import cell_of
 from identification.excitation.search import SearchResult
-from identification.findings import Findings, find_consistent, find_parameters, true_base
+from identification.findings import (
+    Findings,
+    consistent_set,
+    find_parameters,
+    stored_findings,
+)
 from identification.measurement.columns import Reading
 from identification.measurement.experiment import prepare_motion, run_experiment
 from identification.measurement.files import read_record, write_record
@@ -28,7 +30,8 @@ from identification.model.base import BaseParameters, base_parameters
 from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
-from identification.options import make_folder
+from identification.options import Known
+from identification.output import make_folder
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.models.files import models_directory
@@ -36,7 +39,6 @@ from reporting.processes import side_by_side
 
 EXCITATION, RUN, RECORDING = "excitation.yaml", "excitation.csv", "excitation.html"
 _RATE = 1000.0  # Hz, of the motion for a robot's controller
-LONGEST_RUN = 3600.0  # s, of an excitation with all its periods
 
 
 def save_excitation(
@@ -64,23 +66,6 @@ def save_excitation(
     )
     run.export_csv(folder / RUN, _RATE, list(subject.joint_units))
     return record_excitation(subject, trajectory, folder / RECORDING, cell_of(subject, None))
-
-
-def check_duration(period: float, periods: int) -> None:
-    """Refuse a run that is longer than anybody lets a robot move.
-
-    Args:
-        period: Period of the motion [s].
-        periods: How often it is run.
-
-    Raises:
-        InputError: If it is longer than LONGEST_RUN.
-    """
-    if not period * periods <= LONGEST_RUN:
-        raise InputError(
-            f"--periods {periods} of {period:g} s: {period * periods:.4g} s; allowed: a run of up "
-            f"to {LONGEST_RUN:g} s"
-        )
 
 
 def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
@@ -132,33 +117,28 @@ def simulate_runs(
         progress: Receives the fraction done and what is done.
     """
     make_folder(folder)
+    experiment = (robot, subject.tool, trajectory, imperfections, folder)
     runs = len(seeds)
     if runs == 1:
-        return [_run(subject, trajectory, imperfections, folder, seeds[0], progress)]
+        return [_run(experiment, seeds[0], subject, progress)]
     progress(0.0, f"simulating {runs} runs")
-    simulate = partial(_run, trajectory=trajectory, imperfections=imperfections, folder=folder)
     files = []
     with side_by_side(None, runs) as run:
-        for file in run(_simulate, (robot, subject.tool, simulate), seeds):
+        for file in run(_run, experiment, seeds):
             files.append(file)
             progress(len(files) / runs, f"{len(files)} of {runs} runs")
     return sorted(files, key=lambda file: int(file.stem.split("_")[1]))
 
 
-def _simulate(experiment: tuple[str, bool, Callable[..., Path]], seed: int) -> Path:
-    """Simulate a run in a process of its own, which loads the robot anew."""
-    robot, tool, simulate = experiment
-    return simulate(load_subject(robot, tool=tool), seed=seed, progress=lambda _, __: None)
-
-
 def _run(
-    subject: Subject,
-    trajectory: FourierTrajectory,
-    imperfections: Imperfections | None,
-    folder: Path,
+    experiment: tuple[str, bool, FourierTrajectory, Imperfections | None, Path],
     seed: int,
-    progress: Progress,
+    subject: Subject | None = None,
+    progress: Progress | None = None,
 ) -> Path:
+    """Simulate a run, in a process of its own with the robot loaded anew."""
+    robot, tool, trajectory, imperfections, folder = experiment
+    subject = subject or load_subject(robot, tool=tool)
     measured = run_experiment(subject, trajectory, imperfections, seed=seed, progress=progress)
     file = folder / f"run_{seed}.h5"
     write_record(file, measured.record, subject)
@@ -263,60 +243,26 @@ def estimate_files(
     return replace(findings, notes=tuple(notes)), other
 
 
-def stored_findings(
-    subject: Subject, path: Path, other: AveragedMotion | None, simulated: bool
-) -> Findings:
-    """Return the findings that ``identification.h5`` holds.
+def find_model(
+    subject: Subject, source: Path, known: Known, direct: bool, folder: Path
+) -> tuple[ConsistentParameters, WrittenModel]:
+    """Find the consistent set of a stored identification, and write its model.
 
     Args:
         subject: The robot.
-        path: The file, or the folder that it is in.
-        other: A motion to predict, if any.
-        simulated: Whether the robot's model is the truth.
+        source: ``identification.h5``, or the folder that it is in.
+        known: What is known of the links.
+        direct: Whether in one step from the first run's torques.
+        folder: Where to write.
 
     Raises:
-        InputError: If the file cannot be read, or is of another robot.
+        InputError: If nothing is known of the links, or what was estimated is far from any robot.
     """
-    file = path / FILE_NAME if path.is_dir() else path
-    runs = load_estimate(file)
-    first = runs.estimates[0]
-    if first.robot != subject.name:
-        raise InputError(f"{file}: of {first.robot}; must be of {subject.name}")
-    prediction = None if other is None else predict(first, Regressor(subject), other)
-    truth = true_base(first, true_parameters(subject)) if simulated else None
-    return Findings(runs, None, prediction, truth)
-
-
-def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
-    """Return what is known of a robot's bodies: of a file, else what is shipped.
-
-    Raises:
-        InputError: If there is neither, or the file cannot be read.
-    """
-    if file is not None:
-        return load_bounds(file)
-    try:
-        return load_bounds(subject.family)
-    except InputError:
-        raise InputError(
-            f"{subject.name}: nothing is known of its links; write --bounds FILE, or of a chain "
-            "--total-mass LOW:HIGH [kg]"
-        ) from None
-
-
-def consistent_set(
-    findings: Findings, bounds: PhysicalBounds, direct: bool
-) -> ConsistentParameters:
-    """Return the consistent set of what was found.
-
-    Args:
-        findings: Base parameters.
-        bounds: What is known of the bodies.
-        direct: Whether in one step from the first motion, in place of the mean of the runs.
-    """
-    if direct:
-        return estimate_consistent(findings.estimate, bounds)
-    return find_consistent(findings.runs, bounds)
+    findings = stored_findings(subject, source, None, simulated=False)
+    refuse_implausible(findings.estimate)
+    found = consistent_set(findings, known.read(subject), direct)
+    refuse_far(found, str(source))
+    return found, write_consistent(subject, found, folder)
 
 
 def write_consistent(subject: Subject, found: ConsistentParameters, folder: Path) -> WrittenModel:

@@ -1,12 +1,15 @@
-"""What is written on the terminal: text, errors of one line, tables; the status at the end."""
+"""Commands and what they write: options by groups, errors of one line, tables, exit status."""
 
 import codecs
+import dataclasses
+import functools
+import inspect
 import io
 import re
 import sys
 import unicodedata
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -119,6 +122,37 @@ def print_table(console: "Console", table: "Table", most: int | None = None) -> 
 WRONG_INPUT = 2
 FAULT = 3
 NOT_WRITTEN = 4
+
+
+def grouped(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command with the fields of its groups as options of its own.
+
+    Args:
+        command: A function; each parameter that is a dataclass is a group.
+    """
+    groups: dict[str, type] = {}
+    options: list[inspect.Parameter] = []
+    for parameter in inspect.signature(command).parameters.values():
+        kind = parameter.annotation
+        if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+            groups[parameter.name] = kind
+            options += inspect.signature(kind).parameters.values()
+        else:
+            options.append(parameter)
+
+    @functools.wraps(command)
+    def called(**values: Any) -> None:
+        for name, group in groups.items():
+            own = [field.name for field in dataclasses.fields(group)]
+            values[name] = group(**{option: values.pop(option) for option in own})
+        command(**values)
+
+    # arguments first, as they are shown
+    options.sort(key=lambda option: option.default is not option.empty)
+    flat = [option.replace(kind=option.KEYWORD_ONLY) for option in options]
+    called.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
+    called.__annotations__ = {option.name: option.annotation for option in flat}
+    return called
 
 
 def run_app(app: typer.Typer, program: str, arguments: Sequence[str] | None = None) -> int:

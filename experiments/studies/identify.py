@@ -11,12 +11,13 @@ from matplotlib.figure import Figure as Canvas
 from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import RunRow
+from identification.consistency.bounds import bounds_of
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import JointLimits, chosen_limits
 from identification.excitation.search import SearchOptions, search
-from identification.findings import Findings
+from identification.findings import Findings, consistent_set
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
 from identification.report.identification_page import PageContent, write_page
@@ -24,8 +25,6 @@ from identification.steps import (
     EXCITATION,
     RECORDING,
     MeasuredFiles,
-    bounds_of,
-    consistent_set,
     estimate_files,
     save_excitation,
     simulate_runs,

@@ -142,6 +142,23 @@ def load_bounds(robot: str | Path) -> PhysicalBounds:
     return load_file(PhysicalBounds, shipped_or_own(robot, FILE_NAME))
 
 
+def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
+    """Return what is known of a robot's bodies: of a file, else what is shipped.
+
+    Raises:
+        InputError: If there is neither, or the file cannot be read.
+    """
+    if file is not None:
+        return load_bounds(file)
+    try:
+        return load_bounds(subject.family)
+    except InputError:
+        raise InputError(
+            f"{subject.name}: nothing is known of its links; write --bounds FILE, or of a chain "
+            "--total-mass LOW:HIGH [kg]"
+        ) from None
+
+
 def bounds_from_geometry(
     subject: Subject, total_mass: tuple[float, float], margin: float
 ) -> PhysicalBounds:
@@ -191,19 +208,8 @@ _TERMS = np.array(linear_terms())
 _MASS, _FIRST_MOMENT = (LINK_PARAMETERS.index(name) for name in ("m", "mx"))
 
 
-@dataclass(frozen=True, eq=False)
-class Intervals:
-    """``lower <= G rho <= upper``, where ends may be infinite or equal.
-
-    Attributes:
-        G: Shape (k, n).
-        lower: Shape (k,).
-        upper: Shape (k,).
-    """
-
-    G: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+# G, lower, upper of ``lower <= G rho <= upper``, (k, n), (k,), (k,); ends may be infinite or equal
+Intervals = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def extended(link: LinkBounds) -> np.ndarray:
@@ -240,7 +246,7 @@ def link_intervals(link: LinkBounds) -> Intervals:
         rows += [*inside]
     lower, upper = np.zeros(len(rows)), np.full(len(rows), np.inf)
     lower[0], upper[0] = link.mass
-    return Intervals(np.array(rows), lower, upper)
+    return np.array(rows), lower, upper
 
 
 def other_intervals(layout: Layout, bounds: PhysicalBounds) -> Intervals:
@@ -267,7 +273,7 @@ def other_intervals(layout: Layout, bounds: PhysicalBounds) -> Intervals:
         if delta.equal_slides:
             rows += [(row - slides[0], [0.0, 0.0]) for row in slides[1:]]
     ends = np.array([interval for _, interval in rows]).reshape(-1, 2)
-    return Intervals(np.array([row for row, _ in rows]).reshape(-1, layout.size), *ends.T)
+    return np.array([row for row, _ in rows]).reshape(-1, layout.size), *ends.T
 
 
 def check_bounds(layout: Layout, bounds: PhysicalBounds) -> None:

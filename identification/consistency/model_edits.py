@@ -18,6 +18,7 @@ from identification.consistency.parameter_files import (
     layout_of,
     link_faults,
     links_without_tool,
+    tool_parameters,
 )
 from identification.model.dynamic_parameters import link_parameters, moved, true_parameters
 from identification.model.subject import Subject
@@ -80,9 +81,7 @@ def urdf_text(subject: Subject, parameters: np.ndarray) -> str:
     if robot is not None:
         tool = robot.tool
         X_LB = _pose(*flange(chain, tool))
-        center = tool.center_of_mass
-        around = tool.mass * (center @ center * np.eye(3) - np.outer(center, center))
-        _body(model, tool.name, link_parameters(tool.mass, center, tool.inertia_matrix() + around))
+        _body(model, tool.name, tool_parameters(tool))
         _weld(model, tip, tool.name, X_LB)
         tip, X_LT = tool.name, X_LB.inverse() @ X_LT
     frame = "tool_point" if subject.block is None else subject.block.tool_frame.split("::")[-1]

@@ -199,11 +199,19 @@ def links_without_tool(subject: Subject, parameters: np.ndarray) -> np.ndarray:
     layout, robot, chain = layout_of(subject, parameters), subject.parameters, subject.chain
     links = layout.check("parameters", parameters)[layout.links]
     if robot is not None and chain is not None and subject.tool:
-        tool, center = robot.tool, robot.tool.center_of_mass
-        around = tool.mass * (center @ center * np.eye(3) - np.outer(center, center))
-        own = link_parameters(tool.mass, center, tool.inertia_matrix() + around)
-        links[-1] -= moved(own, *flange(chain, tool))
+        links[-1] -= moved(tool_parameters(robot.tool), *flange(chain, robot.tool))
     return links
+
+
+def tool_parameters(tool: ToolParameters) -> np.ndarray:
+    """Return the ten parameters of a tool in its own frame, shape (10,).
+
+    Args:
+        tool: As the robot's file has it.
+    """
+    center = tool.center_of_mass
+    around = tool.mass * (center @ center * np.eye(3) - np.outer(center, center))
+    return link_parameters(tool.mass, center, tool.inertia_matrix() + around)
 
 
 def flange(chain: SerialChain, tool: ToolParameters) -> tuple[np.ndarray, np.ndarray]:

@@ -213,10 +213,11 @@ def _add(
     z: np.ndarray,
 ) -> None:
     """Add intervals of ``rho = S (start + z)``."""
-    G = intervals.G @ S
+    rows, least, most = intervals
+    G = rows @ S
     sizes = np.abs(G).max(axis=1)
     offset = G @ start
-    lower, upper = (intervals.lower - offset) / sizes, (intervals.upper - offset) / sizes
+    lower, upper = (least - offset) / sizes, (most - offset) / sizes
     program.AddLinearConstraint(G / sizes[:, None], lower, upper, z)
 
 

@@ -14,7 +14,7 @@ from identification.consistency.parameter_files import (
     require_consistent,
 )
 from identification.model.subject import Subject
-from identification.options import make_folder, write_text
+from identification.output import make_folder, write_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.visuals import Appearance
 from pfsc_drake.robot.models.writer import write_sdf

@@ -11,16 +11,8 @@ import typer
 from rich.console import Console
 
 from identification.elastic.estimate import JointEstimate
-from identification.options import (
-    Names,
-    Robot,
-    Scales,
-    Units,
-    check_folder,
-    read_number,
-    read_reading,
-    write_text,
-)
+from identification.options import Robot, Wording, read_number
+from identification.output import check_folder, make_folder, write_text
 from reporting.page import Table
 from reporting.progress import fraction_display
 from reporting.terminal import interruptible
@@ -28,6 +20,7 @@ from reporting.terminal import interruptible
 
 def elastic_command(
     robot: Robot,
+    *,
     record: Annotated[
         Path | None,
         typer.Argument(
@@ -48,18 +41,14 @@ def elastic_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_elastic")] = None,
     seed: Annotated[int, typer.Option(help="Of a simulated experiment.")] = 1,
-    units: Units = None,
-    names: Names = None,
-    scales: Scales = None,
+    wording: Wording,
 ) -> None:
     """Estimate the elastic joints of a robot from signals of motors and links."""
-    from identification.elastic.command import joint_table, write_table
     from identification.elastic.estimate import estimate_joints
     from identification.elastic.experiment import simulate_excited, simulate_locked
     from identification.measurement.files import read_record, write_record
     from identification.measurement.imperfections import shipped_imperfections
     from identification.model.subject import load_subject
-    from identification.options import make_folder
     from identification.steps import load_excitation
     from reporting.terminal import print_table
 
@@ -69,9 +58,8 @@ def elastic_command(
             console.print(f"[yellow]note:[/] {subject.note}", soft_wrap=True, highlight=False)
         folder = out or Path("out") / f"{subject.name}_elastic"
         check_folder(folder)
-        reading = read_reading(names, units, scales)
         if record is not None:
-            measured = read_record(record, subject, None, reading, still=locked)
+            measured = read_record(record, subject, None, wording.reading(), still=locked)
             make_folder(folder)
         else:
             make_folder(folder)

@@ -41,7 +41,6 @@ class JointEstimate:
     Attributes:
         name: Name of the joint.
         unit: ``rad`` or ``m``.
-        locked: Whether the link was.
         values: Values of ``parameters``, shape (n,).
         covariance: Covariance of ``values``, shape (n, n).
         parameters: Which were estimated: ``stiffness`` [Nm/rad (N/m)], ``damping``
@@ -55,7 +54,6 @@ class JointEstimate:
 
     name: str
     unit: str
-    locked: bool
     values: np.ndarray
     covariance: np.ndarray
     parameters: tuple[str, ...]
@@ -224,7 +222,6 @@ def estimate_joint(
     estimate = JointEstimate(
         signals.name,
         signals.unit,
-        locked,
         values,
         covariance,
         equation.parameters,

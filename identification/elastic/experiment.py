@@ -1,17 +1,15 @@
 """Experiments with the motors and links of a simulated elastic robot, as Drake diagrams."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.controllers import PidController
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import LinearSystem, MatrixGain, Multiplexer
 
 from diagrams.signal_log import SignalLog, add_log
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.run_in import rest_to_rest
+from identification.excitation.run_in import run_of
 from identification.measurement.experiment import check_effort
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.record import Record
@@ -24,30 +22,18 @@ from identification.measurement.servo import (
     friction_torques,
     rigid_torques,
 )
-from identification.measurement.station import add_feed_forward
+from identification.measurement.station import (
+    SetState,
+    add_feed_forward,
+    add_friction,
+    simulate_diagram,
+)
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.physics.friction import bristles_for_step
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount
-from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
-
-
-@dataclass(frozen=True, eq=False)
-class Multisine:
-    """``tau_i = sum_m A_im sin(2 pi f_im t + p_im)`` for N joints and M lines each.
-
-    Attributes:
-        amplitude: [Nm or N], shape (N, M).
-        frequency: [Hz], shape (N, M).
-        phase: [rad], shape (N, M).
-    """
-
-    amplitude: np.ndarray
-    frequency: np.ndarray
-    phase: np.ndarray
 
 
 def zippered_multisine(
@@ -56,7 +42,7 @@ def zippered_multisine(
     random: np.random.Generator,
     lowest: float = 4.0,
     highest: float = 90.0,
-) -> Multisine:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return sines of equal size whose frequencies the joints take in turns.
 
     No frequency belongs to two joints, so that what moves at one is by the drive of one joint.
@@ -67,6 +53,10 @@ def zippered_multisine(
         random: Generator of the phases.
         lowest: Frequency [Hz].
         highest: Frequency [Hz].
+
+    Returns:
+        A [Nm or N], f [Hz] and p [rad] of ``tau_i = sum_m A_im sin(2 pi f_im t + p_im)``, each
+        (N, M) for N joints and M lines each.
 
     Raises:
         InputError: If a value is not positive, or the frequencies are too few for the joints.
@@ -88,7 +78,7 @@ def zippered_multisine(
         )
     frequency = lines[: each * size.size].reshape(each, size.size).T
     amplitude = np.repeat((size * np.sqrt(2.0 / each))[:, None], each, axis=1)
-    return Multisine(amplitude, frequency, random.uniform(0.0, 2.0 * np.pi, frequency.shape))
+    return amplitude, frequency, random.uniform(0.0, 2.0 * np.pi, frequency.shape)
 
 
 RATE = 1000.0  # samples per second
@@ -96,8 +86,6 @@ _STEP = 0.25e-3  # s, of the integration
 _CHUNK = 0.25  # s, after which progress is told
 # RMS of what shakes locked joints, well above friction, and moving ones, of the largest torque
 _LOCKED, _MOVING = 0.2, 0.05
-
-SetState = Callable[[Context], None]
 
 
 def simulate_locked(
@@ -137,8 +125,8 @@ def simulate_locked(
     plant = builder.AddNamedSystem("motors", inputs)
     state = plant.get_output_port()
     size = share * subject.effort_limit
-    drive = _add_multisine(builder, zippered_multisine(size, duration, random))
-    resistance = _add_friction(builder, chain, coulomb, viscous, state, np.eye(2 * n)[n:])
+    drive = _add_multisine(builder, size, duration, random)
+    resistance = add_friction(builder, (coulomb, viscous), chain.D_M, _STEP, state)
     both = builder.AddNamedSystem("torques", Multiplexer([n, n]))
     builder.Connect(drive, both.get_input_port(0))
     builder.Connect(resistance, both.get_input_port(1))
@@ -178,13 +166,7 @@ def simulate_excited(
     """
     chain, coulomb, viscous = _elastic(subject, faults)
     servo, n, random = Servo(), subject.dimension, np.random.default_rng(seed)
-    if trajectory.dimension != n:
-        raise InputError(
-            f"excitation: of {trajectory.dimension} joints; {subject.name} has {n} joints"
-        )
-    run = rest_to_rest(
-        trajectory, subject.velocity_limit, subject.acceleration_limit, periods=periods, rate=RATE
-    )
+    run = run_of(subject, trajectory, periods, RATE)
     t, q, v, a = run.sample(RATE)
     rigid = rigid_torques(subject, q, v, a)
     check_effort(subject, rigid + friction_torques(v, coulomb, viscous))
@@ -200,14 +182,13 @@ def simulate_excited(
     reference = add_curves(builder, "reference", t, np.hstack([q, v]))
     builder.Connect(reference, control.get_input_port_desired_state())
     known = add_feed_forward(builder, servo, t, v, rigid, (coulomb, viscous))
-    shaking = _add_multisine(
-        builder, zippered_multisine(_MOVING * subject.effort_limit, trajectory.period, random)
-    )
+    shaking = _add_multisine(builder, _MOVING * subject.effort_limit, trajectory.period, random)
     drive = add_sum(builder, "servo_torque", control.get_output_port_control(), known)
     drive = add_sum(builder, "drive_torque", drive, shaking)
     builder.Connect(drive, plant.GetInputPort("drive_torque"))
-    velocity = np.eye(2 * n)[n:]
-    resistance = _add_friction(builder, chain, coulomb, viscous, motor.get_output_port(), velocity)
+    resistance = add_friction(
+        builder, (coulomb, viscous), chain.D_M, _STEP, motor.get_output_port()
+    )
     builder.Connect(resistance, plant.GetInputPort("resistance"))
     log = add_log(builder, {"state": joint_state, "torque": drive}, 1.0 / RATE)
     # motors at rest on the excitation, links where they hang
@@ -241,25 +222,11 @@ def _elastic(subject: Subject, faults: Imperfections) -> tuple[SerialChain, np.n
     return chain, subject.coulomb, subject.viscous
 
 
-def _add_multisine(builder: DiagramBuilder, sines: Multisine) -> OutputPort:
-    omega = 2.0 * np.pi * sines.frequency
-    return add_sines(builder, "shaking", sines.amplitude, omega, sines.phase)
-
-
-def _add_friction(
-    builder: DiagramBuilder,
-    chain: SerialChain,
-    coulomb: np.ndarray,
-    viscous: np.ndarray,
-    state: OutputPort,
-    rows: np.ndarray,
+def _add_multisine(
+    builder: DiagramBuilder, rms: np.ndarray, period: float, random: np.random.Generator
 ) -> OutputPort:
-    bristles = bristles_for_step(coulomb, viscous, chain.D_M, _STEP)
-    friction = builder.AddNamedSystem("friction", JointFriction(bristles))
-    velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(rows))
-    builder.Connect(state, velocity.get_input_port())
-    builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
-    return friction.GetOutputPort("resistance")
+    amplitude, frequency, phase = zippered_multisine(rms, period, random)
+    return add_sines(builder, "shaking", amplitude, 2.0 * np.pi * frequency, phase)
 
 
 def _simulate(
@@ -270,20 +237,16 @@ def _simulate(
     progress: Progress | None,
 ) -> dict[str, np.ndarray]:
     """Return the logged signals."""
-    simulator = Simulator(diagram)
-    config = SimulatorConfig(
-        integration_scheme="runge_kutta3", max_step_size=_STEP, use_error_control=False
-    )
-    ApplySimulatorConfig(config, simulator)
-    root = simulator.get_mutable_context()
-    set_state(root)
-    simulator.Initialize()
-    ends = np.append(np.arange(_CHUNK, duration, _CHUNK), duration)
-    for end in ends:
-        simulator.AdvanceTo(end)
-        if progress is not None:
-            progress(end / duration, "simulating the elastic joints")
-    return log.read(root)[1]
+    ends = np.append(np.arange(_CHUNK, duration, _CHUNK), duration).tolist()
+    tell = progress or (lambda fraction, phase: None)
+    return simulate_diagram(
+        diagram,
+        log,
+        set_state,
+        _STEP,
+        ends,
+        lambda fraction: tell(fraction, "simulating the elastic joints"),
+    )[1]
 
 
 def _measured(

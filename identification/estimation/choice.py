@@ -33,7 +33,6 @@ from identification.estimation.least_squares import estimate
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.progress import Progress
 
 # sections of the motion that terms are judged on; errors that go together are shorter than one
 _SECTIONS = 40
@@ -91,7 +90,6 @@ def choose_friction(
     motion: MeasuredMotion,
     other: MeasuredMotion,
     kinds: Sequence[str] = KINDS,
-    progress: Progress | None = None,
 ) -> FrictionChoice:
     """Return the friction terms that predict a motion better that was not used.
 
@@ -101,7 +99,6 @@ def choose_friction(
         motion: That parameters are estimated on.
         other: That they are judged on, another trajectory; need not excite all parameters.
         kinds: Candidates for each joint, at least one.
-        progress: Told the fraction done and what is done.
 
     Raises:
         InputError: If the regressor is without friction, there is no kind or an unknown one, a
@@ -136,8 +133,7 @@ def choose_friction(
     data = [
         FurtherColumns(system, v) for system, v in zip(systems, (motion.v, other.v), strict=True)
     ]
-    search = _Search(data[0], data[1], candidates, deviations)
-    return search.run(progress or (lambda _fraction, _what: None))
+    return _Search(data[0], data[1], candidates, deviations).run()
 
 
 class _Search:
@@ -163,12 +159,11 @@ class _Search:
         ]
         self._errors = lru_cache(maxsize=_REMEMBERED)(self._errors_of)
 
-    def run(self, progress: Callable[[float, str], None]) -> FrictionChoice:
+    def run(self) -> FrictionChoice:
         """Return the choice."""
         model = FrictionTerms()
         refused: set[str] = set()  # once only, so that the search ends
         while True:
-            progress(len(model.terms) / len(self._candidates), "choosing friction terms")
             judged = [
                 self._judge_added(model, term) for term in self._candidates if not model.has(term)
             ]

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
+from identification.measurement.periods import AveragedMotion
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
@@ -18,35 +19,30 @@ SLOW = 0.03
 _STILL = 1e-3
 
 
-class MeasuredMotion(Protocol):
-    """A motion of N joints at K instants, as of Sec. 2.5.2, and its torques.
+@dataclass(frozen=True, eq=False)
+class StoredMotion:
+    """A motion of N joints at K instants, as of Sec. 2.5.2, and its torques, without its periods.
 
-    :class:`~identification.measurement.periods.AveragedMotion` is one.
+    Attributes:
+        q: Positions [rad or m], shape (K, N).
+        v: Velocities [rad/s or m/s], shape (K, N).
+        a: Accelerations [rad/s^2 or m/s^2], shape (K, N).
+        tau: Torques [Nm or N], shape (K, N).
+        torque_variance: Variance of one torque as measured, shape (N,).
+        mean_torque_variance: Variance of ``tau``, shape (N,); smaller if it is a mean.
+        t: Times [s], shape (K,); None if unknown.
     """
 
-    @property
-    def q(self) -> np.ndarray:
-        """Positions [rad or m], shape (K, N)."""
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+    torque_variance: np.ndarray
+    mean_torque_variance: np.ndarray
+    t: np.ndarray | None = None
 
-    @property
-    def v(self) -> np.ndarray:
-        """Velocities [rad/s or m/s], shape (K, N)."""
 
-    @property
-    def a(self) -> np.ndarray:
-        """Accelerations [rad/s^2 or m/s^2], shape (K, N)."""
-
-    @property
-    def tau(self) -> np.ndarray:
-        """Torques [Nm or N], shape (K, N)."""
-
-    @property
-    def torque_variance(self) -> np.ndarray:
-        """Variance of one torque as measured, shape (N,)."""
-
-    @property
-    def mean_torque_variance(self) -> np.ndarray:
-        """Variance of ``tau``, shape (N,); smaller if it is a mean."""
+MeasuredMotion = StoredMotion | AveragedMotion
 
 
 @dataclass(frozen=True, eq=False)

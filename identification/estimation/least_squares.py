@@ -25,21 +25,7 @@ _BANDS = (1, 11, 41, 161, 641)
 _ERROR = 1e-5
 
 
-@dataclass(frozen=True, eq=False)
-class NoiseSpectrum:
-    """Noise of the torques of N joints in K instants of a period.
-
-    Attributes:
-        power: Variances per sample [(Nm)^2 or N^2] at the frequencies of ``rfft``, shape
-            (K // 2 + 1, N): the same at all frequencies for white noise.
-        coloured: Whether the noise of a joint is coloured, shape (N,).
-    """
-
-    power: np.ndarray
-    coloured: np.ndarray
-
-
-def mean_torque_spectrum(motion: MeasuredMotion) -> NoiseSpectrum | None:
+def mean_torque_spectrum(motion: MeasuredMotion) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the spectrum of the noise in the mean torques; None if there are no periods.
 
     What differs from period to period is noise; what all periods share is not in it, so that a
@@ -50,6 +36,10 @@ def mean_torque_spectrum(motion: MeasuredMotion) -> NoiseSpectrum | None:
     Args:
         motion: Has torques of P periods as ``tau_periods``, shape (P, K, N), or not.
 
+    Returns:
+        Variances per sample [(Nm)^2 or N^2] at the frequencies of ``rfft``, shape
+        (K // 2 + 1, N), the same at all frequencies for white noise; and whether the noise of a
+        joint is coloured, shape (N,).
     """
     periods = getattr(motion, "tau_periods", None)
     if periods is None or len(periods) < 2:
@@ -71,12 +61,10 @@ def mean_torque_spectrum(motion: MeasuredMotion) -> NoiseSpectrum | None:
     padded = np.pad(power, ((_SMOOTH, _SMOOTH), (0, 0)), mode="reflect")
     sums = np.cumsum(np.pad(padded, ((1, 0), (0, 0))), axis=0)
     width = 2 * _SMOOTH + 1
-    return NoiseSpectrum(np.where(white, flat, (sums[width:] - sums[:-width]) / width), ~white)
+    return np.where(white, flat, (sums[width:] - sums[:-width]) / width), ~white
 
 
-def coloured_covariance(
-    inverse: np.ndarray, system: Information, spectrum: NoiseSpectrum
-) -> np.ndarray:
+def coloured_covariance(inverse: np.ndarray, system: Information, powers: np.ndarray) -> np.ndarray:
     """Return the covariance of the weighted least-squares estimate under coloured noise.
 
     ``(X' W X)^-1 X' W E W X (X' W X)^-1`` with the covariance E of the torques, which in a motion
@@ -85,15 +73,15 @@ def coloured_covariance(
     Args:
         inverse: ``(X' W X)^-1``, shape (n_b, n_b).
         system: The linear system.
-        spectrum: Spectrum of the noise.
+        powers: Powers of the noise, see :func:`mean_torque_spectrum`, shape (K // 2 + 1, N).
     """
     samples = len(system.matrix)
-    both = np.full(len(spectrum.power), 2.0)
+    both = np.full(len(powers), 2.0)
     both[0] = 1.0
     if samples % 2 == 0:
         both[-1] = 1.0
     middle = np.zeros_like(inverse)
-    for j, (variance, power) in enumerate(zip(system.variance, spectrum.power.T, strict=True)):
+    for j, (variance, power) in enumerate(zip(system.variance, powers.T, strict=True)):
         column = system.matrix[:, j] * (system.used[:, j] / variance)[:, None]
         parts = np.fft.rfft(column, axis=0) * np.sqrt(both * power / samples)[:, None]
         middle += (parts.conj().T @ parts).real
@@ -241,9 +229,9 @@ def estimate(
     covariance = factors.inverse()
     spectrum = None if white else mean_torque_spectrum(motion)
     coloured = np.zeros(subject.dimension, dtype=bool)
-    if spectrum is not None and spectrum.coloured.any():
-        coloured = spectrum.coloured
-        covariance = coloured_covariance(covariance, system, spectrum)
+    if spectrum is not None and spectrum[1].any():
+        powers, coloured = spectrum
+        covariance = coloured_covariance(covariance, system, powers)
     return Estimate(
         subject.name,
         tuple(subject.joint_names),

@@ -3,57 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from identification.estimation.least_squares import Estimate
-from identification.estimation.validation import mahalanobis
+from identification.estimation.validation import mahalanobis, two_sided
 from pfsc_drake.errors import InputError
-
-_PERCENT = 100.0
-
-
-@dataclass(frozen=True)
-class ParameterRow:
-    """A row of Tab. C.3, with what was predicted for it.
-
-    Attributes:
-        number: j, from 1.
-        name: Name of the parameter that leads the combination.
-        combination: What it is a combination of.
-        mean: Mean of the runs, SI units.
-        unit: Unit of the mean.
-        relative_deviation: Standard deviation of the runs [% of the mean]; NaN for one run.
-        predicted_deviation: The same as the covariance of a run has it, RMS of the runs.
-        truth: True value; NaN if unknown.
-    """
-
-    number: int
-    name: str
-    combination: str
-    mean: float
-    unit: str
-    relative_deviation: float
-    predicted_deviation: float
-    truth: float
-
-
-@dataclass(frozen=True)
-class TorqueRow:
-    """A column of Tab. C.4.
-
-    Attributes:
-        joint: Name of the joint.
-        unit: Unit of the torques, ``Nm`` or ``N``.
-        error_rms: RMS error of single measured torques less predicted ones, RMS of the runs.
-        noise_level: Standard deviation of single measured torques, RMS of the runs.
-        explained: Least share of the mean torques' variance that a run's model explains.
-    """
-
-    joint: str
-    unit: str
-    error_rms: float
-    noise_level: float
-    explained: float
 
 
 @dataclass(frozen=True)
@@ -136,42 +89,28 @@ class Repetitions:
         wider = np.maximum(1.0, np.nan_to_num(ratio, nan=1.0))
         return predicted * np.outer(wider, wider)
 
-    def parameter_rows(self, truth: np.ndarray | None = None) -> list[ParameterRow]:
-        """Return the rows of Tab. C.3.
+    @property
+    def noise_level(self) -> np.ndarray:
+        """Standard deviation of single measured torques, RMS of the runs [Nm or N], shape (N,)."""
+        return np.sqrt(np.mean([run.motion.torque_variance for run in self.estimates], axis=0))
 
-        Args:
-            truth: True base parameters where they are known, shape (n_b,).
-        """
-        base = self.estimates[0].base
-        scale = _PERCENT / np.abs(self.mean)
-        known = np.full(base.rank, np.nan) if truth is None else np.asarray(truth, dtype=float)
-        columns = zip(
-            base.short_names,
-            base.names,
-            self.mean.tolist(),
-            base.units,
-            (self.standard_deviation * scale).tolist(),
-            (self.predicted_standard_deviation * scale).tolist(),
-            known.tolist(),
-            strict=True,
-        )
-        return [ParameterRow(number, *row) for number, row in enumerate(columns, start=1)]
-
-    def torque_rows(self) -> list[TorqueRow]:
-        """Return the columns of Tab. C.4."""
-        first, rows = self.estimates[0], []
+    @property
+    def error_rms(self) -> np.ndarray:
+        """RMS of single measured torques less predicted ones, RMS of the runs, shape (N,)."""
         noise = np.mean([run.motion.torque_variance for run in self.estimates], axis=0)
         means = np.mean([run.motion.mean_torque_variance for run in self.estimates], axis=0)
         squares = np.mean([np.mean(run.residuals**2, axis=0) for run in self.estimates], axis=0)
-        explained = np.min([_explained(run) for run in self.estimates], axis=0)
-        for j, (joint, unit) in enumerate(zip(first.joint_names, first.joint_units, strict=True)):
-            # single torques scatter about the mean ones
-            error = float(np.sqrt(squares[j] + noise[j] - means[j]))
-            torque = "Nm" if unit == "rad" else "N"
-            rows.append(
-                TorqueRow(joint, torque, error, float(np.sqrt(noise[j])), float(explained[j]))
-            )
-        return rows
+        # single torques scatter about the mean ones
+        return np.sqrt(squares + noise - means)
+
+    @property
+    def explained(self) -> np.ndarray:
+        """Least share of the mean torques' variance that a run's model explains, shape (N,)."""
+        shares = [
+            1.0 - np.var(run.residuals, axis=0) / np.var(run.system.torques, axis=0)
+            for run in self.estimates
+        ]
+        return np.min(shares, axis=0)
 
     def spread_test(self, friction: bool = True) -> SpreadTest:
         """Compare the spread of the runs with what their covariance predicts.
@@ -192,10 +131,5 @@ class Repetitions:
         deviations = (self.values - self.mean)[:, counts]
         value = sum(mahalanobis(deviation, covariance) for deviation in deviations)
         freedom = (runs - 1) * len(counts)
-        tail = min(float(chi2.cdf(value, freedom)), float(chi2.sf(value, freedom)))
         ratio = np.median((self.standard_deviation / self.predicted_standard_deviation)[counts])
-        return SpreadTest(value, freedom, 2.0 * tail, float(ratio))
-
-
-def _explained(run: Estimate) -> np.ndarray:
-    return 1.0 - np.var(run.residuals, axis=0) / np.var(run.system.torques, axis=0)
+        return SpreadTest(value, freedom, two_sided(value, freedom), float(ratio))

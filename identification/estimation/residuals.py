@@ -96,15 +96,11 @@ class Excess:
     that may be the robot's drives, whose torques ring without moving it.
 
     Attributes:
-        joint_names: N names.
-        highest_hz: Highest of the frequencies [Hz].
         freedom: Degrees of freedom of the residuals of a joint.
         ratio: Shape (N,); 1 if there is nothing but noise.
         p_value: Probability of a larger ratio of noise, shape (N,).
     """
 
-    joint_names: tuple[str, ...]
-    highest_hz: float
     freedom: float
     ratio: np.ndarray
     p_value: np.ndarray
@@ -151,14 +147,8 @@ def excess(
     band = slice(1, count + 1)
     power = np.abs(np.fft.rfft(np.where(used, residuals, 0.0), axis=0)) ** 2
     power *= 1.0 / used.sum(axis=0)
-    ratio = np.sum(2.0 * power[band] / spectrum.power[band], axis=0) / freedom
-    return Excess(
-        tuple(motion.joint_names),
-        float(highest),
-        freedom,
-        ratio,
-        fisher.sf(ratio, freedom, 2.0 * count * (motion.periods - 1)),
-    )
+    ratio = np.sum(2.0 * power[band] / spectrum[0][band], axis=0) / freedom
+    return Excess(freedom, ratio, fisher.sf(ratio, freedom, 2.0 * count * (motion.periods - 1)))
 
 
 # in units of 20 harmonics

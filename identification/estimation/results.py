@@ -23,7 +23,7 @@ friction: ``joints`` (from 1), ``kinds``, ``widths`` (NaN without).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -32,35 +32,18 @@ import numpy as np
 
 from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
 from identification.estimation.identifiability import factorize
-from identification.estimation.information import Information
+from identification.estimation.information import Information, StoredMotion
 from identification.estimation.least_squares import Estimate
 from identification.estimation.repetitions import Repetitions
 from identification.measurement.columns import si_unit
 from identification.model.base import BaseParameters
-from identification.options import write_bytes
+from identification.output import write_bytes
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import read_regular_file
 from reporting.hdf5_reading import opened
 
 FILE_NAME = "identification.h5"
 _MOTION = {"q": "q", "v": "v", "a": "a", "torque_variance": "tau", "mean_torque_variance": "tau"}
-
-
-@dataclass(frozen=True, eq=False)
-class StoredMotion:
-    """The motion of a file; see :class:`~identification.estimation.information.MeasuredMotion`.
-
-    Attributes:
-        t: Times [s], shape (K,), or None if the estimate's motion had none.
-    """
-
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    tau: np.ndarray
-    torque_variance: np.ndarray
-    mean_torque_variance: np.ndarray
-    t: np.ndarray | None = None
 
 
 def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None = None) -> None:
@@ -122,8 +105,8 @@ def _write(file: h5py.File, estimate: Estimate) -> None:
         units = [si_unit(signal, unit) for unit in estimate.joint_units]
         units = squared if signal == "tau" else units
         _add(group, name, np.asarray(getattr(motion, name)), units=units, **joints)
-    if getattr(motion, "t", None) is not None:
-        _add(group, "t", np.asarray(motion.t), units=["s"])  # type: ignore[attr-defined]
+    if motion.t is not None:
+        _add(group, "t", np.asarray(motion.t), units=["s"])
     terms = file.create_group("friction").attrs
     terms["joints"] = [term.joint + 1 for term in estimate.friction.terms]
     _set_words(terms, "kinds", [term.kind for term in estimate.friction.terms])

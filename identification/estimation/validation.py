@@ -133,14 +133,6 @@ class TruthTest:
     degrees_of_freedom: int
     p_value: float
 
-    def consistent(self, level: float = 0.01) -> bool:
-        """Return whether the errors are as large as predicted.
-
-        Args:
-            level: Probability to deny it though they are.
-        """
-        return self.p_value > level
-
 
 def compare_with_truth(estimate: Estimate, truth: np.ndarray, friction: bool = True) -> TruthTest:
     """Compare an estimate with the true parameters.
@@ -156,18 +148,32 @@ def compare_with_truth(estimate: Estimate, truth: np.ndarray, friction: bool = T
     """
     names = estimate.short_names
     counts = [i for i, name in enumerate(names) if friction or ".f_" not in name]
-    errors = (estimate.base_parameters - checked_truth(estimate, truth))[counts]
+    values = np.asarray(truth, dtype=float)
+    if values.shape != estimate.base_parameters.shape:
+        raise InputError(
+            f"{estimate.robot}: truth of shape {values.shape}; must be "
+            f"{estimate.base_parameters.shape}, base parameters as the estimate has them"
+        )
+    if not np.isfinite(values).all():
+        name = names[int(np.argmin(np.isfinite(values)))]
+        raise InputError(f"{estimate.robot}: the true {name} is not known; all must be")
+    errors = (estimate.base_parameters - values)[counts]
     value = mahalanobis(errors, estimate.covariance[np.ix_(counts, counts)])
     size = len(errors)
-    below = float(chi2.cdf(value, size))
     return TruthTest(
         [names[i] for i in counts],
         errors,
         errors / estimate.standard_deviation[counts],
         value,
         size,
-        2.0 * min(below, float(chi2.sf(value, size))),
+        two_sided(value, size),
     )
+
+
+def two_sided(chi_squared: float, freedom: int) -> float:
+    """Return the probability of a chi-squared at least as far from the middle, on either side."""
+    below, above = chi2.cdf(chi_squared, freedom), chi2.sf(chi_squared, freedom)
+    return 2.0 * min(float(below), float(above))
 
 
 def mahalanobis(errors: np.ndarray, covariance: np.ndarray) -> float:
@@ -176,20 +182,6 @@ def mahalanobis(errors: np.ndarray, covariance: np.ndarray) -> float:
     correlation = covariance / np.outer(deviation, deviation)
     scaled = errors / deviation
     return float(scaled @ np.linalg.solve(correlation, scaled))
-
-
-def checked_truth(estimate: Estimate, truth: np.ndarray) -> np.ndarray:
-    """Return true base parameters, or refuse those of another robot or unknown ones."""
-    values = np.asarray(truth, dtype=float)
-    if values.shape != estimate.base_parameters.shape:
-        raise InputError(
-            f"{estimate.robot}: truth of shape {values.shape}; must be "
-            f"{estimate.base_parameters.shape}, base parameters as the estimate has them"
-        )
-    if not np.isfinite(values).all():
-        name = estimate.short_names[int(np.argmin(np.isfinite(values)))]
-        raise InputError(f"{estimate.robot}: the true {name} is not known; all must be")
-    return values
 
 
 def refuse_implausible(estimate: Estimate) -> None:

@@ -9,6 +9,7 @@ of X, to be as small as possible. Both have gradients by X alone,
 and CasADi carries these matrices back through the regressor to the motion.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -17,9 +18,9 @@ import numpy as np
 import scipy.linalg
 
 from identification.excitation.fourier import FourierTrajectory, fourier_basis
-from identification.excitation.run_in import SampledFunction
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
+from pfsc_drake.compiled.native_code import native_code
 from pfsc_drake.errors import InputError
 
 Criterion = Literal["D", "condition"]
@@ -67,37 +68,75 @@ def information(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class BaseRegressorKernels:
-    """The base regressor of one sample and its transposed derivative, to be sent to workers.
+def base_regressor_kernels(
+    regressor: Regressor, base: BaseParameters
+) -> tuple[ca.Function, ca.Function]:
+    """Return the base regressor of one sample and its transposed derivative.
 
-    Attributes:
-        forward: ``(q, v, a) -> Y_b``, vectors (N,) and a matrix (N, n_b).
-        adjoint: ``(q, v, a, S) -> d<S, Y_b> / d[q, v, a]``, shape (3N,).
+    Args:
+        regressor: With a smooth sign of the velocities.
+        base: The base parameters.
+
+    Returns:
+        ``(q, v, a) -> Y_b``, vectors (N,) and a matrix (N, n_b), and
+        ``(q, v, a, S) -> d<S, Y_b> / d[q, v, a]``, shape (3N,).
+    """
+    n = regressor.subject.dimension
+    q, v, a = (ca.SX.sym(name, n) for name in "qva")
+    Y = regressor.function(q, v, a)[:, base.indices.tolist()]
+    S = ca.SX.sym("S", n, base.rank)
+    gradient = ca.densify(ca.gradient(ca.dot(S, Y), ca.vertcat(q, v, a)))
+    return (
+        ca.Function("forward", [q, v, a], [ca.densify(Y)], ["q", "v", "a"], ["Y"]),
+        ca.Function("adjoint", [q, v, a, S], [gradient], ["q", "v", "a", "S"], ["g"]),
+    )
+
+
+class SampledFunction:
+    """Evaluates a function K times at once, as machine code where that is possible.
+
+    Args:
+        function: SX inside, with dense results.
+        samples: Number K.
     """
 
-    forward: ca.Function
-    adjoint: ca.Function
+    def __init__(self, function: ca.Function, samples: int) -> None:
+        inputs, outputs = range(function.n_in()), range(function.n_out())
+        self._arguments = [np.zeros((samples, function.numel_in(i))) for i in inputs]
+        self._results = [np.zeros((samples, function.numel_out(i))) for i in outputs]
+        self._calls: list[Callable[[], None]] = []
+        code = native_code(function)
+        if code is not None:
+            rows = range(samples)
+            self._calls = [
+                code.bind([x[k] for x in self._arguments], [x[k] for x in self._results])
+                for k in rows
+            ]
+        else:
+            self._mapped = function.map(samples)
+            self._buffer, run = self._mapped.buffer()
+            for i, array in enumerate(self._arguments):
+                self._buffer.set_arg(i, array.ravel().data)
+            for i, array in enumerate(self._results):
+                self._buffer.set_res(i, array.ravel().data)
+            self._calls = [run]
 
-    @classmethod
-    def of(cls, regressor: Regressor, base: BaseParameters) -> "BaseRegressorKernels":
-        """Return the kernels of a robot.
+    def __call__(self, *arguments: np.ndarray) -> Sequence[np.ndarray]:
+        """Return the results.
+
+        They are overwritten by the next call.
 
         Args:
-            regressor: With a smooth sign of the velocities.
-            base: The base parameters.
+            arguments: One array (K, n) each; matrices by columns.
+
+        Returns:
+            One array (K, n) each; matrices by columns.
         """
-        n = regressor.subject.dimension
-        q, v, a = (ca.SX.sym(name, n) for name in "qva")
-        Y = regressor.function(q, v, a)[:, base.indices.tolist()]
-        S = ca.SX.sym("S", n, base.rank)
-        gradient = ca.gradient(ca.dot(S, Y), ca.vertcat(q, v, a))
-        return cls(
-            ca.Function("forward", [q, v, a], [ca.densify(Y)], ["q", "v", "a"], ["Y"]),
-            ca.Function(
-                "adjoint", [q, v, a, S], [ca.densify(gradient)], ["q", "v", "a", "S"], ["g"]
-            ),
-        )
+        for own, given in zip(self._arguments, arguments, strict=True):
+            own[:] = given.reshape(own.shape)
+        for call in self._calls:
+            call()
+        return self._results
 
 
 class ExcitationCost:
@@ -107,7 +146,7 @@ class ExcitationCost:
     of REPORTED_SAMPLES.
 
     Args:
-        kernels: Kernels of the robot, N joints and n_b base parameters.
+        kernels: Those of :func:`base_regressor_kernels`, N joints and n_b base parameters.
         period: Period of the motion [s].
         harmonics: Harmonics of it, M of them.
         samples: Per period.
@@ -119,13 +158,14 @@ class ExcitationCost:
 
     def __init__(
         self,
-        kernels: BaseRegressorKernels,
+        kernels: tuple[ca.Function, ca.Function],
         period: float,
         harmonics: tuple[int, ...],
         samples: int,
         criterion: str = "D",
     ) -> None:
-        self._dimension, self._size = kernels.forward.size_out(0)
+        forward, adjoint = kernels
+        self._dimension, self._size = forward.size_out(0)
         if criterion not in CRITERIA:
             raise InputError(f"criterion = {criterion!r}; must be one of {', '.join(CRITERIA)}")
         if samples * self._dimension < self._size:
@@ -135,8 +175,8 @@ class ExcitationCost:
             )
         self._samples, self._criterion = samples, criterion
         self._bases = fourier_basis(np.arange(samples) * period / samples, period, harmonics)
-        self._forward = SampledFunction(kernels.forward, samples)
-        self._adjoint = SampledFunction(kernels.adjoint, samples)
+        self._forward = SampledFunction(forward, samples)
+        self._adjoint = SampledFunction(adjoint, samples)
         self._shift = self._size * np.log(REPORTED_SAMPLES / samples)
 
     def __call__(self, coefficients: np.ndarray) -> tuple[float, np.ndarray]:

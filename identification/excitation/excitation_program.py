@@ -8,7 +8,12 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
-from identification.excitation.criterion import CRITERIA, BaseRegressorKernels, ExcitationCost
+from identification.excitation.criterion import (
+    CRITERIA,
+    ExcitationCost,
+    SampledFunction,
+    base_regressor_kernels,
+)
 from identification.excitation.fourier import check_harmonics, check_period, fourier_basis
 from identification.excitation.limits import JointLimits
 from identification.excitation.posture_clearance import (
@@ -16,7 +21,6 @@ from identification.excitation.posture_clearance import (
     delta_posture_limits,
     serial_posture_limits,
 )
-from identification.excitation.run_in import SampledFunction
 from identification.excitation.scene import Cell, RobotScene
 from identification.model.base import base_parameters
 from identification.model.dynamic_parameters import true_parameters
@@ -36,7 +40,7 @@ class ExcitationProblem:
         period: T_f [s].
         harmonics: Multiples of the fundamental frequency in use.
         limits: Limits of the joints.
-        kernels: Kernels of the criterion.
+        kernels: Kernels of the criterion, see :func:`base_regressor_kernels`.
         torque: ``(q, v, a) -> tau``, predicted torques of the drives.
         posture: What the joint positions must keep to; None for nothing but the limits.
         criterion: ``D`` or ``condition``.
@@ -45,7 +49,7 @@ class ExcitationProblem:
     period: float
     harmonics: tuple[int, ...]
     limits: JointLimits
-    kernels: BaseRegressorKernels
+    kernels: tuple[ca.Function, ca.Function]
     torque: ca.Function
     posture: PostureLimits | None
     criterion: str
@@ -104,7 +108,7 @@ def excitation_problem(
         period,
         tuple(harmonics),
         limits,
-        BaseRegressorKernels.of(smooth, base),
+        base_regressor_kernels(smooth, base),
         ca.Function("torque", [q, v, a], [tau], ["q", "v", "a"], ["tau"]),
         posture,
         criterion,
@@ -144,21 +148,6 @@ _TOLERANCE = 1e-4  # relative to the limits
 _MOST_MINOR_ITERATIONS = 100_000
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Where a solver ended.
-
-    Attributes:
-        coefficients: Coefficients of the motion, shape (N, 2M + 1).
-        value: The figure to be small, see :class:`ExcitationCost`.
-        converged: Whether it is a local optimum, rather than the end of the iterations.
-    """
-
-    coefficients: np.ndarray
-    value: float
-    converged: bool
-
-
 class ExcitationProgram:
     """Solves one robot's problem from given starts.
 
@@ -189,7 +178,7 @@ class ExcitationProgram:
         joint_times: np.ndarray,
         posture_times: np.ndarray,
         iterations: int,
-    ) -> Solution:
+    ) -> tuple[np.ndarray, float]:
         """Return what SNOPT makes of a motion.
 
         Args:
@@ -198,6 +187,9 @@ class ExcitationProgram:
             joint_times: When joint limits hold [s], shape (K,).
             posture_times: When limits of torques and postures hold [s], shape (L,).
             iterations: At most so many major ones.
+
+        Returns:
+            Coefficients, shape (N, 2M + 1), and the figure to be small.
         """
         program = MathematicalProgram()
         x = program.NewContinuousVariables(coefficients.size, "c")
@@ -219,7 +211,7 @@ class ExcitationProgram:
             options.SetOption(solver.solver_id(), name, value)
         result = solver.Solve(program, (coefficients / self._scale).ravel(), options)
         found = result.GetSolution(x).reshape(coefficients.shape) * self._scale
-        return Solution(found, self.cost(found)[0], result.is_success())
+        return found, self.cost(found)[0]
 
     def _evaluate_cost(self, x: np.ndarray) -> AutoDiffXd:
         value, gradient = self.cost(self._coefficients(x))

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.options import write_text
+from identification.output import write_text
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.yaml.fields import REQUIRED

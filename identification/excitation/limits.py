@@ -50,48 +50,41 @@ class JointLimits:
         )
 
 
-def joint_limits(
-    subject: Subject,
-    *,
-    position: ArrayLike | None = None,
-    velocity: ArrayLike | None = None,
-    acceleration: ArrayLike | None = None,
-    effort: ArrayLike | None = None,
+def chosen_limits(
+    subject: Subject, limits: "JointLimits | Mapping[str, Given] | None" = None
 ) -> JointLimits:
     """Return a robot's limits, those of its model where no others are given.
 
     Args:
         subject: The robot.
-        position: Lower and upper limits [rad or m], shape (N, 2).
-        velocity: [rad/s or m/s], shape (N,), or one number for all joints.
-        acceleration: [rad/s^2 or m/s^2], shape (N,), or one number for all joints.
-        effort: [Nm or N], shape (N,), or one number for all joints.
+        limits: All of them; or ``position`` [rad or m], shape (N, 2), lower and upper, and
+            ``velocity``, ``acceleration`` [per s, per s^2] and ``effort`` [Nm or N], shape (N,) or
+            one number for all joints; or by names of joints, ``{"velocity": {"joint_2": 1.0}}``.
 
     Raises:
-        InputError: If one is neither in the model nor given, or is out of range. Effort alone may
-            be unknown.
+        InputError: If a limit or joint is unknown, a value out of range, or one is neither in the
+            model nor given. Effort alone may be unknown.
     """
     n, names = subject.dimension, subject.joint_names
-    bounds = numbers("position limits", subject.position_limits if position is None else position)
-    if bounds.shape != (n, 2):
-        raise InputError(
-            f"position limits: shape {bounds.shape}; must be ({n}, 2), lower and upper"
-        )
-    magnitudes = {
-        "velocity": (velocity, subject.velocity_limit),
-        "acceleration": (acceleration, subject.acceleration_limit),
-        "effort": (effort, subject.effort_limit),
+    if isinstance(limits, JointLimits):
+        if limits.velocity.size != n:
+            raise InputError(f"limits: of {limits.velocity.size} joints; {subject.name} has {n}")
+        return limits
+    own = {
+        "position": subject.position_limits,
+        "velocity": subject.velocity_limit,
+        "acceleration": subject.acceleration_limit,
+        "effort": subject.effort_limit,
     }
-    values = {"position": bounds}
-    for key, (given, own) in magnitudes.items():
-        array = numbers(f"{key} limits", own if given is None else given)
-        if array.shape not in ((), (1,), (n,)):
-            raise InputError(f"{key} limits: shape {array.shape}; must be one number or {n}")
-        values[key] = np.broadcast_to(array, n).copy()
-    unbounded = np.flatnonzero(~np.isfinite(bounds).all(axis=1))
+    given = dict(limits or {})
+    for key in given:
+        if key not in own:
+            raise InputError(f"limits: {shortened(key)!r}; must be one of {', '.join(own)}")
+    values = {key: _given(subject, key, given.get(key, array), array) for key, array in own.items()}
+    unbounded = np.flatnonzero(~np.isfinite(values["position"]).all(axis=1))
     if unbounded.size:
         _refuse_unknown(subject, "position", [names[i] for i in unbounded])
-    for name, (lower, upper) in zip(names, bounds, strict=True):
+    for name, (lower, upper) in zip(names, values["position"], strict=True):
         if not lower < upper:
             raise InputError(
                 f"position limits of {name} = [{lower:g}, {upper:g}]; lower must be below upper"
@@ -100,56 +93,30 @@ def joint_limits(
         unknown = [name for name, x in zip(names, values[key], strict=True) if np.isinf(x)]
         if unknown:
             _refuse_unknown(subject, key, unknown)
-    for key in magnitudes:
+    for key in ("velocity", "acceleration", "effort"):
         for name, x in zip(names, values[key], strict=True):
             if not x > 0.0:
                 raise InputError(f"{key} limit of {name} = {x:g}; must be positive")
     return JointLimits(**values)
 
 
-def chosen_limits(
-    subject: Subject, limits: "JointLimits | Mapping[str, Given] | None" = None
-) -> JointLimits:
-    """Return a robot's limits, those of its model where no others are given.
-
-    Args:
-        subject: The robot.
-        limits: All of them; or ``position``, ``velocity``, ``acceleration``, ``effort`` as for
-            :func:`joint_limits`, or by names of joints, ``{"velocity": {"joint_2": 1.0}}``.
-
-    Raises:
-        InputError: If a limit or joint is unknown, or a value out of range.
-    """
-    if isinstance(limits, JointLimits):
-        if limits.velocity.size != subject.dimension:
-            raise InputError(
-                f"limits: of {limits.velocity.size} joints; {subject.name} has {subject.dimension}"
-            )
-        return limits
-    own = {
-        "position": subject.position_limits,
-        "velocity": subject.velocity_limit,
-        "acceleration": subject.acceleration_limit,
-        "effort": subject.effort_limit,
-    }
-    given: dict[str, ArrayLike] = {}
-    for key, value in (limits or {}).items():
-        if key not in own:
-            raise InputError(f"limits: {shortened(key)!r}; must be one of {', '.join(own)}")
-        if isinstance(value, Mapping):
-            table = own[key].copy()
-            for joint, entry in value.items():
-                i, where = _joint(subject, joint, f"{key} limits"), f"{key} limit of {joint}"
-                given_entry = numbers(where, entry)
-                if given_entry.shape != table[i].shape:
-                    raise InputError(
-                        f"{where}: shape {given_entry.shape}; must be {table[i].shape}"
-                    )
-                table[i] = given_entry
-            given[key] = table
-        else:
-            given[key] = value
-    return joint_limits(subject, **given)
+def _given(subject: Subject, key: str, value: Given, own: np.ndarray) -> np.ndarray:
+    """Return one kind of limits of all joints, of the shape of those of the model."""
+    if isinstance(value, Mapping):
+        table = own.copy()
+        for joint, entry in value.items():
+            i, where = _joint(subject, joint, f"{key} limits"), f"{key} limit of {joint}"
+            row = numbers(where, entry)
+            if row.shape != table[i].shape:
+                raise InputError(f"{where}: shape {row.shape}; must be {table[i].shape}")
+            table[i] = row
+        return table
+    n, array = subject.dimension, numbers(f"{key} limits", value)
+    if key == "position" and array.shape != (n, 2):
+        raise InputError(f"position limits: shape {array.shape}; must be ({n}, 2), lower and upper")
+    if key != "position" and array.shape not in ((), (1,), (n,)):
+        raise InputError(f"{key} limits: shape {array.shape}; must be one number or {n}")
+    return np.broadcast_to(array, own.shape).copy()
 
 
 def numbers(name: str, value: ArrayLike) -> np.ndarray:

@@ -56,7 +56,7 @@ class LocalSearch:
 
     def __init__(self, problem: ExcitationProblem) -> None:
         highest = max(problem.harmonics)
-        least = -(-problem.kernels.forward.size2_out(0) // problem.dimension)
+        least = -(-problem.kernels[0].size2_out(0) // problem.dimension)
         self.problem = problem
         self._program = ExcitationProgram(problem, max(_SAMPLES * highest, 2 * least))
         self._fine = _instants(problem, _FINE)
@@ -100,14 +100,15 @@ class LocalSearch:
         left, rounds = iterations, 0
         while True:
             rounds += 1
-            solution = self._program.solve(coefficients, joint_times, posture_times, left)
-            coefficients = solution.coefficients
+            coefficients, value = self._program.solve(
+                coefficients, joint_times, posture_times, left
+            )
             joints, postures = self._excesses(coefficients)
             worst = max((*joints, *postures), key=lambda item: item[1].max())
             excess = float(worst[1].max())
             left = max(iterations // 4, 1)
             if excess <= _ENOUGH or rounds == _MOST_ROUNDS:
-                return LocalOptimum(seed, coefficients, solution.value, excess, worst[0], rounds)
+                return LocalOptimum(seed, coefficients, value, excess, worst[0], rounds)
             joint_times = self._with_peaks(joint_times, [values for _, values in joints])
             posture_times = self._with_peaks(posture_times, [values for _, values in postures])
 

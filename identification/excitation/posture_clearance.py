@@ -44,12 +44,10 @@ class PostureLimits:
         function: ``g(q)``, CasADi function of a vector (N,) to (n,): zero or positive where the
             robot may be.
         names: What the elements are, n of them.
-        units: Theirs, n of ``m`` or ``1``.
     """
 
     function: ca.Function
     names: list[str]
-    units: list[str]
 
     def values(self, q: np.ndarray) -> np.ndarray:
         """Return ``g`` of many samples, shape (K, n).
@@ -101,7 +99,7 @@ def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> Po
         return None
     names = [name for name, _ in elements]
     g = ca.densify(ca.vertcat(*[value for _, value in elements]))
-    return PostureLimits(ca.Function("g", [q], [g], ["q"], ["g"]), names, ["m"] * len(names))
+    return PostureLimits(ca.Function("g", [q], [g], ["q"], ["g"]), names)
 
 
 def height_of(name: str) -> str:
@@ -129,7 +127,6 @@ def delta_posture_limits(robot: DeltaRobot) -> PostureLimits:
     return PostureLimits(
         ca.Function("g", [q], [g], ["q"], ["g"]),
         ["independence of the rods", "tool below the rails' common point"],
-        ["1", "m"],
     )
 
 

@@ -16,7 +16,7 @@ from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.run_in import ExcitationRun
 from identification.excitation.scene import Cell, left_out_tool, obstacle_shape
 from identification.model.subject import Subject, tool_frame_of
-from identification.options import write_text
+from identification.output import write_text
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

@@ -6,65 +6,15 @@ falling after the last. So postures, and with them position limits and clearance
 period; where velocities and accelerations of the ramps are not, the ramps are made longer.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 
 from identification.excitation.fourier import FourierTrajectory, samples_per_period
-from identification.options import write_text
-from pfsc_drake.compiled.native_code import native_code
+from identification.model.subject import Subject
+from identification.output import write_text
 from pfsc_drake.errors import InputError
-
-
-class SampledFunction:
-    """Evaluates a function K times at once, as machine code where that is possible.
-
-    Args:
-        function: SX inside, with dense results.
-        samples: Number K.
-    """
-
-    def __init__(self, function: ca.Function, samples: int) -> None:
-        inputs, outputs = range(function.n_in()), range(function.n_out())
-        self._arguments = [np.zeros((samples, function.numel_in(i))) for i in inputs]
-        self._results = [np.zeros((samples, function.numel_out(i))) for i in outputs]
-        self._calls: list[Callable[[], None]] = []
-        code = native_code(function)
-        if code is not None:
-            rows = range(samples)
-            self._calls = [
-                code.bind([x[k] for x in self._arguments], [x[k] for x in self._results])
-                for k in rows
-            ]
-        else:
-            self._mapped = function.map(samples)
-            self._buffer, run = self._mapped.buffer()
-            for i, array in enumerate(self._arguments):
-                self._buffer.set_arg(i, array.ravel().data)
-            for i, array in enumerate(self._results):
-                self._buffer.set_res(i, array.ravel().data)
-            self._calls = [run]
-
-    def __call__(self, *arguments: np.ndarray) -> Sequence[np.ndarray]:
-        """Return the results.
-
-        They are overwritten by the next call.
-
-        Args:
-            arguments: One array (K, n) each; matrices by columns.
-
-        Returns:
-            One array (K, n) each; matrices by columns.
-        """
-        for own, given in zip(self._arguments, arguments, strict=True):
-            own[:] = given.reshape(own.shape)
-        for call in self._calls:
-            call()
-        return self._results
-
 
 # rate of the clock on a ramp of unit length, C^4 at both ends
 _RATE = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0])
@@ -201,3 +151,37 @@ def rest_to_rest(
         f"excitation: no ramp of up to {longest:g} s keeps the limits of velocity and "
         f"acceleration; one period takes {100.0 * share:.3g} % of them, must be less than 100 %"
     )
+
+
+def run_of(
+    subject: Subject, trajectory: FourierTrajectory, periods: int, rate: float
+) -> ExcitationRun:
+    """Return the run of a robot, within its limits of position, velocity and acceleration.
+
+    Args:
+        subject: The robot.
+        trajectory: The periodic motion.
+        periods: How often to run it in full.
+        rate: Rate of samples [Hz].
+
+    Raises:
+        InputError: If the motion is of another robot or leaves the position limits, or as of
+            :func:`rest_to_rest`.
+    """
+    n = subject.dimension
+    if trajectory.dimension != n:
+        raise InputError(
+            f"excitation: of {trajectory.dimension} joints; {subject.name} has {n} joints"
+        )
+    q = trajectory.motion(trajectory.sample_times(rate))[0]
+    lower, upper = subject.position_limits.T
+    beyond = np.maximum(q.max(axis=0) - upper, lower - q.min(axis=0))
+    j = int(np.argmax(beyond))
+    if beyond[j] > 0.0:
+        unit = subject.joint_units[j]
+        raise InputError(
+            f"excitation: {subject.joint_names[j]} goes from {q[:, j].min():.4g} to "
+            f"{q[:, j].max():.4g} {unit}; must stay within {lower[j]:.4g} to {upper[j]:.4g} {unit}"
+        )
+    velocity, acceleration = subject.velocity_limit, subject.acceleration_limit
+    return rest_to_rest(trajectory, velocity, acceleration, periods=periods, rate=rate)

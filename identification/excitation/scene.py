@@ -82,22 +82,6 @@ class Cell(Parameters):
             raise InputError(f"tool_above = {self.tool_above}; must be a number [m]")
 
 
-def load_cell(cell: str | Path | None, robot: str | Path) -> Cell:
-    """Return the cell of a file, or that of a shipped robot.
-
-    Args:
-        cell: YAML file; None for the one shipped with the robot, or an empty one.
-        robot: Name of the robot.
-
-    Raises:
-        InputError: If the file cannot be read or does not fit; one line that names it.
-    """
-    if cell is None:
-        shipped = models_directory() / Path(robot).stem / "cell.yaml"
-        return load_file(Cell, shipped) if shipped.is_file() else Cell()
-    return load_file(Cell, cell)
-
-
 WORLD = -1  # link of what does not move
 # shapes that are near in each of so many postures are so by design
 _POSTURES = 100
@@ -134,25 +118,6 @@ class Pair:
     first: GeometryId
     second: GeometryId
     name: str
-
-
-@dataclass(frozen=True, eq=False)
-class Clearance:
-    """Distances along a motion.
-
-    Attributes:
-        distance: Least distance of each sample [m], shape (K,); negative where shapes overlap,
-            infinite if there is nothing to touch.
-        pair: Names of what is nearest in the worst sample; empty if there is nothing.
-    """
-
-    distance: np.ndarray
-    pair: str
-
-    @property
-    def least(self) -> float:
-        """Least distance of all [m]."""
-        return float(self.distance.min(initial=np.inf))
 
 
 class RobotScene:
@@ -198,18 +163,6 @@ class RobotScene:
     def inspector(self) -> SceneGraphInspector:
         """What the scene graph knows of the shapes."""
         return self._scene.model_inspector()
-
-    def clearance(self, q: np.ndarray) -> Clearance:
-        """Return the least distances of a motion, as Drake computes them.
-
-        Args:
-            q: Joint positions [rad or m], shape (K, N).
-        """
-        table = self.distances(q)
-        if not self.pairs:
-            return Clearance(np.full(len(q), np.inf), "")
-        worst = int(np.argmin(table.min(axis=0)))
-        return Clearance(table.min(axis=1), self.pairs[worst].name)
 
     def distances(self, q: np.ndarray, numbers: np.ndarray | None = None) -> np.ndarray:
         """Return the distances of pairs [m], shape (K, n).
@@ -318,7 +271,11 @@ def cell_of(subject: Subject, cell: Cell | str | Path | None) -> Cell:
     """
     if isinstance(cell, Cell):
         return cell
-    return load_cell(cell, subject.name if subject.block is None else subject.block.model)
+    if cell is not None:
+        return load_file(Cell, cell)
+    model = subject.name if subject.block is None else subject.block.model
+    shipped = models_directory() / Path(model).stem / "cell.yaml"
+    return load_file(Cell, shipped) if shipped.is_file() else Cell()
 
 
 def obstacle_shape(obstacle: Obstacle) -> tuple[RigidTransform, DrakeShape]:

@@ -60,7 +60,7 @@ def swept_clearance(
     q, _, _ = trajectory.motion(t)
     weights = _reach_between(chain, scene, q)
     distances = scene.distances(q)
-    nearest = _Nearest.of(scene, t, distances)
+    nearest = _nearest(scene, t, distances)
     bounds = _between(trajectory, t[:-1], t[1:], distances[:-1], distances[1:], weights)
     goal = required - tolerance
     near = np.any(bounds < goal, axis=0)
@@ -82,33 +82,25 @@ def swept_clearance(
         middle = (left + right) / 2.0
         at_middle = scene.distances(trajectory.motion(middle)[0], pairs)
         instants += len(middle)
-        nearest = min(nearest, _Nearest.of(scene, middle, at_middle, pairs))
+        nearest = min(nearest, _nearest(scene, middle, at_middle, pairs))
         at_left = np.vstack([at_left[~known], at_middle])
         at_right = np.vstack([at_middle, at_right[~known]])
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
         bounds = _between(trajectory, left, right, at_left, at_right, weights)
-    return SweptClearance(nearest.distance, guaranteed, nearest.pair, nearest.time, instants)
+    least, time, pair = nearest
+    return SweptClearance(least, guaranteed, pair, time, instants)
 
 
-@dataclass(frozen=True, order=True)
-class _Nearest:
-    """Least distance of some [m], when it is [s] and of what."""
-
-    distance: float
-    time: float
-    pair: str
-
-    @classmethod
-    def of(
-        cls,
-        scene: RobotScene,
-        times: np.ndarray,
-        distances: np.ndarray,
-        pairs: np.ndarray | None = None,
-    ) -> "_Nearest":
-        row, column = np.unravel_index(np.argmin(distances), distances.shape)
-        pair = scene.pairs[int(column) if pairs is None else int(pairs[column])]
-        return cls(float(distances[row, column]), float(times[row]), pair.name)
+def _nearest(
+    scene: RobotScene,
+    times: np.ndarray,
+    distances: np.ndarray,
+    pairs: np.ndarray | None = None,
+) -> tuple[float, float, str]:
+    """Return the least of some distances [m], when it is [s] and of what."""
+    row, column = np.unravel_index(np.argmin(distances), distances.shape)
+    pair = scene.pairs[int(column) if pairs is None else int(pairs[column])]
+    return float(distances[row, column]), float(times[row]), pair.name
 
 
 def _between(

@@ -76,7 +76,7 @@ def check_excited(subject: Subject, problem: ExcitationProblem, base: BaseParame
     """
     t = np.arange(_SAMPLES) * problem.period / _SAMPLES
     bases = fourier_basis(t, problem.period, problem.harmonics)
-    forward = problem.kernels.forward.map(_SAMPLES)
+    forward = problem.kernels[0].map(_SAMPLES)
     best, direction = -1.0, np.zeros(base.rank)
     for i in range(_MOTIONS):
         coefficients = random_start(problem, np.random.default_rng(i))

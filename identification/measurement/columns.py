@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.measurement.record import REQUIRED_SIGNALS, SIGNALS, MeasuredRobot, Record
+from identification.measurement.record import REQUIRED_SIGNALS, SIGNALS, Record
+from identification.model.subject import Subject
 from pfsc_drake.errors import InputError, in_one_line, shortened, suggestion
 
 _TURN = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "rev": 2.0 * np.pi}
@@ -129,7 +130,7 @@ def parse_name(name: str) -> tuple[str, str] | None:
 
 def make_record(
     signals: Sequence[RawSignal],
-    robot: MeasuredRobot,
+    robot: Subject,
     period: float | None,
     reading: Reading,
     source: str,
@@ -156,7 +157,7 @@ def make_record(
 class _Table:
     """Columns of a record, by signal and joint."""
 
-    def __init__(self, robot: MeasuredRobot, reading: Reading, source: str) -> None:
+    def __init__(self, robot: Subject, reading: Reading, source: str) -> None:
         self._robot, self._reading, self._source = robot, reading, source
         self._columns: dict[tuple[str, int], np.ndarray] = {}
         self._without_unit: list[tuple[str, int]] = []

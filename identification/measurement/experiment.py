@@ -3,16 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from identification.estimation.wiring import find_mistake
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.run_in import ExcitationRun, rest_to_rest
+from identification.excitation.run_in import run_of
 from identification.measurement.imperfections import Imperfections, shipped_imperfections
 from identification.measurement.periods import AveragedMotion, average
 from identification.measurement.record import Record
 from identification.measurement.servo import Servo, friction_torques, rigid_torques
-from identification.measurement.station import MeasuredStation, build_station
+from identification.measurement.station import build_station, simulate_diagram
 from identification.measurement.synchronization import check_torque_lag
 from identification.model.base import BaseParameters, base_parameters
 from identification.model.regressor import Regressor
@@ -22,7 +21,6 @@ from pfsc_drake.geometry.progress import Progress
 
 PERIODS = 5  # Sec. C.2
 _CHUNK = 0.25  # s, after which progress is told
-_SCHEME = "runge_kutta3"
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +83,20 @@ def run_experiment(
     faults.check_size(subject.dimension)
     usual = _usual_friction(subject)
     coulomb, viscous = faults.friction(*usual, random)
-    run = _checked_run(subject, trajectory, periods, servo)
+    run = run_of(subject, trajectory, periods, 1.0 / servo.period)
     _, *motion = run.sample(1.0 / servo.period)
     rigid = rigid_torques(subject, *motion)
     check_effort(subject, rigid + friction_torques(motion[1], *usual))
     friction = (coulomb, viscous)
-    station = build_station(subject, run, faults, servo, friction, rigid, usual, random)
-    t, signals = _simulate(station, run, servo, progress)
+    station = build_station(subject, run, faults, servo, friction, rigid, random)
+    # the run-out serves a real robot
+    ticks = round((run.duration - run.ramp) / servo.period)
+    stride = max(1, round(_CHUNK / servo.period))
+    ends = [tick * servo.period for tick in [*range(stride, ticks, stride), ticks]]
+    tell = progress or (lambda fraction, phase: None)
+    t, signals = simulate_diagram(
+        *station, servo.period, ends, lambda fraction: tell(fraction, "simulating the experiment")
+    )
     # what acts up to a tick and what acts from it on
     feedback = signals["feedback"].copy()
     feedback[1:] = 0.5 * (feedback[1:] + feedback[:-1])
@@ -123,33 +128,6 @@ def _usual_friction(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     return subject.coulomb, subject.viscous
 
 
-def _checked_run(
-    subject: Subject, trajectory: FourierTrajectory, periods: int, servo: Servo
-) -> ExcitationRun:
-    n = subject.dimension
-    if trajectory.dimension != n:
-        raise InputError(
-            f"excitation: of {trajectory.dimension} joints; {subject.name} has {n} joints"
-        )
-    q = trajectory.motion(trajectory.sample_times(1.0 / servo.period))[0]
-    lower, upper = subject.position_limits.T
-    beyond = np.maximum(q.max(axis=0) - upper, lower - q.min(axis=0))
-    j = int(np.argmax(beyond))
-    if beyond[j] > 0.0:
-        unit = subject.joint_units[j]
-        raise InputError(
-            f"excitation: {subject.joint_names[j]} goes from {q[:, j].min():.4g} to "
-            f"{q[:, j].max():.4g} {unit}; must stay within {lower[j]:.4g} to {upper[j]:.4g} {unit}"
-        )
-    return rest_to_rest(
-        trajectory,
-        subject.velocity_limit,
-        subject.acceleration_limit,
-        periods=periods,
-        rate=1.0 / servo.period,
-    )
-
-
 def check_effort(subject: Subject, tau: np.ndarray) -> None:
     """Refuse a motion whose torques a drive does not have: clipped, they tell nothing.
 
@@ -168,36 +146,6 @@ def check_effort(subject: Subject, tau: np.ndarray) -> None:
             f"excitation: asks {subject.joint_names[j]} for {largest[j]:.4g} {unit}; must stay "
             f"within the drive's {subject.effort_limit[j]:.4g} {unit}"
         )
-
-
-def _simulate(
-    station: MeasuredStation, run: ExcitationRun, servo: Servo, progress: Progress | None
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return times and logged signals."""
-    simulator = Simulator(station.diagram)
-    ApplySimulatorConfig(
-        SimulatorConfig(
-            integration_scheme=_SCHEME, max_step_size=servo.period, use_error_control=False
-        ),
-        simulator,
-    )
-    root = simulator.get_mutable_context()
-    station.plant.set_state(station.plant.GetMyMutableContextFromRoot(root), station.start)
-    simulator.Initialize()
-    # the run-out serves a real robot
-    ticks = round((run.duration - run.ramp) / servo.period)
-    stride = max(1, round(_CHUNK / servo.period))
-    for tick in [*range(stride, ticks, stride), ticks]:
-        try:
-            simulator.AdvanceTo(tick * servo.period)
-        except RuntimeError as error:
-            raise InputError(
-                f"excitation: cannot be simulated: {' '.join(str(error).split())}; the robot must "
-                "be able to follow it"
-            ) from None
-        if progress is not None:
-            progress(tick / ticks, "simulating the experiment")
-    return station.log.read(root)
 
 
 def prepare_motion(

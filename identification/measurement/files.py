@@ -24,9 +24,10 @@ import numpy as np
 from scipy.io import loadmat, savemat
 
 from identification.measurement.columns import RawSignal, Reading, make_record, parse_name, si_unit
-from identification.measurement.record import SIGNALS, MeasuredRobot, Record, check_record
+from identification.measurement.record import SIGNALS, Record, check_record
 from identification.measurement.synchronization import check_velocities
-from identification.options import write_bytes
+from identification.model.subject import Subject
+from identification.output import write_bytes
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers, read_regular_file, unreadable
 from reporting.hdf5_reading import opened
@@ -42,7 +43,7 @@ Raw = tuple[list[RawSignal], float | None]
 
 def read_record(
     path: str | Path,
-    robot: MeasuredRobot,
+    robot: Subject,
     period: float | None = None,
     reading: Reading | None = None,
     *,
@@ -80,7 +81,7 @@ def read_record(
     return record
 
 
-def write_record(path: str | Path, record: Record, robot: MeasuredRobot) -> None:
+def write_record(path: str | Path, record: Record, robot: Subject) -> None:
     """Write a record with all its signals.
 
     Args:

@@ -1,11 +1,10 @@
 """What was measured of a robot while it moved, and whether that is sound."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 
 # signals of a record beside the time: a value per sample and joint
@@ -24,34 +23,6 @@ _REACHES = 1e-3  # part of a limit by which a clipped torque may miss it
 # samples at the extreme value that make a plateau, and how much longer than the steps next to it;
 # the top of a parabola that is rounded to steps is up to 5 times as long as these
 _PLATEAU, _FLAT = 5, 10.0
-
-
-class MeasuredRobot(Protocol):
-    """What records are checked against; all on the joint side, N joints."""
-
-    @property
-    def name(self) -> str:
-        """Name of the robot."""
-
-    @property
-    def joint_names(self) -> Sequence[str]:
-        """Names of the N joints."""
-
-    @property
-    def joint_units(self) -> Sequence[str]:
-        """``rad`` or ``m`` for each joint."""
-
-    @property
-    def position_limits(self) -> np.ndarray:
-        """Limits of the positions [rad or m], shape (N, 2); infinite if unknown."""
-
-    @property
-    def velocity_limit(self) -> np.ndarray:
-        """Largest velocities [rad/s or m/s], shape (N,); infinite if unknown."""
-
-    @property
-    def effort_limit(self) -> np.ndarray:
-        """Largest torques [Nm or N], shape (N,); infinite if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +114,7 @@ class Record:
         return self.t.size * self.sampling_time
 
 
-def check_record(record: Record, robot: MeasuredRobot, still: bool = False) -> None:
+def check_record(record: Record, robot: Subject, still: bool = False) -> None:
     """Refuse a record that is not sound or cannot be of the robot.
 
     That is: gaps in time, samples that are not evenly spaced, other joints than the robot's,
@@ -192,7 +163,7 @@ def check_sampling(record: Record) -> None:
         )
 
 
-def _check_positions(record: Record, robot: MeasuredRobot, still: bool) -> None:
+def _check_positions(record: Record, robot: Subject, still: bool) -> None:
     for name, positions in (("q", record.q), ("q_motor", record.q_motor)):
         if positions is None:
             continue
@@ -216,7 +187,7 @@ def _check_positions(record: Record, robot: MeasuredRobot, still: bool) -> None:
 
 
 def _explanation(
-    positions: np.ndarray, lower: np.ndarray, upper: np.ndarray, robot: MeasuredRobot, joint: int
+    positions: np.ndarray, lower: np.ndarray, upper: np.ndarray, robot: Subject, joint: int
 ) -> str:
     """Return what may be the matter with positions beyond the limits."""
     revolute = robot.joint_units[joint] == "rad"
@@ -232,7 +203,7 @@ def _explanation(
     )
 
 
-def _check_velocities(record: Record, robot: MeasuredRobot) -> None:
+def _check_velocities(record: Record, robot: Subject) -> None:
     stride = max(1, round(_STRETCH / record.sampling_time))
     if record.t.size <= stride:
         return
@@ -255,7 +226,7 @@ def _check_velocities(record: Record, robot: MeasuredRobot) -> None:
         )
 
 
-def _check_torques(record: Record, robot: MeasuredRobot) -> None:
+def _check_torques(record: Record, robot: Subject) -> None:
     for j, name in enumerate(record.joint_names):
         tau, limit = record.tau[:, j], float(robot.effort_limit[j])
         unit = "Nm" if robot.joint_units[j] == "rad" else "N"

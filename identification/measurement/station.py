@@ -1,10 +1,12 @@
 """The station of the simulated experiment: a robot, its drives and its encoders, in Drake."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.controllers import PidController
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
     MatrixGain,
     Saturation,
@@ -24,7 +26,8 @@ from identification.measurement.servo import (
     drive_inertia,
 )
 from identification.model.subject import Subject
-from pfsc_drake.physics.friction import bristles_for_step
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.friction import FrictionDrift, bristles_for_step
 from pfsc_drake.physics.joint_sensors import EncoderOptions, JointEncoders
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.systems.block_system import BlockSystem
@@ -32,23 +35,51 @@ from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.plants.coupled_plants import RigidPlant
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
+_SCHEME = "runge_kutta3"
 
-@dataclass(frozen=True)
-class MeasuredStation:
-    """A robot that runs an excitation; N joints.
+# what sets the state at the start, of the context of the diagram
+SetState = Callable[[Context], None]
 
-    Attributes:
-        diagram: Plant, servo, friction, encoders and log.
-        plant: What the servo moves, with the state ``[q, v]``.
-        log: At the ticks: ``state`` ``[q, v]``, ``q`` as the encoders tell it, ``feedback`` that
-            acts until the next tick, ``feed_forward`` at the tick [Nm or N].
-        start: Positions at the start [rad or m], shape (N,).
+
+def simulate_diagram(
+    diagram: Diagram,
+    log: SignalLog,
+    set_state: SetState,
+    step: float,
+    ends: Sequence[float],
+    progress: Callable[[float], None],
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Simulate a diagram by steps of the same length, and return times and logged signals.
+
+    Args:
+        diagram: With the log.
+        log: Its log.
+        set_state: Sets the state at the start.
+        step: Of the integration [s].
+        ends: Times after which progress is told, the last one the end [s].
+        progress: Receives the fraction done.
+
+    Raises:
+        InputError: If the motion cannot be simulated.
     """
-
-    diagram: Diagram
-    plant: RigidPlant | DeltaPlant
-    log: SignalLog
-    start: np.ndarray
+    simulator = Simulator(diagram)
+    config = SimulatorConfig(
+        integration_scheme=_SCHEME, max_step_size=step, use_error_control=False
+    )
+    ApplySimulatorConfig(config, simulator)
+    root = simulator.get_mutable_context()
+    set_state(root)
+    simulator.Initialize()
+    for end in ends:
+        try:
+            simulator.AdvanceTo(end)
+        except RuntimeError as error:
+            raise InputError(
+                f"excitation: cannot be simulated: {' '.join(str(error).split())}; the robot must "
+                "be able to follow it"
+            ) from None
+        progress(end / ends[-1])
+    return log.read(root)
 
 
 def build_station(
@@ -58,19 +89,20 @@ def build_station(
     servo: Servo,
     friction: tuple[np.ndarray, np.ndarray],
     rigid: np.ndarray,
-    usual: tuple[np.ndarray, np.ndarray],
     random: np.random.Generator,
-) -> MeasuredStation:
-    """Return the station of one run.
+) -> tuple[Diagram, SignalLog, SetState]:
+    """Return the station of one run, its log, and what puts the robot at the start.
+
+    The log has at the ticks ``state`` ``[q, v]``, ``q`` as the encoders measure it, ``feedback``
+    that acts until the next tick, and ``feed_forward`` at the tick [Nm or N].
 
     Args:
-        subject: The robot.
+        subject: The robot; the servo feeds forward its usual friction.
         run: What it is to do.
         faults: Encoders, disturbance and drift of the friction.
         servo: The controller.
         friction: ``f_c`` and ``f_v`` of this run, each (N,).
         rigid: Torques of the robot without friction at the ticks [Nm or N], shape (K, N).
-        usual: ``f_c`` and ``f_v`` as the servo believes them, each (N,).
         random: Generator of the disturbance.
     """
     builder, n = DiagramBuilder(), subject.dimension
@@ -87,6 +119,8 @@ def build_station(
     feedback = control.get_output_port_control()
     hold = builder.AddNamedSystem("hold", ZeroOrderHold(servo.period, n))
     builder.Connect(feedback, hold.get_input_port())
+    assert subject.coulomb is not None and subject.viscous is not None  # as the servo has them
+    usual = subject.coulomb, subject.viscous
     known = add_feed_forward(builder, servo, t, v, rigid, usual)
     wanted = add_sum(builder, "drive_torque", hold.get_output_port(), known)
     limits = builder.AddNamedSystem(
@@ -94,7 +128,7 @@ def build_station(
     )
     builder.Connect(wanted, limits.get_input_port())
     builder.Connect(limits.get_output_port(), plant.GetInputPort("actuation"))
-    resistance = _add_friction(builder, faults, friction, inertia, servo, state)
+    resistance = add_friction(builder, friction, inertia, servo.period, state, faults.drift)
     if faults.disturbance > 0.0:
         torque = faults.coloured_torque(len(t), servo.period, random)
         ripple = add_samples(builder, "disturbance", t, torque)
@@ -111,7 +145,11 @@ def build_station(
     log = add_log(builder, signals, servo.period)
     diagram = builder.Build()
     diagram.set_name("identification_experiment")
-    return MeasuredStation(diagram, plant, log, q[0])
+
+    def set_state(root: Context) -> None:
+        plant.set_state(plant.GetMyMutableContextFromRoot(root), q[0])
+
+    return diagram, log, set_state
 
 
 def add_feed_forward(
@@ -171,20 +209,29 @@ def _add_encoders(
     return half.get_output_port()
 
 
-def _add_friction(
+def add_friction(
     builder: DiagramBuilder,
-    faults: Imperfections,
     friction: tuple[np.ndarray, np.ndarray],
     inertia: np.ndarray,
-    servo: Servo,
+    step: float,
     state: OutputPort,
+    drift: FrictionDrift | None = None,
 ) -> OutputPort:
-    """Return the resistance of friction, shape (N,)."""
+    """Return the resistance of friction, shape (N,).
+
+    Args:
+        builder: Builder of the diagram.
+        friction: ``f_c`` and ``f_v``, each (N,).
+        inertia: What friction brakes [kg m^2 or kg], shape (N,).
+        step: Of the integration [s].
+        state: ``[q, v]`` of what friction brakes, shape (2N,).
+        drift: How friction changes, if it does.
+    """
     n = inertia.size
-    stiffest = friction[0] * (1.0 if faults.drift is None else max(1.0, faults.drift.factor))
-    bristles = bristles_for_step(stiffest, friction[1], inertia, servo.period)
+    stiffest = friction[0] * (1.0 if drift is None else max(1.0, drift.factor))
+    bristles = bristles_for_step(stiffest, friction[1], inertia, step)
     system = builder.AddNamedSystem(
-        "friction", JointFriction(replace(bristles, coulomb=friction[0]), faults.drift)
+        "friction", JointFriction(replace(bristles, coulomb=friction[0]), drift)
     )
     velocity = builder.AddNamedSystem("velocity", MatrixGain(np.eye(2 * n)[n:]))
     builder.Connect(state, velocity.get_input_port())

@@ -1,7 +1,7 @@
 """The regression matrix Y of (2.73): torques that are linear in the dynamic parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -22,7 +22,6 @@ from pfsc_drake.robot.serial.rotor_coupling import RotorMount, rotor_momentum
 _BATCH = 500
 
 
-@dataclass(frozen=True, eq=False)
 class Regressor:
     """The regression matrix of a robot with N joints and n parameters.
 
@@ -47,27 +46,21 @@ class Regressor:
         InputError: If ``sign_width`` is negative.
     """
 
-    subject: Subject
-    friction: bool = True
-    coupling: bool = True
-    sign_width: float = 0.0
-    names: list[str] = field(init=False, repr=False)
-    units: list[str] = field(init=False, repr=False)
-    function: ca.Function = field(init=False, repr=False)
-    _batch: BoundFunction = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.sign_width < np.inf:
-            raise InputError(f"sign_width = {self.sign_width!r}; must be finite and not negative")
-        function = self._function()
-        batch = function.map(_BATCH)
-        for name, value in {
-            "names": parameter_names(self.subject, self.friction),
-            "units": parameter_units(self.subject, self.friction),
-            "function": function,
-            "_batch": BoundFunction(batch),
-        }.items():
-            object.__setattr__(self, name, value)
+    def __init__(
+        self,
+        subject: Subject,
+        friction: bool = True,
+        coupling: bool = True,
+        sign_width: float = 0.0,
+    ) -> None:
+        if not 0.0 <= sign_width < np.inf:
+            raise InputError(f"sign_width = {sign_width!r}; must be finite and not negative")
+        self.subject, self.friction, self.coupling = subject, friction, coupling
+        self.sign_width = sign_width
+        self.names = parameter_names(subject, friction)
+        self.units = parameter_units(subject, friction)
+        self.function = self._function()
+        self._batch = BoundFunction(self.function.map(_BATCH))
 
     @property
     def size(self) -> int:

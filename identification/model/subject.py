@@ -35,26 +35,16 @@ TOLERANCE = 1e-4
 _EXACT = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class RoundedChain:
-    """A chain whose angles are what they were before they were rounded.
-
-    Attributes:
-        chain: The chain.
-        note: What was changed, one line; empty if nothing was.
-    """
-
-    chain: SerialChain
-    note: str
-
-
-def with_round_angles(chain: SerialChain) -> RoundedChain:
+def with_round_angles(chain: SerialChain) -> tuple[SerialChain, str]:
     """Return a chain with joints turned by multiples of 15 degrees where they nearly are.
 
     Roll, pitch and yaw of a joint's frame in the one before count, each by itself.
 
     Args:
         chain: As the model file has it.
+
+    Returns:
+        The chain, and what was changed in one line; empty if nothing was.
     """
     links, changed, most = [], [], 0.0
     for link in chain.links:
@@ -66,12 +56,12 @@ def with_round_angles(chain: SerialChain) -> RoundedChain:
             link = replace(link, R_PF=rounded)
         links.append(link)
     if not changed:
-        return RoundedChain(chain, "")
+        return chain, ""
     note = (
         f"the model's angles at {', '.join(changed)} are up to {most:.2g} rad off multiples of "
         f"{STEP_DEG:g} deg; taken for rounded, and put right"
     )
-    return RoundedChain(replace(chain, links=tuple(links)), note)
+    return replace(chain, links=tuple(links)), note
 
 
 def round_rotation(R: np.ndarray) -> np.ndarray:
@@ -222,8 +212,7 @@ def _delta_subject(name: str, robot: DeltaRobot) -> Subject:
 def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> Subject:
     plant, _ = read_robot(block, folder)
     from_file, _ = chain_from_plant(plant, tool_frame_of(plant, block))
-    rounded = with_round_angles(from_file)
-    chain = rounded.chain
+    chain, changed = with_round_angles(from_file)
     parameters = _parameter_file(locate_model(block, folder))
     if parameters is not None and not tool:
         chain = without_tool(chain, parameters)
@@ -249,7 +238,7 @@ def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> S
         block=block,
         folder=folder,
         tool=tool,
-        note=f"{name}: {rounded.note}" if rounded.note else "",
+        note=f"{name}: {changed}" if changed else "",
     )
 
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from identification.consistency.nearest import ConsistentParameters
@@ -12,8 +11,17 @@ from identification.estimation.identifiability import BADLY
 from identification.estimation.least_squares import Estimate
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.residuals import Whiteness
-from identification.estimation.validation import PredictedTorque
-from reporting.style import ALERT, COLOURS, REFERENCE, STYLE, WIDTH, Drawing, Figure, render
+from reporting.style import (
+    ALERT,
+    COLOURS,
+    REFERENCE,
+    STYLE,
+    WIDTH,
+    Drawing,
+    Figure,
+    make_panels,
+    render,
+)
 
 _ROW = 1.35  # height of a joint's panel [inches]
 _LINE = 0.19  # height of a parameter's line [inches]
@@ -31,40 +39,43 @@ def excitation_figure(
         units: ``rad`` or ``m`` of each joint.
     """
     with plt.rc_context(STYLE):
-        canvas, panels = _joint_panels(q.shape[1])
+        canvas, panels = make_panels(q.shape[1], _ROW)
         for j, panel in enumerate(panels):
             panel.plot(t, q[:, j], color=COLOURS[0])
             for limit in limits[j][np.isfinite(limits[j])]:
                 panel.axhline(limit, color=ALERT, linewidth=0.9, linestyle="--")
             panel.set_ylabel(f"$q_{j + 1}$ in {units[j]}")
-        panels[-1].set_xlabel("time in s")
         caption = "Mean of the periods; limits of the joints are dashed."
         return render(Drawing("excitation", "Excitation", caption, canvas))
 
 
-def fit_figure(t: np.ndarray, prediction: PredictedTorque, title: str, caption: str) -> Figure:
+def fit_figure(
+    t: np.ndarray,
+    torques: tuple[np.ndarray, np.ndarray],
+    units: Sequence[str],
+    title: str,
+    caption: str,
+) -> Figure:
     """Return measured and predicted torques and what is left, as in Fig. C.2.
 
     Args:
         t: Times [s], shape (K,).
-        prediction: Prediction of that motion.
+        torques: Measured and predicted ones of that motion [Nm or N], each (K, N).
+        units: ``Nm`` or ``N`` of each joint.
         title: A few words.
         caption: What to see in it.
     """
+    measured, predicted = torques
     with plt.rc_context(STYLE):
-        canvas, panels = _joint_panels(len(prediction.joint_names))
+        canvas, panels = make_panels(len(units), _ROW)
         for j, panel in enumerate(panels):
-            panel.plot(
-                t, prediction.measured[:, j], color="#9CA3AF", linewidth=2.6, label="measured"
-            )
-            panel.plot(
-                t, prediction.predicted[:, j], color=COLOURS[0], linewidth=1.1, label="predicted"
-            )
-            panel.plot(t, prediction.residuals[:, j], color=COLOURS[1], linewidth=0.8, label="left")
-            panel.set_ylabel(f"$\\tau_{j + 1}$ in {prediction.units[j]}")
+            left = measured[:, j] - predicted[:, j]
+            panel.plot(t, measured[:, j], color="#9CA3AF", linewidth=2.6, label="measured")
+            panel.plot(t, predicted[:, j], color=COLOURS[0], linewidth=1.1, label="predicted")
+            panel.plot(t, left, color=COLOURS[1], linewidth=0.8, label="left")
+            panel.set_ylabel(f"$\\tau_{j + 1}$ in {units[j]}")
         handles = panels[0].get_legend_handles_labels()
         canvas.legend(*handles, loc="outside upper right", ncols=3, frameon=False)
-        panels[-1].set_xlabel("time in s")
         name = "prediction" if "not used" in title else "fit"
         return render(Drawing(name, title, caption, canvas))
 
@@ -142,7 +153,7 @@ def whiteness_figure(test: Whiteness) -> Figure:
     """
     lags = np.arange(1, len(test.autocorrelation) + 1)
     with plt.rc_context(STYLE):
-        canvas, panels = _joint_panels(len(test.joint_names), height=1.0)
+        canvas, panels = make_panels(len(test.joint_names), 1.0)
         for j, panel in enumerate(panels):
             panel.axhspan(-test.bound[j], test.bound[j], color="#E5E7EB")
             panel.vlines(lags, 0.0, test.autocorrelation[:, j], color=COLOURS[0])
@@ -167,9 +178,3 @@ def weakness_figure(estimate: Estimate) -> Figure:
         panel.set(yscale="log", xlabel="direction", ylabel="singular value")
         caption = "Directions of the parameters by how much the torques depend on them."
         return render(Drawing("directions", "Singular values of the excitation", caption, canvas))
-
-
-def _joint_panels(count: int, height: float = _ROW) -> tuple[Canvas, list[Axes]]:
-    canvas = Canvas(figsize=(WIDTH, height * count + 0.5))
-    panels = canvas.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    return canvas, list(panels)

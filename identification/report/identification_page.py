@@ -1,16 +1,13 @@
-"""One page, and tables, about the identification of a robot."""
+"""One page about the identification of a robot."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from identification.consistency.nearest import ConsistentParameters
-from identification.estimation.choice import FrictionChoice
 from identification.estimation.least_squares import Estimate
 from identification.estimation.residuals import whiteness
-from identification.estimation.validation import PredictedTorque
 from identification.findings import Findings
 from identification.model.subject import Subject
 from identification.report.figures import (
@@ -20,123 +17,18 @@ from identification.report.figures import (
     weakness_figure,
     whiteness_figure,
 )
+from identification.report.tables import (
+    consistent_table,
+    friction_table,
+    parameter_table,
+    torque_table,
+    weakness_table,
+)
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
 from reporting.page import Page, Report, Table
 from reporting.provenance import standard_attributes
 from reporting.style import Figure
-
-
-def parameter_table(findings: Findings, words: bool = True) -> Table:
-    """Return Tab. C.3: each base parameter with its standard deviations.
-
-    Args:
-        findings: What was estimated.
-        words: Whether to say what each is a combination of, or only what leads it.
-    """
-    rows: list[list[str | float]] = [
-        [
-            str(row.number),
-            row.combination if words else row.name,
-            row.mean,
-            row.unit,
-            row.relative_deviation,
-            row.predicted_deviation,
-            row.truth,
-        ]
-        for row in findings.runs.parameter_rows(findings.truth)
-    ]
-    caption = (
-        "Mean of the runs; standard deviation of one run in % of it, of the runs and predicted."
-    )
-    head = ["", "parameter", "mean", "unit", "of the runs in %", "predicted in %", "true"]
-    return _known("Base parameters", caption, head, rows)
-
-
-def torque_table(findings: Findings) -> Table:
-    """Return Tab. C.4: what the model leaves of the torques, beside their noise."""
-    used = findings.prediction
-    rows: list[list[str | float]] = []
-    for j, row in enumerate(findings.runs.torque_rows()):
-        other = [float("nan")] * 2 if used is None else [used.error_rms[j], 100 * used.explained[j]]
-        rows.append(
-            [
-                row.joint,
-                row.unit,
-                row.noise_level,
-                row.error_rms,
-                100.0 * row.explained,
-                *map(float, other),
-            ]
-        )
-    head = [
-        "joint",
-        "unit",
-        "noise",
-        "error",
-        "explained in %",
-        "error, not used",
-        "explained in %",
-    ]
-    caption = (
-        "Root mean squares of single measured torques: noise, and error of the model on the motion "
-        "that it is from and on one that was not used; share of the torques' variance that it "
-        "explains."
-    )
-    return _known("Torques", caption, head, rows)
-
-
-def _known(
-    title: str, caption: str, head: Sequence[str], rows: Sequence[Sequence[str | float]]
-) -> Table:
-    """Return a table without the columns of which nothing is known."""
-    kept = [
-        k
-        for k in range(len(head))
-        if any(isinstance(row[k], str) or not math.isnan(float(row[k])) for row in rows)
-    ]
-    return Table(title, caption, [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
-
-
-def weakness_table(estimate: Estimate) -> Table:
-    """Return what is badly identifiable, and why."""
-    rows: list[list[str | float]] = [
-        [weak.name, 100.0 * weak.relative_deviation, weak.reason]
-        for weak in estimate.weak_parameters()
-    ]
-    caption = "Parameters with a standard deviation above 15 % of their value."
-    return Table("Badly identifiable", caption, ["parameter", "in %", "why"], rows)
-
-
-def friction_table(choice: FrictionChoice, joints: Sequence[str]) -> Table:
-    """Return the friction terms that were tried."""
-    rows: list[list[str | float]] = [
-        [
-            joints[judged.term.joint],
-            judged.term.kind,
-            "" if judged.term.width is None else f"{judged.term.width:.3g}",
-            100.0 * judged.share,
-            judged.significance,
-            "chosen" if judged.chosen else "",
-        ]
-        for judged in choice.judgements
-    ]
-    caption = (
-        "By how much terms beside Coulomb and viscous friction lower the error of a motion that "
-        f"was not used; chosen above a significance of {choice.threshold:.2f}."
-    )
-    head = ["joint", "term", "width", "share in %", "significance", ""]
-    return Table("Friction", caption, head, rows)
-
-
-def consistent_table(found: ConsistentParameters, units: Sequence[str]) -> Table:
-    """Return all parameters of the consistent set."""
-    rows: list[list[str | float]] = [
-        [name, value, unit]
-        for name, value, unit in zip(found.names, found.parameters.tolist(), units, strict=True)
-    ]
-    caption = f"Every link is a body of positive density; chi squared {found.chi_squared:.4g}."
-    return Table("Physically consistent parameters", caption, ["parameter", "value", "unit"], rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,24 +155,17 @@ def _figures(content: PageContent) -> list[Figure]:
     estimate = findings.estimate
     motion = estimate.motion
     t = np.asarray(getattr(motion, "t", np.arange(len(motion.tau))))
-    fit = PredictedTorque(
-        estimate.joint_names,
-        tuple("Nm" if unit == "rad" else "N" for unit in estimate.joint_units),
-        estimate.system.torques,
-        estimate.prediction,
-        estimate.system.used,
-        motion.torque_variance,
-        motion.mean_torque_variance,
-        np.zeros(len(estimate.joint_names)),
-    )
+    units = ["Nm" if unit == "rad" else "N" for unit in estimate.joint_units]
+    fit = (estimate.system.torques, estimate.prediction)
     figures = [
         excitation_figure(t, motion.q, subject.position_limits, subject.joint_units),
-        fit_figure(t, fit, "Torques that the model is from", "Means of the periods."),
+        fit_figure(t, fit, units, "Torques that the model is from", "Means of the periods."),
     ]
     if findings.prediction is not None and content.other_t is not None:
+        torques = (findings.prediction.measured, findings.prediction.predicted)
         caption = "Means of the periods of a motion that the model does not know."
         title = "Torques of a motion that was not used"
-        figures.append(fit_figure(content.other_t, findings.prediction, title, caption))
+        figures.append(fit_figure(content.other_t, torques, units, title, caption))
     figures.append(parameter_figure(findings.runs, findings.truth, content.consistent))
     test = whiteness(estimate.residuals, estimate.system.used, estimate.joint_names)
     figures += [whiteness_figure(test), weakness_figure(estimate)]

@@ -7,7 +7,7 @@ import pytest
 
 from identification.consistency.bounds import load_bounds
 from identification.excitation.fourier import FourierTrajectory
-from identification.findings import find_consistent, find_parameters
+from identification.findings import consistent_set, find_parameters
 from identification.measurement.periods import average
 from identification.measurement.record import Record
 from identification.model.base import base_parameters
@@ -92,7 +92,7 @@ def test_the_consistent_set_is_that_of_all_runs(delta):
     found = find_parameters(
         delta.regressor, delta.base, [measured(delta, seed) for seed in range(4)]
     )
-    consistent = find_consistent(found.runs, load_bounds("festo_expt_45"))
+    consistent = consistent_set(found, load_bounds("festo_expt_45"), direct=False)
     mean = delta.base.values(consistent.parameters)
     deviation = (mean - found.runs.mean) / np.sqrt(np.diag(found.runs.covariance_of_mean))
     # slides of the parameter file weigh the same

@@ -7,7 +7,7 @@ import typer
 
 from identification.cli import main
 from identification.measurement.files import read_record, write_record
-from identification.options import check_folder, write_text
+from identification.output import check_folder, write_text
 from pfsc_drake.errors import InputError, WriteError
 from reporting.terminal import run_app
 
@@ -32,7 +32,7 @@ def test_folders(tmp_path):
 def test_a_file_in_place_of_the_folder_is_refused_before_the_work(
     tmp_path, monkeypatch, capsys, command
 ):
-    for step in ("excitation.search.search", "steps.simulate_runs", "steps.estimate_files"):
+    for step in ("excitation.search.search", "steps.simulate_runs", "pages.identify"):
         monkeypatch.setattr(f"identification.{step}", None)
     out = tmp_path / "file"
     out.write_text("mine")

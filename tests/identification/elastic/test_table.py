@@ -18,8 +18,8 @@ def estimates():
     covariance = np.diag([21.0, 0.05, 1e-4, 0.01, 0.005, 0.006]) ** 2
     slide = np.array([5e5, 12.3456, 2.0, 5.0, 12.0, 0.1])
     return [
-        JointEstimate("elbow", "rad", False, values, covariance, NAMES, 0.3, 1000),
-        JointEstimate("lift", "m", False, slide, covariance, NAMES, 0.3, 1000),
+        JointEstimate("elbow", "rad", values, covariance, NAMES, 0.3, 1000),
+        JointEstimate("lift", "m", slide, covariance, NAMES, 0.3, 1000),
     ]
 
 

@@ -9,13 +9,12 @@ from pfsc_drake.errors import InputError
 
 def test_joints_share_no_frequency_and_have_the_stated_size():
     rms = np.array([90.0, 8.0, 4.0])
-    sines = zippered_multisine(rms, 2.0, np.random.default_rng(0), 4.0, 40.0)
-    assert np.unique(sines.frequency).size == sines.frequency.size
-    assert sines.frequency.min() == 4.0 and sines.frequency.max() <= 40.0
+    amplitude, frequency, phase = zippered_multisine(rms, 2.0, np.random.default_rng(0), 4.0, 40.0)
+    assert np.unique(frequency).size == frequency.size
+    assert frequency.min() == 4.0 and frequency.max() <= 40.0
     t = np.arange(2000) * 1e-3
     tau = np.sum(
-        sines.amplitude[..., None]
-        * np.sin(2.0 * np.pi * sines.frequency[..., None] * t + sines.phase[..., None]),
+        amplitude[..., None] * np.sin(2.0 * np.pi * frequency[..., None] * t + phase[..., None]),
         axis=1,
     )
     np.testing.assert_allclose(np.sqrt(np.mean(tau**2, axis=1)), rms, rtol=1e-9)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from identification.estimation.least_squares import (
-    NoiseSpectrum,
     coloured_covariance,
     mean_torque_spectrum,
 )
@@ -55,10 +54,10 @@ def test_covariance_under_noise_of_one_frequency(kind, samples):
     data = system(samples)
     noise, power = noise_of(kind, samples)
     white, flat = noise_of("white", samples)
-    spectrum = NoiseSpectrum(np.column_stack([power, flat]), np.array([True, False]))
+    powers = np.column_stack([power, flat])
     inverse, covariance = expected(data, [noise, white])
     np.testing.assert_allclose(
-        coloured_covariance(inverse, data, spectrum), covariance, rtol=1e-10, atol=1e-12
+        coloured_covariance(inverse, data, powers), covariance, rtol=1e-10, atol=1e-12
     )
 
 
@@ -66,12 +65,13 @@ def test_the_spectrum_is_that_of_the_mean():
     """White noise of P periods: its mean has the variance divided by P, at all frequencies."""
     periods = np.random.default_rng(1).normal(size=(5, 400, JOINTS)) * [1.0, 3.0]
     found = mean_torque_spectrum(SimpleNamespace(tau_periods=periods))
-    assert not found.coloured.any()
-    np.testing.assert_allclose(found.power[7], np.array([1.0, 9.0]) / 5.0, rtol=0.1)
+    powers, coloured = found
+    assert not coloured.any()
+    np.testing.assert_allclose(powers[7], np.array([1.0, 9.0]) / 5.0, rtol=0.1)
     # what all periods share is no noise
     shared = periods + 100.0 * np.sin(np.arange(400))[:, None]
     again = mean_torque_spectrum(SimpleNamespace(tau_periods=shared))
-    np.testing.assert_allclose(again.power, found.power, rtol=1e-9)
+    np.testing.assert_allclose(again[0], powers, rtol=1e-9)
 
 
 def test_an_offset_of_each_period_is_coloured_noise():
@@ -79,9 +79,10 @@ def test_an_offset_of_each_period_is_coloured_noise():
     random = np.random.default_rng(2)
     periods = 0.01 * random.normal(size=(6, 400, 1)) + random.normal(size=(6, 1, 1))
     found = mean_torque_spectrum(SimpleNamespace(tau_periods=periods))
-    assert found.coloured.all()
+    powers, coloured = found
+    assert coloured.all()
     offsets = periods.mean(axis=1)[:, 0]
     power = 400 * np.var(offsets, ddof=1) / 6
     # by a window of 21 frequencies
-    np.testing.assert_allclose(found.power[0, 0], power / 21.0, rtol=0.05)
-    assert found.power[20, 0] < 1e-3 * found.power[0, 0]
+    np.testing.assert_allclose(powers[0, 0], power / 21.0, rtol=0.05)
+    assert powers[20, 0] < 1e-3 * powers[0, 0]

@@ -6,6 +6,8 @@ import pytest
 from identification.estimation.friction_terms import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.repetitions import Repetitions
+from identification.findings import Findings
+from identification.report.tables import parameter_table, torque_table
 from pfsc_drake.errors import InputError
 
 
@@ -17,27 +19,28 @@ def runs(comau, measure):
 
 
 def test_table_of_parameters(comau, runs):
-    rows = runs.parameter_rows(comau.truth)
-    assert [row.number for row in rows] == list(range(1, 53))
+    rows = parameter_table(Findings(runs, truth=comau.truth)).rows
+    assert [row[0] for row in rows] == [str(number) for number in range(1, 53)]
     values = np.array([run.base_parameters for run in runs.estimates])
     for row, column, truth in zip(rows, values.T, comau.truth, strict=True):
-        assert row.mean == pytest.approx(column.mean())
+        assert row[2] == pytest.approx(column.mean())
         spread = np.sqrt(np.sum((column - column.mean()) ** 2) / 6.0)
-        assert row.relative_deviation == pytest.approx(100.0 * spread / abs(column.mean()))
-        assert row.truth == truth
-    f_c = next(row for row in rows if row.name == "joint_1.f_c")
-    assert (f_c.unit, f_c.combination) == ("Nm", "joint_1.f_c")
-    assert np.isnan(runs.parameter_rows()[0].truth)
+        assert row[4] == pytest.approx(100.0 * spread / abs(column.mean()))
+        assert row[6] == truth
+    (f_c,) = [row for row in rows if row[1] == "joint_1.f_c"]
+    assert f_c[3] == "Nm"
+    assert "true" not in parameter_table(Findings(runs)).head
 
 
 def test_table_of_torques(comau, runs):
     """Torques that are predicted well: the error is the noise, as printed in Tab. C.4."""
-    rows = runs.torque_rows()
-    for row, noise in zip(rows, comau.noise, strict=True):
-        assert row.noise_level == pytest.approx(noise, rel=0.03)
-        assert row.error_rms == pytest.approx(noise, rel=0.03)
-        assert row.unit == "Nm"
-        assert 0.85 < row.explained < 1.0
+    np.testing.assert_allclose(runs.noise_level, comau.noise, rtol=0.03)
+    np.testing.assert_allclose(runs.error_rms, comau.noise, rtol=0.03)
+    assert np.all((runs.explained > 0.85) & (runs.explained < 1.0))
+    rows = torque_table(Findings(runs)).rows
+    assert [row[:2] for row in rows] == [[f"joint_{j}", "Nm"] for j in range(1, 7)]
+    np.testing.assert_allclose([row[2] for row in rows], runs.noise_level)
+    np.testing.assert_allclose([row[4] for row in rows], 100.0 * runs.explained)
 
 
 def test_spread_is_as_predicted(runs):
@@ -81,6 +84,7 @@ def test_what_does_not_belong_together(comau, measure, runs):
         Repetitions((runs.estimates[0], other))
     single = Repetitions(runs.estimates[:1])
     np.testing.assert_allclose(single.covariance_of_mean, runs.estimates[0].covariance)
-    assert np.isnan(single.parameter_rows()[0].relative_deviation)
+    assert np.isnan(single.standard_deviation).all()
+    assert "of the runs in %" not in parameter_table(Findings(single)).head
     with pytest.raises(InputError, match="one run; at least two"):
         single.spread_test()

@@ -6,7 +6,7 @@ import pytest
 from identification.excitation.excitation_program import believed_parameters, excitation_problem
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import chosen_limits
-from identification.excitation.scene import RobotScene, cell_of, load_cell
+from identification.excitation.scene import RobotScene, cell_of
 from identification.excitation.verification import verify
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
@@ -22,8 +22,8 @@ def comau():
 
 
 @pytest.fixture(scope="session")
-def comau_cell():
-    return load_cell(None, "comau_racer_1_4")
+def comau_cell(comau):
+    return cell_of(comau, None)
 
 
 @pytest.fixture(scope="session")

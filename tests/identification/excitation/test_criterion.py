@@ -28,9 +28,7 @@ def test_gradient(arm_problem, random_motion, criterion):
 def test_values_are_those_of_the_matrix(arm_problem, random_motion):
     motion = FourierTrajectory.from_coefficients(random_motion, 5.0, (1, 2))
     q, v, a = motion.motion(np.arange(60) * 5.0 / 60)
-    X = np.vstack(
-        [np.array(arm_problem.kernels.forward(*row)) for row in zip(q, v, a, strict=True)]
-    )
+    X = np.vstack([np.array(arm_problem.kernels[0](*row)) for row in zip(q, v, a, strict=True)])
     sign, value = np.linalg.slogdet(X.T @ X)
     value += X.shape[1] * np.log(1000.0 / 60.0)  # as of 1000 samples
     by_determinant = ExcitationCost(arm_problem.kernels, 5.0, (1, 2), 60)

@@ -54,9 +54,9 @@ def test_torques_are_those_of_the_robot(problem, program, random_motion, arm):
 
 def test_limits_hold_at_given_instants(problem, program, random_motion):
     times = np.arange(20) * 0.25
-    solution = program.solve(random_motion, times, times, 30)
-    assert solution.value < program.cost(random_motion)[0] - 5.0
-    q, v, a = (b @ solution.coefficients.T for b in fourier_basis(times, 5.0, (1, 2)))
+    coefficients, value = program.solve(random_motion, times, times, 30)
+    assert value < program.cost(random_motion)[0] - 5.0
+    q, v, a = (b @ coefficients.T for b in fourier_basis(times, 5.0, (1, 2)))
     limits = problem.limits
     for values, most in (
         (q - limits.middle, limits.reach),

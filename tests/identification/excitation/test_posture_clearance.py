@@ -37,7 +37,7 @@ def test_what_is_allowed_is_clear_of_everything(limits, postures, comau_scene, c
     values = limits.values(postures)
     allowed = np.all(values >= 0.0, axis=1)
     assert 10 < allowed.sum() < 200
-    assert comau_scene.clearance(postures[allowed]).least >= comau_cell.clearance
+    assert comau_scene.distances(postures[allowed]).min() >= comau_cell.clearance
 
 
 @pytest.mark.parametrize("obstacle", ["socket", "floor"])

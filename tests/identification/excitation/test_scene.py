@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.excitation.balls import cover
-from identification.excitation.scene import Cell, Obstacle, RobotScene, load_cell
+from identification.excitation.scene import Cell, Obstacle, RobotScene, cell_of
 from pfsc_drake.errors import InputError
 
 
@@ -16,11 +16,11 @@ def test_distance_to_a_ball_far_away(comau):
     scene = RobotScene(comau, Cell([ball([0.0, 10.0, 0.0])], self_collision=False))
     q = np.zeros((1, 6))
     q[0, 1] = np.pi / 2
-    found = scene.clearance(q)
+    found = scene.distances(q)
     # Drake's distance to the same ball further away is as much larger
     further = RobotScene(comau, Cell([ball([0.0, 1000.0, 0.0])], self_collision=False))
-    assert further.clearance(q).least - found.least == pytest.approx(990.0, abs=0.5)
-    assert found.pair.endswith("ball")
+    assert further.distances(q).min() - found.min() == pytest.approx(990.0, abs=0.5)
+    assert scene.pairs[int(found.argmin())].name.endswith("ball")
 
 
 def test_neighbours_and_joined_links_are_no_pairs(comau_scene):
@@ -42,7 +42,7 @@ def test_overlap_is_negative(comau):
     balls = cover(comau.chain, plain)
     center = balls.sample(q)[0, np.flatnonzero(balls.links == 2)[0]]
     scene = RobotScene(comau, Cell([ball(center)], self_collision=False))
-    assert scene.clearance(q).least < 0.0
+    assert scene.distances(q).min() < 0.0
 
 
 def test_refuses(comau, delta, tmp_path):
@@ -55,4 +55,4 @@ def test_refuses(comau, delta, tmp_path):
     file = tmp_path / "cell.yaml"
     file.write_text("obstacles:\n  - {name: x, kind: pyramid}\n")
     with pytest.raises(InputError, match=r"cell\.yaml"):
-        load_cell(file, "comau_racer_1_4")
+        cell_of(comau, file)

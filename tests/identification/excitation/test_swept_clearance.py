@@ -13,9 +13,9 @@ from identification.excitation.swept_clearance import swept_clearance
 def test_nothing_is_nearer_than_guaranteed(comau, comau_scene, printed):
     swept = swept_clearance(comau.chain, comau_scene, printed, 0.02)
     t = np.random.default_rng(0).uniform(0.0, 10.0, 300)
-    dense = comau_scene.clearance(printed.motion(t)[0])
-    assert swept.guaranteed <= swept.least <= dense.least + 1e-3
-    assert swept.guaranteed <= dense.least
+    dense = comau_scene.distances(printed.motion(t)[0]).min()
+    assert swept.guaranteed <= swept.least <= dense + 1e-3
+    assert swept.guaranteed <= dense
 
 
 @pytest.fixture(scope="module")
@@ -82,9 +82,9 @@ def test_finds_what_happens_between_instants_of_rest(arm, far_wall, monkeypatch)
     motion = FourierTrajectory(q_0, np.zeros((3, 1)), b, 2.0 * np.pi, (1,))
     rest = np.array([0.0, np.pi])
     assert np.abs(motion.motion(rest)[1]).max() < 1e-12
-    assert scene.clearance(motion.motion(rest)[0]).least > 0.2
+    assert scene.distances(motion.motion(rest)[0]).min() > 0.2
     swept = swept_clearance(arm.chain, scene, motion, 0.02)
-    dense = scene.clearance(motion.motion(np.linspace(0.0, 2.0 * np.pi, 500))[0]).least
+    dense = scene.distances(motion.motion(np.linspace(0.0, 2.0 * np.pi, 500))[0]).min()
     assert swept.guaranteed <= dense + 1e-9
     assert swept.least < 0.02 and "sheet" in swept.pair
 

@@ -40,7 +40,7 @@ def test_shipped_excitation_between_samples(comau, comau_scene, comau_cell, best
     assert np.all((q >= comau.position_limits[:, 0]) & (q <= comau.position_limits[:, 1]))
     assert np.all(np.abs(v) <= comau.velocity_limit)
     assert np.all(np.abs(a) <= comau.acceleration_limit)
-    assert comau_scene.clearance(q).least >= comau_cell.clearance
+    assert comau_scene.distances(q).min() >= comau_cell.clearance
 
 
 @pytest.mark.slow

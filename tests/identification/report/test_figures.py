@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from identification.estimation.residuals import whiteness
-from identification.estimation.validation import PredictedTorque
 from identification.report import figures
 
 
@@ -23,10 +22,8 @@ def labelled(panel):
 def test_torques_are_drawn_joint_by_joint(canvas):
     t, random = np.linspace(0.0, 1.0, 50), np.random.default_rng(0)
     measured, predicted = random.normal(size=(2, 50, 2))
-    used, ones = np.ones((50, 2), dtype=bool), np.ones(2)
-    names, units = ("swing", "lift"), ("Nm", "N")
-    prediction = PredictedTorque(names, units, measured, predicted, used, ones, ones, ones)
-    figures.fit_figure(t, prediction, "Torques of a motion that was not used", "")
+    units, title = ("Nm", "N"), "Torques of a motion that was not used"
+    figures.fit_figure(t, (measured, predicted), units, title, "")
     panels = canvas[0].canvas.axes
     assert canvas[0].name == "prediction"
     for j, panel in enumerate(panels):
