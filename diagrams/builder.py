@@ -7,10 +7,10 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.controlled_robot import add_controlled_robot
-from diagrams.drawing.held_look import held_look
-from diagrams.drawing.mounting_look import mounting_look
+from diagrams.drawing.held_look import HeldLook
+from diagrams.drawing.mounting_look import MountingLook
 from diagrams.drawing.recorded import RecordedMotion
-from diagrams.drawing.replay import build_delta_replay, build_replay
+from diagrams.drawing.replay import Playback
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.environment.acting_forces import Environment
 from diagrams.environment.mounting_parts import payload_of
@@ -76,7 +76,7 @@ def build_station(
     Raises:
         InputError: If the scenario cannot be built.
     """
-    builder, chosen = DiagramBuilder(), StationOptions(scenario, folder)
+    builder, chosen = DiagramBuilder(), StationOptions(scenario, folder, progress)
     check_carrier(scenario, simulated=not (remote or parametric or with_slope))
     task = make_task(scenario, folder, progress) if like is None else like.task
     workpiece, mounting = chosen.workpiece(task), chosen.mounting(task)
@@ -90,7 +90,7 @@ def build_station(
         assert isinstance(part, Arm)
         part = replace(part, belief=part.belief.with_symbols())
     check_joints(scenario, task, part.robot.dimension)
-    carrier = _add_carrier(builder, chosen, task, progress, like)
+    carrier = _add_carrier(builder, chosen, task, like)
     frame = None if carrier is None else carrier.frame
     start = (
         find_start(scenario.start, task, part, workpiece, mounting, frame)
@@ -108,7 +108,6 @@ def build_station(
         task,
         start,
         _options(chosen, part, around, carrier),
-        progress=progress,
         like=None if like is None else like.controlled,
     )
     around = replace(around, manifold=robot.controller.law.linearization.manifold)
@@ -128,14 +127,13 @@ def _add_carrier(
     builder: DiagramBuilder,
     chosen: StationOptions,
     task: Task,
-    progress: Progress | None,
     like: Station | None,
 ) -> Holder | Turntable | None:
     """Add the robot or the turntable that carries the workpiece, if one does."""
     scenario = chosen.scenario
     if scenario.holder is not None:
         order, built = task.manifold.layout.order, None if like is None else like.holder
-        return add_holder(builder, chosen, order, progress, built)
+        return add_holder(builder, chosen, order, built)
     if scenario.turntable is not None:
         scenario.turntable.check()
         return Turntable(scenario.turntable)
@@ -215,17 +213,17 @@ def build_station_replay(
         motion: What to draw.
         meshcat: Where to draw.
     """
-    period, drawn = settings.simulation.frame_period, drawing_of(station.task)
+    playback = Playback(motion, meshcat, settings.simulation.frame_period)
+    drawn = drawing_of(station.task)
     look = None
     if station.workpiece is not None:
         look = station.workpiece.look(station.part.gravity)
     if isinstance(station.part, DeltaPart):
-        robot = station.part.robot
-        return build_delta_replay(robot, drawn, motion, meshcat, period, look)
+        return playback.build_delta(station.part.robot, drawn, look)
     assert drawing is not None  # draw_station knows every other robot
-    plates = None if station.mounting is None else mounting_look(station.mounting)
+    plates = None if station.mounting is None else MountingLook(station.mounting)
     held = None
     carrier = settings.holder or settings.turntable
     if carrier is not None:
-        held = held_look(carrier.workpiece, drawing.holder)
-    return build_replay(drawing, drawn, motion, meshcat, period, look, plates, held)
+        held = HeldLook(carrier.workpiece, drawing.holder)
+    return playback.build(drawing, drawn, look, plates, held)

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from diagrams.fault_instant import first_instant
 from diagrams.oscillation import oscillation_before
 from diagrams.robots.belief import believed_robot
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor, check_sides
@@ -25,7 +24,6 @@ from pfsc_drake.controller.fault_description import FoundFault
 from pfsc_drake.controller.options.follower_options import FollowerOptions
 from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import BlockAccess
@@ -148,7 +146,7 @@ class ControlledRobot:
             column: Its column.
             suspects: Implausible components of the joint state; those of the controller if omitted.
         """
-        now, before = first_instant(log, blocks, root, signal, column)
+        now, before = log.first_instant(blocks, root, signal, column)
         if suspects is None:
             suspects = self.access.suspects(blocks, root)
         oscillating = oscillation_before(now.time, log, root, self.controller.law)
@@ -175,7 +173,6 @@ def add_controlled_robot(
     start: tuple[StartPoint, np.ndarray],
     options: FollowerOptions,
     *,
-    progress: Progress | None = None,
     like: ControlledRobot | None = None,
 ) -> ControlledRobot:
     """Add the controller of a robot, and its encoders.
@@ -187,7 +184,6 @@ def add_controlled_robot(
         task: Task of its tool.
         start: Start of the tool, and state of the robot's model there.
         options: Options of the controller.
-        progress: Receives the fraction done and the name of the step.
         like: The same but for the model or the integration, if it has been built.
 
     Raises:
@@ -206,7 +202,7 @@ def add_controlled_robot(
             start[0],
             (part.coordinates.link_rows @ start[1])[: part.robot.dimension],
             duration=scenario.duration,
-            progress=progress,
+            progress=chosen.progress,
             like=None if like is None else like.controller,
             logged=True,
         )

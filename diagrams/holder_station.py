@@ -8,14 +8,11 @@ from functools import cached_property
 from typing import cast
 
 import numpy as np
-from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder, InputPort, OutputPort, System
 
 from diagrams.controlled_robot import ControlledRobot, add_controlled_robot
-from diagrams.environment.held_reaction import add_held_reaction
-from diagrams.named_builder import PrefixingBuilder
 from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.drives import add_drives
-from diagrams.robots.held_workpiece import holding
 from diagrams.robots.model import is_delta
 from diagrams.robots.plant_friction import add_friction
 from diagrams.scenario import DriverParameters, HolderParameters, Scenario
@@ -24,14 +21,16 @@ from diagrams.scenario_task import check_joints, make_task
 from diagrams.signal_log import SignalLog
 from diagrams.station_options import StationOptions
 from diagrams.station_start import find_start
+from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.checks import require
+from pfsc_drake.control.estimation.reaction import Reaction
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.controller.carrier import CarriedFrame, Derivatives, MeasuredReaction
 from pfsc_drake.controller.fault_description import FoundFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import BlockAccess
@@ -39,6 +38,27 @@ from pfsc_drake.systems.fuse import BlockAccess
 # beginning of the names of all systems and signals of the robot that holds the workpiece
 HOLDER = "holder_"
 _WHO = "the robot that holds the workpiece"
+
+
+class PrefixingBuilder(DiagramBuilder):
+    """Builder that adds systems to another builder, a prefix before their names.
+
+    Args:
+        builder: The builder that the systems stand in.
+        prefix: What the names begin with.
+    """
+
+    def __init__(self, builder: DiagramBuilder, prefix: str) -> None:
+        super().__init__()
+        self._builder, self._prefix = builder, prefix
+
+    def AddNamedSystem(self, name: str, system: System) -> System:
+        """Add a system under its prefixed name, and return it."""
+        return self._builder.AddNamedSystem(self._prefix + name, system)
+
+    def Connect(self, output: OutputPort, input: InputPort) -> None:
+        """Connect two ports of the other builder's systems."""
+        self._builder.Connect(output, input)
 
 
 @dataclass
@@ -97,7 +117,6 @@ def add_holder(
     builder: DiagramBuilder,
     station: StationOptions,
     order: int,
-    progress: Progress | None = None,
     like: Holder | None = None,
 ) -> Holder:
     """Add the robot that holds the workpiece of a scenario, with its controller.
@@ -108,7 +127,6 @@ def add_holder(
         builder: Builder of the diagram.
         station: Options of the station, with a holder.
         order: Relative degree of the other robot's law, for which the motion is needed.
-        progress: Receives the fraction done and the name of the step.
         like: The same but for the integration, if it has been built.
 
     Raises:
@@ -124,8 +142,8 @@ def add_holder(
     period, reacts = scenario.controller.sampling_time, bool(scenario.forces)
     with naming_holder():
         _check(holder, period, order)
-        task = make_task(own, folder, progress) if before is None else before.task
-        part = add_arm(named, holding(chosen.belief_source, holder.workpiece))
+        task = make_task(own, folder, station.progress) if before is None else before.task
+        part = add_arm(named, chosen.belief_source.holding(holder.workpiece))
         check_joints(own, task, part.robot.dimension)
         start = find_start(own.start, task, part) if before is None else before.begun
         senses = reacts and own.controller.external_torque.source == "measured"
@@ -149,10 +167,37 @@ def add_holder(
     logged |= robot.logged_states
     reaction = None
     if reacts:
-        reaction, wrench = add_held_reaction(named, part, robot.true_state, period)
+        reaction, wrench = _add_reaction(named, part, robot.true_state, period)
         robot.controller.connect(builder, "wrench_ext", wrench)
         logged["wrench_ext"] = wrench
     return Holder(robot, holder, {f"{HOLDER}{n}": p for n, p in logged.items()}, reaction)
+
+
+def _add_reaction(
+    builder: DiagramBuilder, part: Arm, true_state: OutputPort, period: float
+) -> tuple[BlockSystem, OutputPort]:
+    """Let a robot bear the process on the workpiece that it holds.
+
+    Args:
+        builder: Builder of the diagram.
+        part: The robot, whose tool frame is the workpiece's.
+        true_state: Its true ``[q_J, v_J, q_M, v_M]``.
+        period: Sampling time [s].
+
+    Returns:
+        The reaction, its inputs ``wrench`` and ``tool_pose`` of the other robot open; and the
+        wrench on the workpiece at its frame's origin, world axes, shape (6,) [N, Nm].
+    """
+    view = builder.AddNamedSystem("workpiece_view", BlockSystem(ToolKinematics(part.robot), period))
+    builder.Connect(true_state, view.GetInputPort("joint_state"))
+    reaction = builder.AddNamedSystem("process_reaction", BlockSystem(Reaction(), period))
+    builder.Connect(view.GetOutputPort("tool_pose"), reaction.GetInputPort("workpiece_pose"))
+    # both robots bear the same over a sample
+    hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
+    builder.Connect(reaction.GetOutputPort("reaction"), hold.GetInputPort("value"))
+    held = hold.GetOutputPort("held")
+    part.connect_wrench(builder, held, true_state)
+    return reaction, held
 
 
 @contextmanager

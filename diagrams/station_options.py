@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.environment.acting_forces import Outside
-from diagrams.environment.leader_side import teleoperated
+from diagrams.environment.leader import teleoperated
 from diagrams.environment.mounting import Mounting, make_mounting
 from diagrams.environment.workpieces import NotchedWorkpiece, PressedWorkpiece
 from diagrams.robots.arm import add_arm
@@ -29,6 +29,7 @@ from pfsc_drake.controller.tasks.surface_task import SurfaceTask
 from pfsc_drake.controller.tasks.task import Task
 from pfsc_drake.controller.teleoperated import Teleoperated
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
@@ -39,10 +40,12 @@ class StationOptions:
     Attributes:
         scenario: The scenario.
         folder: Where its relative file names start.
+        progress: Receives the fraction done and the name of the step, where that takes its time.
     """
 
     scenario: Scenario
     folder: FilePath
+    progress: Progress | None = None
 
     @property
     def period(self) -> float:

@@ -7,8 +7,7 @@ afterwards.
 
 from collections.abc import Callable
 
-from diagrams.environment.leader import Leading
-from diagrams.environment.leader_side import add_leader_side
+from diagrams.environment.leader import LeaderSide
 from diagrams.environment.measured_obstacles import add_obstacles, add_told_obstacles
 from diagrams.environment.operator import add_operator
 from diagrams.holder_station import HOLDER, Holder
@@ -85,9 +84,9 @@ def _leader(site: Site) -> None:
     scenario = site.scenario
     if scenario.teleoperation is not None:
         known = site.task, site.robot.start, site.period
-        leading = Leading(scenario.teleoperation, scenario.hand, site.operator, *known)
+        side = LeaderSide(scenario.teleoperation, scenario.hand, site.operator, *known)
         message, paced = site.signals["message"], not site.remote
-        signals, site.leader = add_leader_side(site.builder, leading, message, paced=paced)
+        signals, site.leader = side.add(site.builder, message, paced=paced)
         site.signals["message_arrived"] = signals.pop("message_arrived")
         site.show(**signals)
 

@@ -7,10 +7,13 @@ import numpy as np
 from diagrams.robots.force_sensor import taring_warnings
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
-from diagrams.warnings.encoders import coarse_encoders
-from diagrams.warnings.fixture_warnings import firm_guides, stiff_fixtures
-from diagrams.warnings.obstacle_warnings import obstacle_warnings
-from diagrams.warnings.rest_warnings import rest_warnings
+from diagrams.warnings.part_warnings import (
+    coarse_encoders,
+    firm_guides,
+    obstacle_warnings,
+    rest_warnings,
+    stiff_fixtures,
+)
 from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
 from diagrams.warnings.untold_forces import (
     ExpectedForces,

@@ -205,14 +205,6 @@ def judge_commands(console: Console, commands: "Commands") -> int:
     return 0
 
 
-def _numbers_table(*titles: str) -> Table:
-    """Return a table whose columns are numbers."""
-    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in titles:
-        table.add_column(title, justify="right")
-    return table
-
-
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
     """The metrics with their targets, one line each."""
     from reporting.metrics import format_quantity

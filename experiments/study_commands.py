@@ -171,12 +171,12 @@ def margins_command(
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console, box = Console(), ErrorBox(mass, stiffness, rotor, tool)
         with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
-            outcome = write_margins(loaded, folder, box, progress)
-        for table in (place_table(outcome.analysis), case_table(outcome.analysis)):
+            analysis, report = write_margins(loaded, folder, box, progress)
+        for table in (place_table(analysis), case_table(analysis)):
             console.print(table)
             console.print()
-        console.print(summary(outcome.analysis), highlight=False)
-        raise typer.Exit(show_page("margins", outcome.report))
+        console.print(summary(analysis), highlight=False)
+        raise typer.Exit(show_page("margins", report))
 
 
 def export_command(

@@ -65,11 +65,6 @@ class Metric:
             return None
 
     @property
-    def is_upper_bound(self) -> bool:
-        """Whether the target is a largest value."""
-        return self.bound is not None and self.bound[0] in ("<", "<=")
-
-    @property
     def passed(self) -> bool | None:
         """Whether the target is met; None without a comparable target. NaN meets no target."""
         if self.bound is None:

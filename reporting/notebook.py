@@ -9,7 +9,7 @@ from typing import Any, Self
 from urllib.parse import quote
 
 from reporting.metrics import Metric
-from reporting.templates import fill
+from reporting.page import fill
 
 _SHOWN = 8  # metrics of a short table
 _PARTS = 200  # of a whole, between two looks at its progress

@@ -1,6 +1,4 @@
-"""What plates, gripper, magazine and frame look like."""
-
-from dataclasses import dataclass
+"""Drawing of plates, gripper, magazine and frame."""
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Meshcat, Rgba
@@ -19,11 +17,14 @@ _CUP, _PLATE = Rgba(0.16, 0.17, 0.19, 1.0), Rgba(0.02, 0.53, 0.82, 0.6)
 _PIN = Rgba(0.9, 0.35, 0.05, 1.0)
 _CUP_RADIUS, _CUP_HEIGHT = 0.016, 0.03  # m
 _BOARD, _BAR = 0.006, 0.02  # m
+_BORE = Rgba(0.45, 0.47, 0.50, 0.35)  # what is in it shows
 
 
-@dataclass(frozen=True)
 class MountingLook:
-    """How plates and what belongs to them are drawn.
+    """Drawing of plates and what belongs to them.
+
+    Args:
+        mounting: Where magazine and frame stand.
 
     Attributes:
         fixed: What stands in the world.
@@ -32,37 +33,59 @@ class MountingLook:
         plate: What moves with each plate.
     """
 
-    fixed: list[ToolPart]
-    bores: Triangles
-    gripper: list[ToolPart]
-    plate: list[ToolPart]
+    def __init__(self, mounting: Mounting) -> None:
+        plate = mounting.parameters
+        height = plate.size[2]
+        length, width = plate.frame.size
+        under = mounting.X_WF @ RigidTransform(
+            [0.0, 0.0, height + plate.frame.depth + _BOARD / 2.0]
+        )
+        shelf = mounting.X_WM @ RigidTransform(
+            [0.0, 0.0, height + max(PAD[1], plate.pins.length) + _BOARD / 2.0]
+        )
+        fixed = [
+            ToolPart("frame", Box(length, width, _BOARD), _FRAME, under),
+            ToolPart("magazine", Box(length, width, _BOARD), _MAGAZINE, shelf),
+        ]
+        for name, X_WC, color in (
+            ("frame", mounting.X_WF, _FRAME),
+            ("magazine", mounting.X_WM, _MAGAZINE),
+        ):
+            for i, (x, y) in enumerate(plate.rests):
+                X_WG = X_WC @ RigidTransform([x, y, height + PAD[1] / 2.0])
+                fixed.append(ToolPart(f"{name}_rest_{i}", Box(PAD[0], PAD[0], PAD[1]), color, X_WG))
+        self.fixed, self.bores = fixed, _bores(mounting)
+        self.gripper, self.plate = _gripper(plate), _plate(plate)
 
+    def add(
+        self,
+        builder: DiagramBuilder,
+        tool_pose: OutputPort,
+        plates: list[OutputPort],
+        meshcat: Meshcat,
+        period: float,
+    ) -> None:
+        """Draw magazine and frame, and let gripper and plates move.
 
-def mounting_look(mounting: Mounting) -> MountingLook:
-    """Return how plates and what belongs to them are drawn.
-
-    Args:
-        mounting: Where magazine and frame stand.
-    """
-    plate = mounting.parameters
-    height = plate.size[2]
-    length, width = plate.frame.size
-    under = mounting.X_WF @ RigidTransform([0.0, 0.0, height + plate.frame.depth + _BOARD / 2.0])
-    shelf = mounting.X_WM @ RigidTransform(
-        [0.0, 0.0, height + max(PAD[1], plate.pins.length) + _BOARD / 2.0]
-    )
-    fixed = [
-        ToolPart("frame", Box(length, width, _BOARD), _FRAME, under),
-        ToolPart("magazine", Box(length, width, _BOARD), _MAGAZINE, shelf),
-    ]
-    for name, X_WC, color in (
-        ("frame", mounting.X_WF, _FRAME),
-        ("magazine", mounting.X_WM, _MAGAZINE),
-    ):
-        for i, (x, y) in enumerate(plate.rests):
-            X_WG = X_WC @ RigidTransform([x, y, height + PAD[1] / 2.0])
-            fixed.append(ToolPart(f"{name}_rest_{i}", Box(PAD[0], PAD[0], PAD[1]), color, X_WG))
-    return MountingLook(fixed, _bores(mounting), _gripper(plate), _plate(plate))
+        Args:
+            builder: Builder of the replay.
+            tool_pose: ``[y_t, R_e by rows]``, shape (12,).
+            plates: The same of each plate.
+            meshcat: Where to draw.
+            period: Time between frames [s].
+        """
+        vertices, triangles = self.bores.vertices.T, self.bores.triangles.T
+        meshcat.SetTriangleMesh("mounting/bores", vertices, triangles, _BORE)
+        for part in self.fixed:
+            meshcat.SetObject(f"mounting/{part.name}", part.shape, part.color)
+            meshcat.SetTransform(f"mounting/{part.name}", part.X_TP)
+        moving = {"gripper": (self.gripper, tool_pose)}
+        moving |= {f"plate_{k + 1}": (self.plate, port) for k, port in enumerate(plates)}
+        for name, (parts, pose) in moving.items():
+            system = builder.AddNamedSystem(
+                f"{name}_visualizer", ToolVisualizer(parts, meshcat, period, f"mounting/{name}")
+            )
+            builder.Connect(pose, system.GetInputPort("tool_pose"))
 
 
 def _bores(mounting: Mounting) -> Triangles:
@@ -95,41 +118,6 @@ def _plate(plate: PlateParameters) -> list[ToolPart]:
     for i, (x, y) in enumerate(plate.pins.positions):
         parts.append(ToolPart(f"pin_{i}", pin, _PIN, RigidTransform([x, y, depth])))
     return parts
-
-
-_BORE = Rgba(0.45, 0.47, 0.50, 0.35)  # what is in it shows
-
-
-def add_mounting_drawing(
-    builder: DiagramBuilder,
-    look: MountingLook,
-    tool_pose: OutputPort,
-    plates: list[OutputPort],
-    meshcat: Meshcat,
-    period: float,
-) -> None:
-    """Draw magazine and frame, and let gripper and plates move.
-
-    Args:
-        builder: Builder of the replay.
-        look: How they are drawn.
-        tool_pose: ``[y_t, R_e by rows]``, shape (12,).
-        plates: The same of each plate.
-        meshcat: Where to draw.
-        period: Time between frames [s].
-    """
-    vertices, triangles = look.bores.vertices.T, look.bores.triangles.T
-    meshcat.SetTriangleMesh("mounting/bores", vertices, triangles, _BORE)
-    for part in look.fixed:
-        meshcat.SetObject(f"mounting/{part.name}", part.shape, part.color)
-        meshcat.SetTransform(f"mounting/{part.name}", part.X_TP)
-    moving = {"gripper": (look.gripper, tool_pose)}
-    moving |= {f"plate_{k + 1}": (look.plate, port) for k, port in enumerate(plates)}
-    for name, (parts, pose) in moving.items():
-        system = builder.AddNamedSystem(
-            f"{name}_visualizer", ToolVisualizer(parts, meshcat, period, f"mounting/{name}")
-        )
-        builder.Connect(pose, system.GetInputPort("tool_pose"))
 
 
 def ring_surface(wedges: np.ndarray) -> Triangles:

@@ -46,6 +46,15 @@ class RecordedHolder:
     positions: np.ndarray | None
     workpiece_pose: np.ndarray
 
+    def first_points(self, points: np.ndarray) -> np.ndarray:
+        """Return points of the workpiece where it is at the first frame [m], shape (K, 3).
+
+        Args:
+            points: Points in its frame [m], shape (K, 3).
+        """
+        pose = self.workpiece_pose[0]
+        return np.asarray(pose[:3] + points @ pose[3:].reshape(3, 3).T)
+
 
 @dataclass(frozen=True)
 class RecordedObstacles:

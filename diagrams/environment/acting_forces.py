@@ -7,7 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder
 
 from diagrams.environment.mounting import Mounting
-from diagrams.environment.mounting_parts import add_hand, add_mounting
+from diagrams.environment.mounting_parts import add_gripper, add_hand, add_mounting_hand
 from diagrams.environment.operator import Operator, add_live_hand
 from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
@@ -108,7 +108,8 @@ class Environment:
         Returns:
             ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there; if
             something acts on K links ``push_wrench`` of shape (6K,), ``push_point`` of shape (3K,)
-            and ``push_torque`` of shape (N,); of plates those of :func:`add_mounting`.
+            and ``push_torque`` of shape (N,); of plates those of :func:`add_gripper`,
+            with an operator ``hand_wrench`` and ``phase``.
 
         Raises:
             InputError: If a force does not suit the robot, or it has no such link.
@@ -125,10 +126,10 @@ class Environment:
             sources.append(add_live_hand(builder, part.robot, operator, joint_state))
         pushes, signals = self._add_pushes(builder, ports)
         if mounting is not None:
-            wrenches, mounted = add_mounting(
-                builder, mounting, part, self.task, outside.hand, period, self.start, joint_state
-            )
-            sources, signals = sources + wrenches, signals | mounted
+            mounted = self._add_mounting(builder, mounting, joint_state)
+            wrenches = ("gripper_wrench", "hand_wrench")
+            sources += [mounted[name] for name in wrenches if name in mounted]
+            signals |= mounted
         acting: list[OutputPort] = []
         held: OutputPort | None = None
         if part.contact is not None:
@@ -171,6 +172,27 @@ class Environment:
         builder.AddNamedSystem("contact_view", view)
         builder.Connect(joint_state, view.GetInputPort("joint_state"))
         return view.GetOutputPort("tool_pose")
+
+    def _add_mounting(
+        self, builder: DiagramBuilder, mounting: Mounting, joint_state: OutputPort
+    ) -> dict[str, OutputPort]:
+        """Add plates, gripper and operator, and return their signals."""
+        part, period = self.part, self.outside.period
+        gripper, signals = add_gripper(builder, mounting, part, self.start, period, joint_state)
+        if mounting.parameters.operator is None:
+            return signals
+        parameters = self.outside.hand
+        assert parameters is not None  # where an operator mounts, a hand is given
+        hand = add_mounting_hand(
+            builder, mounting, part.robot, self.task, parameters, period, joint_state
+        )
+        builder.Connect(signals["held"], hand.GetInputPort("held"))
+        builder.Connect(hand.GetOutputPort("vacuum"), gripper.GetInputPort("vacuum"))
+        hand_signals = {
+            "hand_wrench": hand.GetOutputPort("wrench"),
+            "phase": hand.GetOutputPort("phase"),
+        }
+        return signals | hand_signals
 
     def _scripted(self, builder: DiagramBuilder, ports: dict[str, OutputPort]) -> list[OutputPort]:
         """Add the forces on the tool that are written down beforehand."""

@@ -169,21 +169,6 @@ REST_RADIUS = 2e-3  # m, of the bosses on which a plate lies
 PAD = 0.02, 0.01  # m, side and height of what they lie on
 
 
-@dataclass(frozen=True)
-class PlatePlant:
-    """Plates, magazine and frame in a diagram.
-
-    Attributes:
-        plant: The plates, K free bodies; what they touch is fixed to its world.
-        bodies: The plates in it.
-        contact: Forces by frame and magazine on all plates, shape (6,) [N].
-    """
-
-    plant: MultibodyPlant
-    bodies: list[BodyIndex]
-    contact: PartnerForces
-
-
 def add_plate_plant(
     builder: DiagramBuilder,
     parameters: PlateParameters,
@@ -191,8 +176,8 @@ def add_plate_plant(
     X_WF: RigidTransform,
     X_WPs: Sequence[RigidTransform],
     gravity: np.ndarray,
-) -> PlatePlant:
-    """Add a plant of its own for the plates.
+) -> tuple[MultibodyPlant, list[BodyIndex], PartnerForces]:
+    """Add a plant of its own for the plates, K free bodies; what they touch is fixed to its world.
 
     Args:
         builder: Builder of the diagram.
@@ -201,6 +186,10 @@ def add_plate_plant(
         X_WF: Where it is when it is mounted.
         X_WPs: Where the K plates are at the start.
         gravity: World axes [m/s^2], shape (3,).
+
+    Returns:
+        The plant, the plates in it, and the forces by frame and magazine on all plates, shape
+        (6,) [N].
     """
     plant = builder.AddNamedSystem("plates", MultibodyPlant(parameters.contact.time_step))
     scene_graph = builder.AddNamedSystem("plate_scene", SceneGraph())
@@ -225,7 +214,7 @@ def add_plate_plant(
     builder.Connect(
         plant.get_contact_results_output_port(), contact.GetInputPort("contact_results")
     )
-    return PlatePlant(plant, bodies, contact)
+    return plant, bodies, contact
 
 
 def pin_shape(parameters: PlateParameters) -> tuple[Capsule, float]:

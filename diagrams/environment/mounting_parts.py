@@ -94,40 +94,34 @@ def connect_hand(
     return hand
 
 
-def add_mounting(
+def add_gripper(
     builder: DiagramBuilder,
     mounting: Mounting,
     part: RobotPart,
-    task: Task,
-    hand: HandParameters | None,
-    period: float,
     start: StartPoint,
+    period: float,
     joint_state: OutputPort,
-) -> tuple[list[OutputPort], dict[str, OutputPort]]:
-    """Add plates, gripper and operator.
+) -> tuple[BlockSystem, dict[str, OutputPort]]:
+    """Add plates and gripper.
 
     Args:
         builder: Builder of the diagram.
         mounting: Where the plates come from and go.
         part: The robot.
-        task: What it is to do.
-        hand: Hand of an operator who mounts them, if one does.
-        period: Sampling time [s].
         start: Where its tool starts.
+        period: Sampling time [s].
         joint_state: The true ``[q_J, v_J, q_M, v_M]``.
 
     Returns:
-        Wrenches on the tool point, world axes, each (6,) [N, Nm], and signals for the log:
-        ``plate_state``, ``plate_contact``, ``held``, ``gripper_wrench``, with an operator
-        ``hand_wrench`` and ``phase``.
-
-    Raises:
-        InputError: If the operator's hand does not suit the task.
+        The gripper, its input ``vacuum`` open where an operator mounts; and signals for the log:
+        ``plate_state``, ``plate_contact``, ``held``, ``gripper_wrench``.
     """
-    plate, robot = mounting.parameters, part.robot
+    plate = mounting.parameters
     places, gravity = mounting.plates(start), part.gravity
-    world = add_plate_plant(builder, plate, mounting.X_WM, mounting.X_WF, places, gravity)
-    motion = builder.AddNamedSystem("tool_motion", BlockSystem(ToolMotion(robot), period))
+    plates, bodies, contact = add_plate_plant(
+        builder, plate, mounting.X_WM, mounting.X_WF, places, gravity
+    )
+    motion = builder.AddNamedSystem("tool_motion", BlockSystem(ToolMotion(part.robot), period))
     builder.Connect(joint_state, motion.GetInputPort("joint_state"))
     held = None
     if plate.start != "magazine":
@@ -137,31 +131,22 @@ def add_mounting(
         load = places[0].rotation().matrix().T @ weight
         held = holding_cups(plate.suction, 0, X_PT.rotation().matrix(), X_PT.translation(), load)
     half_size = np.array(plate.size[:2]) / 2.0
-    cups = SuctionGripper(plate.suction, half_size, len(world.bodies), held)
+    cups = SuctionGripper(plate.suction, half_size, len(bodies), held)
     gripper = builder.AddNamedSystem("gripper", BlockSystem(cups, period))
-    state = world.plant.get_state_output_port()
+    state = plates.get_state_output_port()
     builder.Connect(motion.GetOutputPort("tool_motion"), gripper.GetInputPort("tool_motion"))
     builder.Connect(state, gripper.GetInputPort("plate_state"))
-    applied = builder.AddNamedSystem("plate_pushes", AppliedForces(world.bodies))
+    applied = builder.AddNamedSystem("plate_pushes", AppliedForces(bodies))
     builder.Connect(gripper.GetOutputPort("pushes"), applied.get_input_port())
-    builder.Connect(applied.get_output_port(), world.plant.get_applied_spatial_force_input_port())
-    signals = {
+    builder.Connect(applied.get_output_port(), plates.get_applied_spatial_force_input_port())
+    if plate.operator is None:
+        builder.Connect(_scheduled_vacuum(builder, plate), gripper.GetInputPort("vacuum"))
+    return gripper, {
         "plate_state": state,
-        "plate_contact": world.contact.GetOutputPort("forces"),
+        "plate_contact": contact.GetOutputPort("forces"),
         "held": gripper.GetOutputPort("held"),
         "gripper_wrench": gripper.GetOutputPort("wrench"),
     }
-    wrenches = [gripper.GetOutputPort("wrench")]
-    if plate.operator is None:
-        builder.Connect(_scheduled_vacuum(builder, plate), gripper.GetInputPort("vacuum"))
-        return wrenches, signals
-    assert hand is not None  # where an operator mounts, a hand is given
-    operator = _add_operator(builder, mounting, robot, task, hand, period, joint_state)
-    builder.Connect(gripper.GetOutputPort("held"), operator.GetInputPort("held"))
-    builder.Connect(operator.GetOutputPort("vacuum"), gripper.GetInputPort("vacuum"))
-    signals["hand_wrench"] = operator.GetOutputPort("wrench")
-    signals["phase"] = operator.GetOutputPort("phase")
-    return [*wrenches, operator.GetOutputPort("wrench")], signals
 
 
 def _scheduled_vacuum(builder: DiagramBuilder, plate: PlateParameters) -> OutputPort:
@@ -174,7 +159,7 @@ def _scheduled_vacuum(builder: DiagramBuilder, plate: PlateParameters) -> Output
     return builder.AddNamedSystem("vacuum", TrajectorySource(ending)).get_output_port()
 
 
-def _add_operator(
+def add_mounting_hand(
     builder: DiagramBuilder,
     mounting: Mounting,
     robot: RobotModel,
@@ -183,6 +168,24 @@ def _add_operator(
     period: float,
     joint_state: OutputPort,
 ) -> BlockSystem:
+    """Add the hand of an operator who mounts plates.
+
+    Args:
+        builder: Builder of the diagram.
+        mounting: Where the plates come from and go.
+        robot: The robot.
+        task: Task whose coordinates the hand may be told in.
+        parameters: The hand.
+        period: Sampling time [s].
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+
+    Returns:
+        The hand, its input ``held`` open; it puts out ``vacuum``, ``wrench`` on the tool point,
+        world axes, shape (6,) [N, Nm], and ``phase``.
+
+    Raises:
+        InputError: If the hand does not suit the task.
+    """
     operator, pin_length = mounting.parameters.operator, mounting.parameters.pins.length
     goal = mounting.X_WF.translation(), mounting.X_WF.rotation().matrix()
 

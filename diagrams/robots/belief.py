@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
-from diagrams.scenario import RobotParameters
+from diagrams.robots.model import tool_frame
+from diagrams.scenario import HeldWorkpieceParameters, RobotParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from pfsc_drake.control.estimation.link_errors import MotorEncoders
 from pfsc_drake.controller.believed import Believed, Coefficients
@@ -18,6 +19,9 @@ from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain import ParametricChain, SerialChain, chain_parameters
 from pfsc_drake.robot.tool_load import ToolLoad
+
+# body of a workpiece that a robot holds, and its frame, which follows the path of the robot
+WORKPIECE = "held_workpiece"
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,27 @@ class BeliefSource:
     folder: Path
     carried: Callable[[MultibodyPlant], None] | None = None
     by_velocity: bool = False
+
+    def holding(self, workpiece: HeldWorkpieceParameters) -> "BeliefSource":
+        """Return the source of a robot that holds a workpiece, whose frame is its tool frame then.
+
+        Args:
+            workpiece: The workpiece; the tool frame of the robot alone is where it holds it.
+        """
+        grip = self.robot
+
+        def add(plant: MultibodyPlant) -> None:
+            if plant.HasBodyNamed(WORKPIECE):
+                raise InputError(
+                    f"holder.robot.model: {grip.model} has a link '{WORKPIECE}'; allowed: models "
+                    "without one of that name"
+                )
+            frame = tool_frame(plant, grip)
+            model = frame.body().model_instance()
+            body = plant.AddRigidBody(WORKPIECE, model, workpiece.inertia)
+            plant.WeldFrames(frame, body.body_frame(), workpiece.pose.transform())
+
+        return replace(self, robot=replace(grip, tool_frame=WORKPIECE), carried=add)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 import dataclasses as dc
 from typing import Annotated
 
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
+
 from diagrams.scenario.manifolds import PathParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -39,6 +41,17 @@ class SolidParameters(Parameters):
     pose: PoseParameters = dc.field(default_factory=PoseParameters)
     mass: Annotated[float, Range(0.0, _HEAVIEST, "kg")] = 1.0
 
+    @property
+    def inertia(self) -> SpatialInertia:
+        """Its inertia about the origin of the workpiece's frame, axes of that."""
+        if self.box:
+            unit = UnitInertia.SolidBox(*self.box)
+        else:
+            unit = UnitInertia.SolidCylinder(*self.cylinder, [0.0, 0.0, 1.0])
+        X_CS = self.pose.transform()
+        central = SpatialInertia(self.mass, [0.0, 0.0, 0.0], unit)
+        return central.ReExpress(X_CS.rotation()).Shift(-X_CS.translation())
+
 
 @dc.dataclass
 class HeldWorkpieceParameters:
@@ -51,6 +64,14 @@ class HeldWorkpieceParameters:
 
     pose: PoseParameters = dc.field(default_factory=PoseParameters)
     solids: list[SolidParameters] = dc.field(default_factory=list)
+
+    @property
+    def inertia(self) -> SpatialInertia:
+        """Its inertia about the origin of its frame, axes of the frame."""
+        total = SpatialInertia.Zero()
+        for solid in self.solids:
+            total += solid.inertia
+        return total
 
     def check(self) -> None:
         """Refuse what is no body.

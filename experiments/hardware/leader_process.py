@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.environment.channel_end import ChannelEnd
-from diagrams.environment.leader import Leading, add_leader
+from diagrams.environment.leader import LeaderSide
 from diagrams.scenario import Scenario
 from diagrams.scenario_task import make_task
 from diagrams.signal_log import add_log
@@ -73,12 +73,13 @@ def lead_scenario(
         require(lasts > 0.0, "duration", lasts, "a positive number [s]")
         task = make_task(settings, scenario.path.parent)
         start = task.start(np.zeros(3))
-        leader = add_leader(builder, Leading(way, settings.hand, None, task, start, period))
+        side = LeaderSide(way, settings.hand, None, task, start, period)
+        port, ports = side.add_leader(builder)
     end = TeleoperationEnd(lcm, "leader")
     link = builder.AddNamedSystem("follower_link", ChannelEnd(end, period))
-    builder.Connect(leader.port.GetOutputPort("message"), link.GetInputPort("sent"))
-    builder.Connect(link.GetOutputPort("arrived"), leader.port.GetInputPort("message"))
-    log = add_log(builder, leader.signals, period)
+    builder.Connect(port.GetOutputPort("message"), link.GetInputPort("sent"))
+    builder.Connect(link.GetOutputPort("arrived"), port.GetInputPort("message"))
+    log = add_log(builder, ports, period)
     fuse_blocks(builder)
     simulator = Simulator(builder.Build())
     tell("leading; waiting for a follower")

@@ -7,7 +7,6 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.fault_instant import first_instant
 from diagrams.scenario import (
     Circle,
     ForcePulse,
@@ -127,8 +126,8 @@ def test_out_of_the_neighbourhood(load_scenario):
     settings.faults.overspeed = np.inf
     station, root = run(settings, 1.0)
     sentence = station.fault(root)
-    now, before = first_instant(
-        station.log, station.blocks, root, "law", station.law.layout.status.start
+    now, before = station.log.first_instant(
+        station.blocks, root, "law", station.law.layout.status.start
     )
     y_t = now.signals["tool_pose"][:3]
     depth = 0.05 - np.linalg.norm((y_t - [0.8, 0.0, 1.0])[1:])
@@ -179,8 +178,8 @@ def test_a_servo(six_axes):
 def test_an_unstable_loop_is_not_blamed_on_sensors_alone(six_axes, unstable):
     """Measured values that part while commands swing; without, they alone are named."""
     station, root = run(six_axes, 0.02)
-    now, before = first_instant(
-        station.log, station.blocks, root, "law", station.law.layout.status.start
+    now, before = station.log.first_instant(
+        station.blocks, root, "law", station.law.layout.status.start
     )
     scene = FaultScene(
         station.law,
@@ -202,9 +201,7 @@ def test_what_is_known_without_a_run(six_axes):
     """Forces and references that are no numbers; a projection without a result."""
     station, root = run(six_axes, 0.04)
     assert station.fault(root) is None
-    now, _ = first_instant(
-        station.log, station.blocks, root, "law", station.law.layout.status.start
-    )
+    now, _ = station.log.first_instant(station.blocks, root, "law", station.law.layout.status.start)
 
     def sentence(fault, **changes):
         changed = FaultInstant(0.5, {**now.signals, **changes})
@@ -235,9 +232,7 @@ def test_what_is_known_without_a_run(six_axes):
 @pytest.mark.parametrize("fast", [0, 3])
 def test_a_joint_that_runs_away_next_to_a_singular_posture(six_axes, fast):
     station, root = run(six_axes, 0.0)
-    now, _ = first_instant(
-        station.log, station.blocks, root, "law", station.law.layout.status.start
-    )
+    now, _ = station.log.first_instant(station.blocks, root, "law", station.law.layout.status.start)
     state = now.measured_state.copy()
     state[[4, 16]], state[[6 + fast, 18 + fast]] = np.deg2rad(2.0), np.deg2rad(600.0)
     near = FaultInstant(0.5, {**now.signals, "joint_state_measured": state})
@@ -254,8 +249,8 @@ def test_a_robot_without_names(load_scenario):
     station = build_station(settings, FOLDER)
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
-    now, before = first_instant(
-        station.log, station.blocks, root, "law", station.law.layout.status.start
+    now, before = station.log.first_instant(
+        station.blocks, root, "law", station.law.layout.status.start
     )
     assert before is None
     scene = FaultScene(station.law, station.robot, station.task.place, False, now, None)

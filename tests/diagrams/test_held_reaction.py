@@ -106,7 +106,7 @@ def test_the_holder_is_told_what_the_other_ones_sensor_measures(known):
     told, true = raw["holder_wrench_measured"][-1], raw["holder_wrench_ext"][-1]
     assert np.linalg.norm(true[:3]) > 60.0
     assert np.abs(told - true).max() < 0.3
-    assert not any("sensor" in line for line in station.holder.warn())
+    assert not any("sensor" in line for line in station.holder.warnings())
 
 
 @pytest.mark.slow

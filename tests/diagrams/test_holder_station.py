@@ -4,10 +4,12 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, Gain
 
 from diagrams.builder import build_station
-from diagrams.holder_station import HOLDER
-from diagrams.robots.held_workpiece import WORKPIECE
+from diagrams.holder_station import HOLDER, PrefixingBuilder
+from diagrams.robots.belief import WORKPIECE
 from diagrams.scenario import Scenario, SensorFailureParameters
 from diagrams.scenario.robot import PoseParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
@@ -223,3 +225,17 @@ def test_where_there_are_no_two_robots(known):
     for further in ({"remote": True}, {"with_slope": True}):
         with pytest.raises(InputError, match="holder = given; allowed: null where margins"):
             build_station(exact(), SCENARIO_DIRECTORY, like=known[0], **further)
+
+
+def test_names_begin_with_the_prefix_and_ports_are_connected():
+    builder = DiagramBuilder()
+    named = PrefixingBuilder(builder, "other_")
+    builder.AddNamedSystem("source", ConstantVectorSource([1.0]))
+    source = named.AddNamedSystem("source", ConstantVectorSource([2.0]))
+    gain = named.AddNamedSystem("gain", Gain(3.0, 1))
+    named.Connect(source.get_output_port(), gain.get_input_port())
+    diagram = builder.Build()
+    names = [system.get_name() for system in diagram.GetSystems()]
+    assert names == ["source", "other_source", "other_gain"]
+    context = gain.GetMyContextFromRoot(diagram.CreateDefaultContext())
+    assert np.array_equal(gain.get_output_port().Eval(context), [6.0])

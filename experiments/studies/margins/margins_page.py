@@ -291,22 +291,9 @@ def _rate(rate: float) -> str:
     return f"[red]{rate:+.1f}[/]" if rate > 0.0 else f"{rate:+.1f}"
 
 
-@dataclass(frozen=True)
-class MarginsOutcome:
-    """What an analysis left.
-
-    Attributes:
-        analysis: The analysis.
-        report: The page.
-    """
-
-    analysis: MarginAnalysis
-    report: Report
-
-
 def write_margins(
     scenario: ScenarioFile, out: Path, box: ErrorBox, progress: ProgressListener
-) -> MarginsOutcome:
+) -> tuple[MarginAnalysis, Report]:
     """Analyse a scenario's margins and write ``margins.json`` and the page.
 
     Args:
@@ -314,6 +301,9 @@ def write_margins(
         out: Folder for the results.
         box: Model errors that are to be borne.
         progress: Told how far it is.
+
+    Returns:
+        The analysis and the page.
 
     Raises:
         InputError: If the scenario is wrong or the folder cannot be used.
@@ -334,4 +324,4 @@ def write_margins(
             figures=draw_margins(analysis),
             log_attributes=standard_attributes(scenario.name),
         )
-        return MarginsOutcome(analysis, page.write(results))
+        return analysis, page.write(results)

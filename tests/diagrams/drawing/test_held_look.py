@@ -7,9 +7,9 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
-from diagrams.drawing.held_look import held_look, held_points
+from diagrams.drawing.held_look import HeldLook
 from diagrams.drawing.recorded import RecordedHolder, RecordedMotion
-from diagrams.drawing.replay import build_replay
+from diagrams.drawing.replay import Playback
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.scenario import (
     HeldWorkpieceParameters,
@@ -42,7 +42,7 @@ def held():
 
 def test_points_are_placed_where_the_workpiece_begins(held):
     held.workpiece_pose[0, 3:] = zyx_to_matrix([0.5 * np.pi, 0.0, 0.0]).ravel()
-    (placed,) = held_points(np.array([[0.1, 0.0, 0.02]]), held)
+    (placed,) = held.first_points(np.array([[0.1, 0.0, 0.02]]))
     assert np.allclose(placed, [0.9, 0.2, 0.52], rtol=0, atol=1e-15)
 
 
@@ -50,7 +50,7 @@ def test_everything_on_the_workpiece_moves_with_it(held, load_arm):
     path = make_path(PathParameters(Line([0.0, 0.0, 0.1], [0.0, 0.1, 0.1])), "rigid", None)
     arm, other = load_arm(MODEL), load_arm(MODEL)
     drawing = draw_robot(arm.plant, arm.tool, RobotParameters(MODEL), Path())
-    look = held_look(WORKPIECE, draw_robot(other.plant, other.tool, RobotParameters(MODEL), Path()))
+    look = HeldLook(WORKPIECE, draw_robot(other.plant, other.tool, RobotParameters(MODEL), Path()))
     evaluator = path.evaluator(2)
     points = np.array([evaluator([0.0, 0.04 * k, 0.1], 0.0) for k in range(3)])
     tool = np.array([np.append([0.0, 0.04 * k, 0.1], np.eye(3)) for k in range(3)])
@@ -60,7 +60,7 @@ def test_everything_on_the_workpiece_moves_with_it(held, load_arm):
     )
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     layout = PathPointLayout(2, oriented=False)
-    diagram = build_replay(drawing, PathDrawing(path, layout), motion, meshcat, PERIOD, held=look)
+    diagram = Playback(motion, meshcat, PERIOD).build(drawing, PathDrawing(path, layout), held=look)
     simulator = Simulator(diagram)
     simulator.AdvanceTo(2 * PERIOD)
     root = "/drake/path_following"

@@ -8,8 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.drawing.mounting_look import (
-    add_mounting_drawing,
-    mounting_look,
+    MountingLook,
     ring_surface,
 )
 from diagrams.environment.mounting import Mounting
@@ -33,7 +32,7 @@ def test_a_ring_is_as_large_as_its_bore():
 
 
 def test_everything_is_drawn_where_it_is():
-    look = mounting_look(Mounting(PlateParameters(), X_WM, X_WF))
+    look = MountingLook(Mounting(PlateParameters(), X_WM, X_WF))
     middle = look.bores.vertices.reshape(4, -1, 3).mean(axis=(0, 1))
     np.testing.assert_allclose(middle[:2], X_WF.translation()[:2], atol=1e-9)
     names = {part.name for part in look.fixed}
@@ -43,7 +42,7 @@ def test_everything_is_drawn_where_it_is():
     tool, *plates = (
         builder.AddSystem(ConstantVectorSource(pose)).get_output_port() for pose in poses
     )
-    add_mounting_drawing(builder, look, tool, plates, meshcat, 0.1)
+    look.add(builder, tool, plates, meshcat, 0.1)
     simulator = Simulator(builder.Build())
     simulator.Initialize()
     for name in ("bores", "frame", "magazine", "gripper/cup_0", "plate_1/pin_3", "plate_2/board"):

@@ -11,7 +11,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.drawing.recorded import RecordedMotion, RecordedPushes
 from diagrams.drawing.replay import (
-    build_replay,
+    Playback,
     camera_and_target,
     record,
 )
@@ -59,7 +59,7 @@ def build(path, motion, meshcat, load_arm):
         meshcat.Delete()
         arm = load_arm(MODEL)
         drawing = draw_robot(arm.plant, arm.tool, RobotParameters(MODEL), Path())
-        return build_replay(drawing, PathDrawing(path, LAYOUT), motion, meshcat, PERIOD)
+        return Playback(motion, meshcat, PERIOD).build(drawing, PathDrawing(path, LAYOUT))
 
     return built
 

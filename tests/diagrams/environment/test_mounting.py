@@ -195,22 +195,20 @@ INSERTED = RigidTransform([0.0, 0.0, -2e-3])
 
 def world(*poses):
     builder = DiagramBuilder()
-    plates = add_plate_plant(builder, PLATE, X_WM, X_WF, poses, GRAVITY)
-    return builder.Build(), plates
+    plant, bodies, contact = add_plate_plant(builder, PLATE, X_WM, X_WF, poses, GRAVITY)
+    return builder.Build(), plant, bodies, contact
 
 
 @pytest.fixture(name="depth", scope="module")
 def fixture_depth():
     """Return how deep a plate at a pose beside its seat is in something [m]."""
-    diagram, plates = world(X_WF)
+    diagram, plant, bodies, _ = world(X_WF)
     root = diagram.CreateDefaultContext()
-    plant, context = plates.plant, plates.plant.GetMyMutableContextFromRoot(root)
+    context = plant.GetMyMutableContextFromRoot(root)
     query = plant.get_geometry_query_input_port()
 
     def depth(X_FP):
-        plant.SetFloatingBaseBodyPoseInWorldFrame(
-            context, plant.get_body(plates.bodies[0]), X_WF @ X_FP
-        )
+        plant.SetFloatingBaseBodyPoseInWorldFrame(context, plant.get_body(bodies[0]), X_WF @ X_FP)
         pairs = query.Eval(context).ComputePointPairPenetration()
         return max((pair.depth for pair in pairs), default=0.0)
 
@@ -247,14 +245,14 @@ def test_a_plate_that_is_tilted_jams(depth, make):
 
 
 def fall(X_FP, duration=0.4):
-    diagram, plates = world(X_WF @ X_FP)
+    diagram, plant, bodies, contact = world(X_WF @ X_FP)
     simulator = Simulator(diagram)
     simulator.AdvanceTo(duration)
     root = simulator.get_context()
-    plant, context = plates.plant, plates.plant.GetMyContextFromRoot(root)
-    forces = plates.contact.GetOutputPort("forces")
-    forces = forces.Eval(plates.contact.GetMyContextFromRoot(root))
-    X_WP = plant.GetFreeBodyPose(context, plant.get_body(plates.bodies[0]))
+    context = plant.GetMyContextFromRoot(root)
+    forces = contact.GetOutputPort("forces")
+    forces = forces.Eval(contact.GetMyContextFromRoot(root))
+    X_WP = plant.GetFreeBodyPose(context, plant.get_body(bodies[0]))
     return X_WF.inverse() @ X_WP, forces
 
 
@@ -274,12 +272,12 @@ def test_a_plate_beside_its_bores_stays_on_the_frame():
 
 
 def test_plates_lie_in_the_magazine():
-    diagram, plates = world(X_WF, X_WM)
+    diagram, _, _, contact = world(X_WF, X_WM)
     simulator = Simulator(diagram)
     simulator.AdvanceTo(0.05)
     root = simulator.get_context()
-    forces = plates.contact.GetOutputPort("forces")
+    forces = contact.GetOutputPort("forces")
     weight = [0.0, 0.0, PLATE.mass * 9.81]
     np.testing.assert_allclose(
-        forces.Eval(plates.contact.GetMyContextFromRoot(root)), [*weight, *weight], atol=0.1
+        forces.Eval(contact.GetMyContextFromRoot(root)), [*weight, *weight], atol=0.1
     )

@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.drawing.recorded import RecordedMotion
-from diagrams.drawing.replay import build_delta_replay, record
+from diagrams.drawing.replay import Playback, record
 from diagrams.scenario import Scenario
 from diagrams.tasks.task_drawing import drawing_of
 from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
@@ -251,7 +251,7 @@ def test_replay_draws_robot_and_path_upside_down():
     )
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     drawn = drawing_of(station.task)
-    diagram = build_delta_replay(station.robot, drawn, motion, meshcat, PERIOD)
+    diagram = Playback(motion, meshcat, PERIOD).build_delta(station.robot, drawn)
     page = record(diagram, meshcat, motion.times[-1], PERIOD)
     assert "</html>" in page
     for name in ("delta_robot/slide_1", "delta_robot/rod_6", "path_following/path"):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.robots.arm_model import believe_arm, read_arm
-from diagrams.robots.belief import BeliefSource
-from diagrams.robots.held_workpiece import WORKPIECE, holding, workpiece_inertia
+from diagrams.robots.belief import WORKPIECE, BeliefSource
 from diagrams.scenario import (
     HeldWorkpieceParameters,
     ModelErrorParameters,
@@ -30,7 +29,7 @@ MOVED = np.eye(24)[6:12]
 
 
 def test_the_inertia_of_a_box_and_a_rod():
-    M = workpiece_inertia(HeldWorkpieceParameters(solids=[BOX, ROD]))
+    M = HeldWorkpieceParameters(solids=[BOX, ROD]).inertia
     x, y, z = BOX.box
     box = BOX.mass / 12.0 * np.diag([y**2 + z**2, x**2 + z**2, x**2 + y**2])
     r, length = ROD.cylinder
@@ -52,7 +51,7 @@ def fixture_source():
     )
     robot = RobotParameters(model="comau_racer_1_4_elastic", tool_frame="tool_point")
     error = ModelErrorParameters(tool_mass=-0.2)
-    return holding(BeliefSource(robot, "", error, Path()), workpiece)
+    return BeliefSource(robot, "", error, Path()).holding(workpiece)
 
 
 def test_the_workpiece_is_the_tool_of_the_robot_that_holds_it(source):

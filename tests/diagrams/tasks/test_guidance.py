@@ -11,7 +11,7 @@ from diagrams.environment.operator import controls_text, idle_controls
 from diagrams.scenario import Scenario
 from diagrams.scenario.simulation import OperatorParameters
 from diagrams.scenario_task import make_task
-from diagrams.warnings.fixture_warnings import stiff_fixtures
+from diagrams.warnings.part_warnings import stiff_fixtures
 from experiments.scenario_file import find_scenario
 from pfsc_drake.yaml.typed import load_file
 

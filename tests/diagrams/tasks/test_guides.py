@@ -9,7 +9,7 @@ import pytest
 from diagrams.scenario.virtual_fixtures import GuideParameters
 from diagrams.scenario_task import make_task
 from diagrams.tasks.task_drawing import drawing_of
-from diagrams.warnings.fixture_warnings import firm_guides, stiff_fixtures
+from diagrams.warnings.part_warnings import firm_guides, stiff_fixtures
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.shapes.path_shapes import Line
 from pfsc_drake.geometry.shapes.through_waypoints import Waypoints
