@@ -22,8 +22,7 @@ from pfsc_drake.geometry import zyx_to_quaternion
 from pfsc_drake.physics.waypoint_source import Arrivals, WaypointSource
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.operator_panel import OperatorPanel
-from pfsc_drake.systems.physics.recorded_pen import RecordedPen
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedPen
 
 _SETTLES = 3.0  # s, after the last way point has come, of a run that tells no duration
 _SLOWEST = 0.3  # of the largest speed, to tell how long a run may take

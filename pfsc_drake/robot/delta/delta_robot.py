@@ -13,7 +13,7 @@ from pfsc_drake.jets import Jet
 from pfsc_drake.robot.delta.delta_parameters import NUM_ARMS, DeltaParameters
 from pfsc_drake.robot.delta.kinematics import RodMotion, joint_coordinates, rod_motion
 from pfsc_drake.robot.model_error import ModelError
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, bias_torque
 
 
 @dataclass(frozen=True)
@@ -136,9 +136,7 @@ class DeltaRobot(RobotModel):
             force: Drive forces less friction [N], shape (3, 1).
             f_ext: External force at the end-effector [N], shape (3, 1).
         """
-        coasting = [Jet.from_derivatives([q[i], v[i], ca.SX(0.0)]) for i in range(NUM_ARMS)]
-        needed = ca.vertcat(*[tau.coefficients[0] for tau in self.inverse_dynamics(coasting)])
-        pushed = force + self.jacobian(q).T @ f_ext - needed
+        pushed = force + self.jacobian(q).T @ f_ext - bias_torque(self, q, v)
         return ca.ldl_solve(pushed, *ca.ldl(self.mass_matrix(q)))
 
     def tool_position(self, q: np.ndarray) -> np.ndarray:

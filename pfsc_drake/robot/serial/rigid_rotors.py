@@ -11,14 +11,10 @@ from collections.abc import Sequence
 
 import casadi as ca
 
+from pfsc_drake.robot.robot_model import bias_torque
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.newton_euler import mass_matrix
-from pfsc_drake.robot.serial.rotor_coupling import (
-    RotorMount,
-    bias_torque,
-    check_mounts,
-    rotor_momentum,
-)
+from pfsc_drake.robot.serial.rotor_coupling import RotorMount, check_mounts, rotor_momentum
 
 
 def rigid_mass_matrix(chain: SerialChain, mounts: Sequence[RotorMount] | None, q: ca.SX) -> ca.SX:

@@ -23,8 +23,9 @@ from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.models.robot_parameters import ArmParameters
+from pfsc_drake.robot.robot_model import bias_torque
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.newton_euler import inverse_dynamics, link_motions, mass_matrix
+from pfsc_drake.robot.serial.newton_euler import link_motions, mass_matrix
 
 # of unit vectors, so that right angles leave structural zeros in the expressions
 _DIGITS = 12
@@ -251,16 +252,6 @@ def _coupling_terms(
     momentum = rotor_momentum(chain, mounts, q, v)
     terms = [ca.jacobian(momentum, v).T, *_coriolis(momentum, q, v, w)]
     return tuple(ca.substitute(terms, [q, v, w], [q_J, v_J, v_M]))
-
-
-def bias_torque(chain: SerialChain, q_J: ca.SX, v_J: ca.SX) -> ca.SX:
-    """Return ``n_E = C_E v_J + g_L`` of (2.65a) without friction, shape (N, 1)."""
-    unmoved = ca.SX(chain.dimension, 1)
-    q = [
-        Jet.from_derivatives([a, b, c])
-        for a, b, c in zip(_rows(q_J), _rows(v_J), _rows(unmoved), strict=True)
-    ]
-    return ca.vertcat(*[tau.coefficients[0] for tau in inverse_dynamics(chain, q)])
 
 
 def full_mass_matrix_function(chain: SerialChain, mounts: Sequence[RotorMount]) -> ca.Function:

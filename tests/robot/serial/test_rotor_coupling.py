@@ -10,11 +10,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.robot_parameters import load_parameters
+from pfsc_drake.robot.robot_model import bias_torque
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.newton_euler import mass_matrix
 from pfsc_drake.robot.serial.rotor_coupling import (
     RotorMount,
-    bias_torque,
     coupling_matrices,
     full_dynamics_function,
     full_energy_function,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.systems.physics.recorded_pen import RecordedPen
+from pfsc_drake.systems.physics.operator_panel import RecordedPen
 
 PERIOD, LENGTH = 2e-3, 2
 TICKS = np.array([0, 3, 3, 5, 6, 6])
