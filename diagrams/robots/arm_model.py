@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
+import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint
 
@@ -15,7 +16,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import inboard_joints
 from pfsc_drake.robot.models.robot_parameters import VariantParameters, load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
-from pfsc_drake.robot.serial.chain import SerialChain, ToolMass, believed_chain
+from pfsc_drake.robot.serial.chain import SerialChain, believed_chain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames
 from pfsc_drake.robot.tool_load import ToolLoad
@@ -88,15 +89,18 @@ class ArmModel:
         """
         return tool_load_from_plant(self.plant, self.sensor_joint(joint), self.tool)
 
-    def tool_mass(self) -> ToolMass:
-        """Return what the body of the tool frame weighs, of a body beside the last link's own."""
+    def tool_mass(self) -> tuple[float, np.ndarray, str]:
+        """Return what the tool frame's body weighs, where its centre of mass is, and its name.
+
+        It weighs nothing where it is the last link's own. The centre is in the frame of that link.
+        """
         body, link = self.tool.body(), link_frames(self.plant, self.coordinates)[-1]
         context = self.plant.CreateDefaultContext()
         if body.index() == link.body().index():
-            return ToolMass(0.0, self.chain.p_LT, body.name())
+            return 0.0, self.chain.p_LT, body.name()
         center = body.CalcCenterOfMassInBodyFrame(context)
         X_LB = self.plant.CalcRelativeTransform(context, link, body.body_frame())
-        return ToolMass(body.get_mass(context), X_LB @ center, body.name())
+        return body.get_mass(context), X_LB @ center, body.name()
 
 
 def read_arm(
@@ -140,7 +144,7 @@ def believe_arm(true: ArmModel, source: BeliefSource) -> tuple[Belief, ArmModel]
     error, believed = source.error.error(true.chain.gather("is_revolute")), model.chain
     if source.error.is_given:
         with naming_model_error():
-            believed = believed_chain(model.chain, error, model.tool_mass())
+            believed = believed_chain(model.chain, error, *model.tool_mass())
     sees_truth = model is true and not error.moves_tool
     return Belief(believed, error, sees_truth), model
 

@@ -4,18 +4,20 @@ Drake takes a stand-in for an inertia that it does not like, ends the program at
 and lets the rest through. Here each is refused in one line that names file, line, part and value.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.joint_edits import Mimic, mimics_of
 from pfsc_drake.robot.models.mjcf_drives import MjcfDrive, mjcf_drives
 from pfsc_drake.robot.models.model_parts import (
     DRIVE_NUMBERS,
     MOMENTS,
     PRODUCTS,
+    Mimic,
     ModelPart,
     check_inertia,
     check_joint,
+    mimics_of,
     refuse_loops,
 )
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
@@ -45,6 +47,37 @@ class ModelFacts:
     mimics: dict[str, Mimic] = field(default_factory=dict)
     still: set[str] = field(default_factory=set)
 
+    def with_followers(self, fixed: Mapping[str, float]) -> dict[str, float]:
+        """Return the positions of fixed joints, and of what follows them.
+
+        Args:
+            fixed: Positions of joints that are fixed, by name [rad or m]; those of followers, too,
+                are taken as they are given.
+
+        Raises:
+            InputError: If a joint follows one that moves, or itself.
+        """
+        positions = dict(fixed)
+
+        def position(name: str, waiting: tuple[str, ...]) -> float:
+            if name in positions:
+                return positions[name]
+            if name in self.still:
+                return 0.0
+            mimic = self.mimics.get(name)
+            if mimic is None or name in waiting:
+                follower = self.mimics[waiting[0]]
+                raise InputError(
+                    f"{follower.place}: joint '{waiting[0]}': mimic = {follower.leader}, which "
+                    "moves; allowed: joints on their own: fix the one that it follows, and it is "
+                    f"fixed too: fixed_joints: {{{name}: VALUE}}"
+                )
+            return mimic.multiplier * position(mimic.leader, (*waiting, name)) + mimic.offset
+
+        for name in self.mimics.keys() - self.still:
+            positions[name] = position(name, ())
+        return positions
+
 
 def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -> ModelFacts:
     """Check the numbers and the joints of a model.
@@ -66,7 +99,7 @@ def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -
     facts.drives = mjcf_drives(models)
     facts.effort_limits |= {name: drive.effort_limit for name, drive in facts.drives.items()}
     for name, drive in facts.drives.items():
-        if drive.stiffness > 0.0 and drive.actuated:
+        if drive.stiffness > 0.0 and drive.is_actuated:
             raise InputError(
                 f"{models[0].file}: joint '{name}': stiffness = {drive.stiffness:g} beside an "
                 "actuator; allowed: 0, or a joint of its own behind the driven one; of an elastic "
@@ -106,20 +139,31 @@ def _inspect_urdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
             for key in keys
             if key in part.attributes
         }
-        numbers = check_joint(joint, values, fixed, negative_is_unlimited=False)
-        if "effort" in numbers:
-            facts.effort_limits[joint.name] = numbers["effort"]
-        if numbers.get("friction", 0.0) > 0.0:
-            facts.friction.append(joint.name)
-        if element.attributes.get("type") == "fixed":
-            facts.still.add(joint.name)
+        _take_joint(joint, values, facts, fixed)
     refuse_loops(edges, {})
-    for transmission in model.root.all("transmission"):
-        for actuator in transmission.all("actuator"):
-            drive = ModelPart(model, actuator, "actuator")
-            for key, allowed in DRIVE_NUMBERS.items():
-                for part in actuator.all(key):
-                    drive.number(key, part.attributes.get("value"), allowed, part)
+    for actuator in model.root.all("transmission", "actuator"):
+        drive = ModelPart(model, actuator, "actuator")
+        for key, allowed in DRIVE_NUMBERS.items():
+            for part in actuator.all(key):
+                drive.number(key, part.attributes.get("value"), allowed, part)
+
+
+def _take_joint(
+    joint: ModelPart,
+    values: dict[str, tuple[str, Element]],
+    facts: ModelFacts,
+    fixed: frozenset[str],
+) -> None:
+    """Check a joint of a URDF or SDF model, and keep what Drake's plant will not say of it."""
+    numbers = check_joint(joint, values, fixed)
+    if "effort" in numbers and joint.model.root.name == "robot":
+        facts.effort_limits[joint.name] = numbers["effort"]
+    if numbers.get("friction", 0.0) > 0.0:
+        facts.friction.append(joint.name)
+    if numbers.get("spring_stiffness", 0.0) > 0.0:
+        facts.springs[joint.name] = numbers["spring_stiffness"]
+    if joint.element.attributes.get("type") == "fixed":
+        facts.still.add(joint.name)
 
 
 def _check_origin(part: ModelPart, holder: Element) -> None:
@@ -155,16 +199,10 @@ def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> N
                 for key in keys
                 for part in above.all(key)
             }
-            numbers = check_joint(joint, values, fixed, negative_is_unlimited=True)
-            if numbers.get("friction", 0.0) > 0.0:
-                facts.friction.append(joint.name)
-            if numbers.get("spring_stiffness", 0.0) > 0.0:
-                facts.springs[joint.name] = numbers["spring_stiffness"]
+            _take_joint(joint, values, facts, fixed)
             for key, allowed in DRIVE_NUMBERS.items():
                 for part in element.all(key):
                     joint.number(key, part.text, allowed, part)
-            if element.attributes.get("type") == "fixed":
-                facts.still.add(joint.name)
         _check_poses(model, one)
         frames = {
             frame.attributes.get("name", ""): frame.attributes.get("attached_to", "")
@@ -193,13 +231,11 @@ def _inspect_mjcf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
             named = dict(zip((*MOMENTS, *PRODUCTS), moments.split(), strict=False))
             check_inertia(body, attributes.get("mass"), named, inertial)
         for element_of_joint in element.all("joint"):
-            joint = ModelPart(model, element_of_joint, "joint")
             given = element_of_joint.attributes
             limits = dict(zip(("lower", "upper"), given.get("range", "").split(), strict=False))
             values = limits | {k: given[k] for k in ("damping", "armature") if k in given}
-            check_joint(
-                joint, {key: (text, element_of_joint) for key, text in values.items()}, fixed, False
-            )
+            placed = {key: (text, element_of_joint) for key, text in values.items()}
+            check_joint(ModelPart(model, element_of_joint, "joint"), placed, fixed)
     for equality in model.root.all("equality"):
         for constraint in equality.children:
             if constraint.name == "joint":  # one follows the other

@@ -18,81 +18,6 @@ from pfsc_drake.robot.models.mjcf_classes import (
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
 
-@dataclass
-class MjcfDrive:
-    """Drive of a joint.
-
-    Attributes:
-        armature: Inertia of the rotor, on the joint's side [kg m^2 or kg].
-        friction: Dry friction, ``frictionloss`` [Nm or N].
-        stiffness: Stiffness of a spring at the joint [Nm/rad or N/m].
-        actuated: Whether an actuator of the model drives the joint.
-        effort_limit: Largest magnitude of the force on the joint, infinite if nothing limits it
-            [Nm or N]; of an uneven range its smaller side.
-        source: Attributes that the limit is from.
-    """
-
-    armature: float = 0.0
-    friction: float = 0.0
-    stiffness: float = 0.0
-    actuated: bool = False
-    effort_limit: float = math.inf
-    source: str = "no limit in the model"
-
-
-def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
-    """Return the drives of all joints of an MJCF model that have a name.
-
-    Args:
-        models: The model and what it includes.
-
-    Raises:
-        InputError: If a range, a gear or a gain is not made of numbers; one line.
-    """
-    roots = [model.root for model in models if model.root.name.startswith("mujoco")]
-    classes, limits_by_range = DefaultClasses.of(models), True
-    for root in roots:
-        for compiler in root.all("compiler"):
-            limits_by_range = compiler.attributes.get("autolimits", "true") != "false"
-    places = {id(e): model for model in models for e in model.root.within()}
-    joints: dict[str, _Numbers] = {}
-    for world in (world for root in roots for world in root.all("worldbody")):
-        for _, element, given in classes.below(world, "joint"):
-            numbers = _Numbers(places[id(element)], element, given, limits_by_range)
-            if "name" in given:
-                joints[given["name"]] = numbers
-            elif numbers.stiffness > 0.0:
-                raise InputError(
-                    f"{numbers.model.place(element)}: joint without a name: stiffness = "
-                    f"{given['stiffness']}; allowed: 0, or a joint with a name"
-                )
-    drives = {
-        name: MjcfDrive(
-            numbers.of("armature", 0.0), numbers.of("frictionloss", 0.0), numbers.stiffness
-        )
-        for name, numbers in joints.items()
-    }
-    driven: dict[str, list[tuple[float, str]]] = {}
-    for root in roots:
-        for element in (e for group in root.all("actuator") for e in group.children):
-            given = classes.resolved(element, "actuator") | servo_attributes(element)
-            joint = given.get("joint", given.get("jointinparent"))
-            if joint in drives:
-                numbers = _Numbers(places[id(element)], element, given, limits_by_range)
-                driven.setdefault(joint, []).append(_limit_of_actuator(numbers))
-                drives[joint].actuated = True
-    for name, numbers in joints.items():
-        limits = driven.get(name, [])
-        total = sum(limit for limit, _ in limits) if limits else math.inf
-        source = " + ".join(source for _, source in limits)
-        of_joint = numbers.limit("actuatorfrc")
-        if of_joint < total:
-            total, source = of_joint, "actuatorfrcrange"
-        if total < math.inf:
-            drives[name].effort_limit, drives[name].source = total, source
-    return drives
-
-
 @dataclass(frozen=True)
 class _Numbers:
     """Attributes of an element as numbers, with messages that name them."""
@@ -148,3 +73,72 @@ def _limit_of_actuator(numbers: _Numbers) -> tuple[float, str]:
     if gear != 1.0:
         source += f" x gear {gear:g}"
     return gear * force, source
+
+
+class MjcfDrive:
+    """Drive of a joint.
+
+    Args:
+        joint: Attributes of the joint.
+        actuators: Attributes of the actuators that drive it.
+
+    Attributes:
+        armature: Inertia of the rotor, on the joint's side [kg m^2 or kg].
+        friction: Dry friction, ``frictionloss`` [Nm or N].
+        stiffness: Stiffness of a spring at the joint [Nm/rad or N/m].
+        is_actuated: Whether an actuator of the model drives the joint.
+        effort_limit: Largest magnitude of the force on the joint, infinite if nothing limits it
+            [Nm or N]; of an uneven range its smaller side.
+        source: Attributes that the limit is from.
+
+    Raises:
+        InputError: If an attribute is not made of numbers, or the spring does not rest at zero.
+    """
+
+    def __init__(self, joint: _Numbers, actuators: list[_Numbers]) -> None:
+        self.armature, self.friction = joint.of("armature", 0.0), joint.of("frictionloss", 0.0)
+        self.stiffness, self.is_actuated = joint.stiffness, bool(actuators)
+        limits = [_limit_of_actuator(actuator) for actuator in actuators]
+        total = sum(limit for limit, _ in limits) if limits else math.inf
+        source = " + ".join(source for _, source in limits)
+        if (of_joint := joint.limit("actuatorfrc")) < total:
+            total, source = of_joint, "actuatorfrcrange"
+        self.effort_limit = total
+        self.source = source if total < math.inf else "no limit in the model"
+
+
+def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
+    """Return the drives of all joints of an MJCF model that have a name.
+
+    Args:
+        models: The model and what it includes.
+
+    Raises:
+        InputError: If a range, a gear or a gain is not made of numbers; one line.
+    """
+    roots = [model.root for model in models if model.root.name.startswith("mujoco")]
+    classes, limits_by_range = DefaultClasses.of(models), True
+    for root in roots:
+        for compiler in root.all("compiler"):
+            limits_by_range = compiler.attributes.get("autolimits", "true") != "false"
+    places = {id(e): model for model in models for e in model.root.within()}
+    joints: dict[str, _Numbers] = {}
+    for world in (world for root in roots for world in root.all("worldbody")):
+        for _, element, given in classes.below(world, "joint"):
+            numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+            if "name" in given:
+                joints[given["name"]] = numbers
+            elif numbers.stiffness > 0.0:
+                raise InputError(
+                    f"{numbers.model.place(element)}: joint without a name: stiffness = "
+                    f"{given['stiffness']}; allowed: 0, or a joint with a name"
+                )
+    driven: dict[str, list[_Numbers]] = {name: [] for name in joints}
+    for root in roots:
+        for element in (e for group in root.all("actuator") for e in group.children):
+            given = classes.resolved(element, "actuator") | servo_attributes(element)
+            joint = given.get("joint", given.get("jointinparent", ""))
+            if joint in joints:
+                numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+                driven[joint].append(numbers)
+    return {name: MjcfDrive(numbers, driven[name]) for name, numbers in joints.items()}

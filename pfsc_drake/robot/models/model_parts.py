@@ -1,7 +1,7 @@
 """Links and joints in a model file, and what their numbers may be."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -153,10 +153,7 @@ def _acceptable_to_drake(values: list[float]) -> bool:
 
 
 def check_joint(
-    joint: ModelPart,
-    values: dict[str, tuple[str, Element]],
-    fixed: frozenset[str],
-    negative_is_unlimited: bool,
+    joint: ModelPart, values: dict[str, tuple[str, Element]], fixed: frozenset[str]
 ) -> dict[str, float]:
     """Return the numbers of a joint, or refuse them.
 
@@ -164,8 +161,6 @@ def check_joint(
         joint: The joint.
         values: What is written, and where, by key.
         fixed: Joints that will not move.
-        negative_is_unlimited: Whether negative effort and velocity limits mean that there are
-            none, as in SDF.
 
     Raises:
         InputError: If a number is none or out of range, or the lower limit is not below the
@@ -174,8 +169,8 @@ def check_joint(
     numbers = {}
     for key, (text, at) in values.items():
         allowed = _JOINT_NUMBERS[key]
-        if key in ("effort", "velocity") and negative_is_unlimited:
-            allowed = _LIMIT
+        if key in ("effort", "velocity") and joint.model.root.name == "sdf":
+            allowed = _LIMIT  # negative for none
         numbers[key] = joint.number(key, text, allowed, at)
     kind = joint.element.attributes.get("type", "hinge")
     if kind in _ONE_AXIS and "lower" in numbers and "upper" in numbers:
@@ -223,3 +218,67 @@ def refuse_loops(
                 "child", f"'{child}'", "an open chain; this joint closes a loop", joint.element
             )
         group[other] = one
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint at ``multiplier * leader + offset``.
+
+    Attributes:
+        leader: Name of the joint that it follows.
+        multiplier: Factor of the leader's position.
+        offset: Where it stands when the leader is at zero [rad or m].
+        place: Where the model says so, for messages.
+    """
+
+    leader: str
+    multiplier: float
+    offset: float
+    place: str
+
+
+def mimic_elements(model: ModelXml) -> Iterator[tuple[Element, Element]]:
+    """Yield the joints of a URDF or SDF model that follow others, and the elements that say so."""
+    path = {"robot": ("mimic",), "sdf": ("axis", "mimic")}.get(model.root.name)
+    if path is None:
+        return
+    for joint in (element for element in model.root.within() if element.name == "joint"):
+        for mimic in joint.all(*path):
+            yield joint, mimic
+
+
+def mimics_of(model: ModelXml) -> dict[str, Mimic]:
+    """Return the joints of a model that follow others, by name.
+
+    Args:
+        model: URDF, SDF or MJCF; in the last they are equality constraints of two joints, of which
+            the constant and the linear part count.
+
+    Raises:
+        InputError: If a number is none.
+    """
+    found = {}
+    for element, mimic in mimic_elements(model):
+        joint = ModelPart(model, element, "joint")
+        said = mimic.attributes | {child.name: child.text for child in mimic.children}
+        number = {
+            key: joint.number(f"mimic {key}", said.get(key, usual), ANY, mimic)
+            for key, usual in {"multiplier": "1", "offset": "0", "reference": "0"}.items()
+        }
+        found[joint.name] = Mimic(
+            said.get("joint", ""),
+            number["multiplier"],
+            number["offset"] - number["multiplier"] * number["reference"],
+            model.place(element),
+        )
+    for element in model.root.all("equality", "joint"):
+        given = element.attributes
+        if "joint1" not in given or "joint2" not in given:
+            continue
+        part = ModelPart(model, element, "equality")
+        words = given.get("polycoef", "0 1").split()
+        offset, slope = (
+            part.number("polycoef", word, ANY) for word in (words + ["0", "1"][len(words) :])[:2]
+        )
+        found[given["joint1"]] = Mimic(given["joint2"], slope, offset, model.place(element))
+    return found

@@ -4,12 +4,12 @@ import logging
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from pfsc_drake.robot.models.joint_edits import mimic_elements
 from pfsc_drake.robot.models.mjcf_meshes import mesh_files, mesh_name
+from pfsc_drake.robot.models.model_parts import mimic_elements
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
 _GREY = '<color rgba="0.7 0.7 0.7 1"/>'
@@ -171,8 +171,7 @@ def with_attributes(element: Element, **changed: str) -> Edit:
 _IN_DRAKE = re.compile(r"Failure at \S+ in (\w+)\(\): ")
 
 
-@dataclass(frozen=True)
-class DrakeMessages:
+class DrakeMessages(logging.Handler):
     """Messages of Drake's, one line each, each once.
 
     Attributes:
@@ -180,21 +179,14 @@ class DrakeMessages:
         errors: What it could not do, though it went on.
     """
 
-    warnings: list[str] = field(default_factory=list)
-    errors: list[str] = field(default_factory=list)
-
-
-class _Collector(logging.Handler):
-    """Keeps the messages of a logger."""
-
-    def __init__(self, messages: DrakeMessages) -> None:
+    def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._messages = messages
+        self.warnings: list[str] = []
+        self.errors: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep a message."""
-        error = record.levelno >= logging.ERROR
-        kept = self._messages.errors if error else self._messages.warnings
+        kept = self.errors if record.levelno >= logging.ERROR else self.warnings
         message = one_line(record.getMessage())
         if message not in kept:
             kept.append(message)
@@ -210,7 +202,7 @@ def collected_messages() -> Iterator[DrakeMessages]:
     messages = DrakeMessages()
     logger = logging.getLogger("drake")
     level, propagate, handlers = logger.level, logger.propagate, logger.handlers[:]
-    logger.handlers[:] = [_Collector(messages)]
+    logger.handlers[:] = [messages]
     logger.propagate = False
     logger.setLevel(logging.WARNING)
     try:

@@ -10,7 +10,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
-    ForceElementIndex,
     Joint,
     JointActuator,
     PrismaticSpring,
@@ -30,11 +29,11 @@ from pfsc_drake.robot.models.inspection import ModelFacts, inspect_model
 from pfsc_drake.robot.models.joint_edits import (
     actuator_of,
     drivable_joints,
+    force_elements,
     idealize_drives,
     inboard_joints,
     moving_joints,
     sprung_joints,
-    with_followers,
 )
 from pfsc_drake.robot.models.masses import require_inertia, require_regular_mass_matrix
 from pfsc_drake.robot.models.mjcf_sites import add_sites
@@ -120,8 +119,7 @@ def read_model(
     packages = packages_for(file, model.content, options.packages)
     models = read_with_inclusions(file, packages)
     facts = inspect_model(models, frozenset(options.fixed_joints))
-    followers = with_followers(facts.mimics, options.fixed_joints, facts.still)
-    options = replace(options, fixed_joints=followers)
+    options = replace(options, fixed_joints=facts.with_followers(options.fixed_joints))
     sprung = [name for name in options.fixed_joints if name in facts.springs]
     if sprung:
         raise InputError(f"fixed_joints: '{sprung[0]}' carries a spring; allowed: other joints")
@@ -284,10 +282,7 @@ def _take_constraints(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> N
     """Take out what ties fixed joints to others; refuse what else acts between bodies."""
     constraints = plant.GetConstraintIds()
     known = UniformGravityFieldElement, RevoluteSpring, PrismaticSpring
-    elements = (
-        plant.get_force_element(ForceElementIndex(i)) for i in range(plant.num_force_elements())
-    )
-    others = [type(element).__name__ for element in elements if not isinstance(element, known)]
+    others = [type(e).__name__ for e in force_elements(plant) if not isinstance(e, known)]
     if others or len(constraints) > len(facts.mimics):
         raise InputError(
             f"{file}: {', '.join(others) or 'constraints'} between bodies; allowed: an open chain "

@@ -67,28 +67,18 @@ class SerialChain(Linkage, RobotModel):
 _ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
-class ToolMass:
-    """The tool among what is fixed to the last link.
-
-    Attributes:
-        mass: [kg]; 0 where the last link is the tool.
-        p_LC: Its centre of mass in the last link frame [m], shape (3,).
-        name: Name of its body, for messages.
-    """
-
-    mass: float
-    p_LC: np.ndarray
-    name: str = "tool"
-
-
-def believed_chain(chain: SerialChain, error: ModelError, tool: ToolMass) -> SerialChain:
+def believed_chain(
+    chain: SerialChain, error: ModelError, mass: float, p_LC: np.ndarray, tool: str = "tool"
+) -> SerialChain:
     """Return what is believed of a chain.
 
     Args:
         chain: The true one, N links.
         error: By how much it is off, N links.
-        tool: The tool on it.
+        mass: Mass of the tool among what is fixed to the last link [kg]; 0 where that link is the
+            tool.
+        p_LC: The tool's centre of mass in the last link frame [m], shape (3,).
+        tool: Name of the tool's body, for messages.
 
     Raises:
         InputError: If no body can have the believed mass properties of the tool.
@@ -116,24 +106,24 @@ def believed_chain(chain: SerialChain, error: ModelError, tool: ToolMass) -> Ser
                 stiffness=link.stiffness * error.stiffness[i],
             )
         )
-    links[-1] = _with_other_tool(links[-1], chain.R_LT, error, tool)
+    links[-1] = _with_other_tool(links[-1], chain.R_LT, error, mass, p_LC, tool)
     return replace(chain, links=tuple(links), p_LT=chain.p_LT * error.link_length[-1])
 
 
 def _with_other_tool(
-    link: ChainLink, R_LT: np.ndarray, error: ModelError, tool: ToolMass
+    link: ChainLink, R_LT: np.ndarray, error: ModelError, mass: float, p_LC: np.ndarray, tool: str
 ) -> ChainLink:
     """Return the last link with the tool's mass and centre as believed.
 
     The tool's inertia about its own centre stays, so that only two point masses differ.
     """
-    mass, p_LC = tool.mass * error.mass[-1], tool.p_LC + error.center[-1]
+    mass, p_LC = mass * error.mass[-1], p_LC + error.center[-1]
     moved = p_LC + R_LT @ error.tool_center
     if error.tool_mass == 0.0 and not np.any(error.tool_center * mass):
         return link
     allowed = f"more than {-mass:.4g} kg, the tool's mass"
     if mass == 0.0:
-        allowed = f"0 kg or more; '{tool.name}', which carries the tool frame, has no mass to lose"
+        allowed = f"0 kg or more; '{tool}', which carries the tool frame, has no mass to lose"
     if not mass + error.tool_mass > 0.0:
         raise InputError(f"tool_mass = {error.tool_mass:g} kg; allowed: {allowed}")
     # moments of mass of order 0, 1, 2 about the link's origin add up

@@ -1,6 +1,5 @@
 """Extraction of a serial chain from a finalized MultibodyPlant."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,10 +7,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
-    ForceElementIndex,
     Frame,
     Joint,
-    JointActuatorIndex,
+    JointActuator,
     JointIndex,
     PrismaticJoint,
     PrismaticSpring,
@@ -23,6 +21,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.joint_edits import all_joints, force_elements
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
@@ -187,7 +186,7 @@ def _moving_joints_to(plant: MultibodyPlant, body: RigidBody) -> list[Joint]:
     """Return the moving joints from the world to a body, base first."""
     inboard = {
         joint.child_body().index(): joint
-        for joint in _all_joints(plant)
+        for joint in all_joints(plant)
         if joint.num_velocities() > 0
     }
     path: list[Joint] = []
@@ -212,15 +211,11 @@ def _moving_joints_to(plant: MultibodyPlant, body: RigidBody) -> list[Joint]:
         body = joint.parent_body()
 
 
-def _all_joints(plant: MultibodyPlant) -> Iterable[Joint]:
-    return (plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices())
-
-
 def _refuse_branches(plant: MultibodyPlant, chain: list[Joint], tool: str) -> None:
     """Raise if something else moves on the chain's links; its dynamics would be missing."""
     own = {joint.index() for joint in chain}
     on_chain = {b.index() for joint in chain for b in plant.GetBodiesWeldedTo(joint.child_body())}
-    for joint in _all_joints(plant):
+    for joint in all_joints(plant):
         if joint.num_velocities() == 0 or joint.index() in own:
             continue
         if {joint.parent_body().index(), joint.child_body().index()} & on_chain:
@@ -233,22 +228,17 @@ def _refuse_branches(plant: MultibodyPlant, chain: list[Joint], tool: str) -> No
 def _joint_springs(plant: MultibodyPlant, context: Context) -> dict[JointIndex, float]:
     """Return the stiffness of every joint that carries a spring."""
     springs = {}
-    for i in range(plant.num_force_elements()):
-        element = plant.get_force_element(ForceElementIndex(i))
-        if isinstance(element, RevoluteSpring | PrismaticSpring):
-            joint = element.joint()
-            rest = (
-                element.GetNominalAngle(context)
-                if isinstance(element, RevoluteSpring)
-                else element.nominal_position()
-            )
-            if rest != 0.0:
-                raise InputError(f"joint '{joint.name()}': spring rests at {rest}; must be 0")
-            springs[joint.index()] = (
-                element.GetStiffness(context)
-                if isinstance(element, RevoluteSpring)
-                else element.stiffness()
-            )
+    for element in force_elements(plant):
+        if isinstance(element, RevoluteSpring):
+            rest, stiffness = element.GetNominalAngle(context), element.GetStiffness(context)
+        elif isinstance(element, PrismaticSpring):
+            rest, stiffness = element.nominal_position(), element.stiffness()
+        else:
+            continue
+        joint = element.joint()
+        if rest != 0.0:
+            raise InputError(f"joint '{joint.name()}': spring rests at {rest}; must be 0")
+        springs[joint.index()] = stiffness
     return springs
 
 
@@ -321,7 +311,7 @@ def _link(
         M += M_B.ReExpress(X_LB.rotation()).Shift(-X_LB.translation())
     p_LC = M.get_com()
     I_C = M.Shift(p_LC).CalcRotationalInertia().CopyToFullMatrix3()
-    actuator = _actuator(plant, motor)
+    drive = _actuator(plant, motor)
     limits = (float(motor.position_lower_limits()[0]), float(motor.position_upper_limits()[0]))
     return ChainLink(
         name=motor.name(),
@@ -332,28 +322,24 @@ def _link(
         mass=M.get_mass(),
         p_LC=p_LC,
         I_C=I_C,
-        reflected_inertia=0.0
-        if actuator is None
-        else plant.get_joint_actuator(actuator).calc_reflected_inertia(context),
+        reflected_inertia=0.0 if drive is None else drive.calc_reflected_inertia(context),
         stiffness=np.inf if flex is None else springs[flex.index()],
         damping=0.0 if flex is None else float(flex.default_damping_vector()[0]),
         viscous_damping=float(motor.default_damping_vector()[0]),
-        effort_limit=np.inf
-        if actuator is None
-        else plant.get_joint_actuator(actuator).effort_limit(),
+        effort_limit=np.inf if drive is None else drive.effort_limit(),
         position_limits=limits,
         velocity_limit=float(motor.velocity_upper_limits()[0]),
     )
 
 
-def _actuator(plant: MultibodyPlant, joint: Joint) -> JointActuatorIndex | None:
+def _actuator(plant: MultibodyPlant, joint: Joint) -> JointActuator | None:
     """Return the actuator of a joint, if it has one."""
     actuators = (plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices())
     found = [actuator for actuator in actuators if actuator.joint().index() == joint.index()]
     if len(found) > 1:
         names = ", ".join(f"'{actuator.name()}'" for actuator in found)
         raise InputError(f"joint '{joint.name()}': actuators {names}; allowed: one")
-    return found[0].index() if found else None
+    return found[0] if found else None
 
 
 def _coordinates(
@@ -371,16 +357,13 @@ def _coordinates(
             flex_rows[n + i, nq + flex.velocity_start()] = 1.0
     others = plant.GetPositionsAndVelocities(plant.CreateDefaultContext())
     others[(motor_rows + flex_rows).any(axis=0)] = 0.0
-    actuators = [_actuator(plant, motor) for motor in motors]
+    drives = [_actuator(plant, motor) for motor in motors]
     return PlantCoordinates(
         num_states,
         motor_rows + flex_rows,
         motor_rows,
         tuple(motor.name() for motor in motors),
-        tuple(
-            None if index is None else plant.get_joint_actuator(index).input_start()
-            for index in actuators
-        ),
+        tuple(None if drive is None else drive.input_start() for drive in drives),
         others,
     )
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, Frame, JointIndex
+from pydrake.multibody.tree import BodyIndex, Frame
 
 from pfsc_drake.errors import InputError, suggestion
-from pfsc_drake.robot.models.joint_edits import bodies_of, frame_named
+from pfsc_drake.robot.models.joint_edits import all_joints, bodies_of, frame_named
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 
 
@@ -37,8 +37,7 @@ def link_frames(plant: MultibodyPlant, coordinates: PlantCoordinates) -> list[Fr
         plant: The plant that the chain was extracted from.
         coordinates: Where the chain's coordinates stand in the plant's state.
     """
-    joints = [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
-    moving = {joint.velocity_start(): joint for joint in joints if joint.num_velocities() > 0}
+    moving = {j.velocity_start(): j for j in all_joints(plant) if j.num_velocities() > 0}
     velocities = np.s_[len(coordinates.joints) :, plant.num_positions() :]
     frames = []
     for motor, link in zip(

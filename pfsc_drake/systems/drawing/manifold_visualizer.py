@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from pfsc_drake.geometry import Path, PathPointLayout
-from pfsc_drake.systems.drawing.numbers import SceneNumber, draw_number
+from pfsc_drake.systems.drawing.numbers import SceneNumber
 from pfsc_drake.systems.drawing.tool_visualizer import draw_frame
 
 _PATH_ROOT, _SURFACE_ROOT, _REGION_ROOT = "path_following", "surface_following", "fixtures"
@@ -223,7 +223,7 @@ class RegionVisualizer(LeafSystem):
         for i, (skin, lines) in enumerate(self._surfaces):
             draw_surface(self._meshcat, f"{_REGION_ROOT}/{i}", skin, lines)
         for i, shown in self._numbers.items():
-            draw_number(self._meshcat, f"{_REGION_ROOT}/{i}/number", shown)
+            shown.draw(self._meshcat, f"{_REGION_ROOT}/{i}/number")
         self._seen = set(self._numbers)
         draw_frame(self._meshcat, f"{_REGION_ROOT}/frame")
         return EventStatus.Succeeded()

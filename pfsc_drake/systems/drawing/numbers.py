@@ -1,6 +1,5 @@
 """Numbers in a scene, drawn as strokes: Meshcat knows no text, and no line but a thin one."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,48 +40,35 @@ class SceneNumber:
     across: np.ndarray
     height: float
 
+    def strokes(self) -> np.ndarray:
+        """Return its strokes along z: starts, then ends [m], shape (2, strokes, 3)."""
+        digits = str(self.number)
+        flat = np.concatenate(
+            [_CORNERS[list(_STROKES[digit])] + [_PITCH * k, 0.0] for k, digit in enumerate(digits)]
+        )
+        flat[:, 0] -= (_PITCH * (len(digits) - 1) + _CORNERS[1, 0]) / 2.0
+        axes = np.stack([self.across, [0.0, 0.0, 1.0]])
+        points = self.place + self.height * flat @ axes
+        return np.stack([points[0::2], points[1::2]])
 
-def number_strokes(shown: SceneNumber) -> np.ndarray:
-    """Return the strokes of a number: starts, then ends [m], shape (2, strokes, 3).
+    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return flat bars, seen from both sides: vertices [m] (K, 3), triangles (M, 3)."""
+        starts, ends = self.strokes()
+        bold = _BOLD * self.height
+        along = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
+        aside = bold * np.cross(np.cross(self.across, [0.0, 0.0, 1.0]), along)
+        first, last = starts - bold * along, ends + bold * along
+        corners = np.stack([first - aside, last - aside, last + aside, first + aside], axis=1)
+        halves = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]])
+        triangles = 4 * np.arange(len(starts))[:, np.newaxis, np.newaxis] + halves
+        return corners.reshape(-1, 3), triangles.reshape(-1, 3)
 
-    Args:
-        shown: The number; it stands along z.
-    """
-    digits: Sequence[str] = str(shown.number)
-    flat = np.concatenate(
-        [_CORNERS[list(_STROKES[digit])] + [_PITCH * k, 0.0] for k, digit in enumerate(digits)]
-    )
-    flat[:, 0] -= (_PITCH * (len(digits) - 1) + _CORNERS[1, 0]) / 2.0
-    axes = np.stack([shown.across, [0.0, 0.0, 1.0]])
-    points = shown.place + shown.height * flat @ axes
-    return np.stack([points[0::2], points[1::2]])
+    def draw(self, meshcat: Meshcat, path: str) -> None:
+        """Draw it.
 
-
-def number_mesh(strokes: np.ndarray, shown: SceneNumber) -> tuple[np.ndarray, np.ndarray]:
-    """Return flat bars for strokes, seen from both sides: vertices [m] (K, 3), triangles (M, 3).
-
-    Args:
-        strokes: From :func:`number_strokes`.
-        shown: The number.
-    """
-    starts, ends = strokes
-    bold = _BOLD * shown.height
-    along = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
-    aside = bold * np.cross(np.cross(shown.across, [0.0, 0.0, 1.0]), along)
-    first, last = starts - bold * along, ends + bold * along
-    corners = np.stack([first - aside, last - aside, last + aside, first + aside], axis=1)
-    halves = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]])
-    triangles = 4 * np.arange(len(starts))[:, np.newaxis, np.newaxis] + halves
-    return corners.reshape(-1, 3), triangles.reshape(-1, 3)
-
-
-def draw_number(meshcat: Meshcat, place: str, shown: SceneNumber) -> None:
-    """Draw a number.
-
-    Args:
-        meshcat: Where to draw.
-        place: Path of the number, which moves with what is above it.
-        shown: The number.
-    """
-    vertices, triangles = number_mesh(number_strokes(shown), shown)
-    meshcat.SetTriangleMesh(place, vertices.T, triangles.T, _INK)
+        Args:
+            meshcat: Where to draw.
+            path: Path of the number, which moves with what is above it.
+        """
+        vertices, triangles = self.mesh()
+        meshcat.SetTriangleMesh(path, vertices.T, triangles.T, _INK)

@@ -15,7 +15,7 @@ from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.robot.robot_model import pose_function
-from pfsc_drake.robot.serial.chain import ToolMass, believed_chain
+from pfsc_drake.robot.serial.chain import believed_chain
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 N = 6
@@ -31,7 +31,7 @@ def comau():
     last = plant.GetJointByName("joint_6").frame_on_child()
     X_LB = plant.CalcRelativeTransform(context, last, tool.body_frame())
     center = X_LB @ tool.CalcCenterOfMassInBodyFrame(context)
-    return plant, chain, ToolMass(tool.get_mass(context), center)
+    return plant, chain, (tool.get_mass(context), center)
 
 
 def _torques(chain, q, v, a):
@@ -86,9 +86,9 @@ def test_masses_and_inertias(comau):
     q, v, a = _state()
     expected = _drake_torques(plant, context, q, v, a)
     np.testing.assert_allclose(
-        _torques(believed_chain(chain, link_6, tool), q, v, a), expected, rtol=0, atol=1e-9
+        _torques(believed_chain(chain, link_6, *tool), q, v, a), expected, rtol=0, atol=1e-9
     )
-    last = believed_chain(chain, error, tool).links[-1]
+    last = believed_chain(chain, error, *tool).links[-1]
     np.testing.assert_allclose(last.I_C, 0.7 * 1.2 * chain.links[-1].I_C, rtol=1e-12)
 
 
@@ -103,7 +103,7 @@ def test_centres_of_mass(comau):
         R_BL = plant.CalcRelativeTransform(context, body.body_frame(), frame).rotation()
         _change(plant, context, f"link_{i + 1}", shift=R_BL @ center[i])
     q, v, a = _state()
-    believed = believed_chain(chain, replace(ModelError.none(N), center=center), tool)
+    believed = believed_chain(chain, replace(ModelError.none(N), center=center), *tool)
     np.testing.assert_allclose(
         _torques(believed, q, v, a),
         _drake_torques(plant, context, q, v, a),
@@ -126,7 +126,7 @@ def test_tool(comau, added):
     assert body.get_mass(context) == pytest.approx(mass + added)
     q, v, a = _state()
     np.testing.assert_allclose(
-        _torques(believed_chain(chain, error, tool), q, v, a),
+        _torques(believed_chain(chain, error, *tool), q, v, a),
         _drake_torques(plant, context, q, v, a),
         rtol=0,
         atol=1e-9,
@@ -136,7 +136,7 @@ def test_tool(comau, added):
 def test_joint_offsets(comau):
     plant, chain, tool = comau
     offset = np.deg2rad([1.0, -2.0, 3.0, -4.0, 5.0, -6.0])
-    believed = believed_chain(chain, replace(ModelError.none(N), joint_offset=offset), tool)
+    believed = believed_chain(chain, replace(ModelError.none(N), joint_offset=offset), *tool)
     q, v, a = _state()
     context = plant.CreateDefaultContext()
     np.testing.assert_allclose(
@@ -154,7 +154,7 @@ def test_joint_offsets(comau):
 def test_link_lengths(shoulder_and_elbow):
     factor = np.array([1.0, 1.02, 0.97])
     error = replace(ModelError.none(3), link_length=factor)
-    believed = believed_chain(shoulder_and_elbow, error, ToolMass(0.0, np.zeros(3)))
+    believed = believed_chain(shoulder_and_elbow, error, 0.0, np.zeros(3))
     q = np.array([0.0, 0.4, -0.9])
     pose = np.array(pose_function(believed)(q)).ravel()
     upper, fore = 0.7 * 1.02, 0.6 * 0.97
@@ -166,7 +166,7 @@ def test_link_lengths(shoulder_and_elbow):
 def test_slides_are_off_along_their_axis(make_chain):
     chain = make_chain([(np.array([1.0, 0.0, 0.0]), [0, 0, 0])], [0.1, 0, 0], sliding=[0])
     error = replace(ModelError.none(1), joint_offset=np.array([0.02]))
-    believed = believed_chain(chain, error, ToolMass(0.0, np.zeros(3)))
+    believed = believed_chain(chain, error, 0.0, np.zeros(3))
     assert np.array(pose_function(believed)([0.3]))[0, 0] == pytest.approx(0.42)
 
 
@@ -177,22 +177,22 @@ def test_drives(comau):
         chain,
         links=tuple(replace(link, stiffness=1e4 * (i + 1)) for i, link in enumerate(chain.links)),
     )
-    believed = believed_chain(soft, error, tool)
+    believed = believed_chain(soft, error, *tool)
     np.testing.assert_allclose(believed.D_M, 1.1 * chain.D_M)
     np.testing.assert_allclose(believed.K_s, 9e3 * np.arange(1, N + 1))
-    assert believed_chain(chain, error, tool).is_rigid
+    assert believed_chain(chain, error, *tool).is_rigid
 
 
 @pytest.mark.parametrize("added", [-3.0, -1.6])
 def test_a_tool_that_weighs_less_than_nothing(comau, added):
     _, chain, tool = comau
-    assert tool.mass < 1.6
+    assert tool[0] < 1.6
     with pytest.raises(InputError, match=r"tool_mass = -.* kg; allowed: more than -1\.\d+ kg"):
-        believed_chain(chain, replace(ModelError.none(N), tool_mass=added), tool)
+        believed_chain(chain, replace(ModelError.none(N), tool_mass=added), *tool)
 
 
 def test_a_tool_that_no_body_can_be(comau):
     _, chain, _ = comau
-    nowhere = ToolMass(1.5, np.array([0.0, 0.0, 1.0]))
+    nowhere = 1.5, np.array([0.0, 0.0, 1.0])
     with pytest.raises(InputError, match="principal moments of inertia unlike"):
-        believed_chain(chain, replace(ModelError.none(N), tool_mass=-1.4), nowhere)
+        believed_chain(chain, replace(ModelError.none(N), tool_mass=-1.4), *nowhere)

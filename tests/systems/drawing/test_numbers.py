@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from pfsc_drake.systems.drawing.numbers import (
-    SceneNumber,
-    draw_number,
-    number_mesh,
-    number_strokes,
-)
+from pfsc_drake.systems.drawing.numbers import SceneNumber
 
 ACROSS = np.array([0.6, 0.8, 0.0])
 PLACE = np.array([1.0, -2.0, 0.5])
@@ -17,7 +12,7 @@ PLACE = np.array([1.0, -2.0, 0.5])
 
 def flat(number, height=0.1):
     """Return starts and ends across and up, in heights, shape (2, strokes, 2)."""
-    points = number_strokes(SceneNumber(number, PLACE, ACROSS, height)) - PLACE
+    points = SceneNumber(number, PLACE, ACROSS, height).strokes() - PLACE
     # nothing is beside the plane in which it stands
     np.testing.assert_allclose(points @ np.cross(ACROSS, [0.0, 0.0, 1.0]), 0.0, atol=1e-12)
     return np.stack([points @ ACROSS, points[..., 2]], axis=-1) / height
@@ -56,8 +51,8 @@ def test_digits_stand_side_by_side():
 
 def test_strokes_are_as_bold_from_either_side():
     shown = SceneNumber(8, PLACE, ACROSS, 0.1)
-    strokes = number_strokes(shown)
-    vertices, triangles = number_mesh(strokes, shown)
+    strokes = shown.strokes()
+    vertices, triangles = shown.mesh()
     np.testing.assert_allclose((vertices - PLACE) @ [0.8, -0.6, 0.0], 0.0, atol=1e-12)
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
@@ -69,5 +64,5 @@ def test_strokes_are_as_bold_from_either_side():
 
 def test_a_number_is_drawn_where_it_is_told():
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    draw_number(meshcat, "fixtures/3/number", SceneNumber(17, PLACE, ACROSS, 0.1))
+    SceneNumber(17, PLACE, ACROSS, 0.1).draw(meshcat, "fixtures/3/number")
     assert meshcat.HasPath("/drake/fixtures/3/number")
