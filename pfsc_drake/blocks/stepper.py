@@ -10,6 +10,9 @@ from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
 
+# arguments of a program that are not the block's
+_NO_INPUTS = {"x", "t", "preset"}
+
 
 class Stepper:
     """Steps a block tick by tick, with numbers.
@@ -21,7 +24,6 @@ class Stepper:
 
     Attributes:
         tick: Number of the next tick.
-        states: States by name, as they are before it; None before the start.
     """
 
     def __init__(self, block: Block | Network, connected: tuple[str, ...] = ()) -> None:
@@ -33,8 +35,20 @@ class Stepper:
         step, initial = self._program.step(), self._program.initial
         self._step = BoundFunction(step, x=self._x)
         self._initial = BoundFunction(initial)
+        self._connected = set(self._step.arguments) - _NO_INPUTS
+        self._started = False
         self.tick = 0
-        self.states: dict[str, np.ndarray] | None = None
+
+    @property
+    def states(self) -> dict[str, np.ndarray] | None:
+        """States by name, as they are before the next tick; None before the start."""
+        if not self._started:
+            return None
+        return {name: self._x[part].copy() for name, part in self._program.states.items()}
+
+    def restart(self) -> None:
+        """Forget all states: the next step is the first one."""
+        self._started, self.tick = False, 0
 
     def start(self, **inputs: Any) -> None:
         """Begin, as the inputs say.
@@ -43,11 +57,12 @@ class Stepper:
             inputs: Values by name.
         """
         wanted = self._program.initial_inputs
-        self._give(self._initial, {k: value for k, value in inputs.items() if k in wanted})
+        given = {name: value for name, value in inputs.items() if name in wanted}
+        self._give(self._initial, given, set(self._initial.arguments) - _NO_INPUTS)
         self._initial.arguments["t"][0] = self.tick
         self._initial.evaluate()
         self._x[:] = self._initial.results["x_start"]
-        self._name_states()
+        self._started = True
 
     def set_state(self, name: str, value: Any) -> None:
         """Set what is remembered, after the start.
@@ -57,7 +72,7 @@ class Stepper:
             value: Value of the state.
         """
         self._x[self._program.states[name]] = value
-        self._name_states()
+        self._started = True
 
     def step(self, **inputs: Any) -> dict[str, np.ndarray]:
         """Return the outputs of a tick by name, and go on to the next.
@@ -68,23 +83,18 @@ class Stepper:
         Raises:
             InputError: If one is missing, unknown or of another size.
         """
-        if self.states is None:
+        if not self._started:
             self.start(**inputs)
-        self._give(self._step, inputs)
+        self._give(self._step, inputs, self._connected)
         self._step.arguments["t"][0] = self.tick
         self._step.evaluate()
         results = {name: value.copy() for name, value in self._step.results.items()}
         self._x[:] = results.pop("x_next")
         self.tick += 1
-        self._name_states()
         return results
 
-    def _name_states(self) -> None:
-        self.states = {name: self._x[part].copy() for name, part in self._program.states.items()}
-
-    def _give(self, function: BoundFunction, inputs: dict[str, Any]) -> None:
-        wanted = set(function.arguments) - {"x", "t", "preset"}
-        if wanted != set(inputs):
+    def _give(self, function: BoundFunction, inputs: dict[str, Any], wanted: set[str]) -> None:
+        if inputs.keys() != wanted:
             raise InputError(f"inputs: {', '.join(inputs)}; must be {', '.join(sorted(wanted))}")
         for name, value in inputs.items():
             values = np.ravel(value)

@@ -15,13 +15,13 @@ from pfsc_drake.errors import InputError
 from tests.diagrams.station_run import run_station
 from tests.scenarios import shipped_scenario
 
-END, BEGIN = 0.8, 0.5  # s
+END, BEGIN = 0.6, 0.3  # s
 
 
 def exact(**table):
     """Return the scenario with a robot that knows and sees the truth, and a table like that."""
     settings, plain = shipped_scenario("pfc_turntable"), Scenario()
-    settings.reference.dwell = settings.turntable.dwell = 0.3
+    settings.reference.dwell = settings.turntable.dwell = 0.1
     for key in ("friction", "encoders", "model_error"):
         setattr(settings, key, getattr(plain, key))
     for key, value in ({"increments": 0.0, "lag": 0.0} | table).items():
@@ -66,6 +66,7 @@ def test_what_drives_are_asked_for_counts_the_table(late):
     assert np.all(np.abs(told - true) < 0.03 * np.abs(true).max(axis=0) + 0.05)
 
 
+@pytest.mark.slow(but="table0-0.0001")
 @pytest.mark.parametrize(
     ("table", "least"), [({"believed_delay": 0.0}, 0.1e-3), ({"derivatives": "none"}, 0.1e-3)]
 )
@@ -118,6 +119,15 @@ WRONG = {
 }
 
 
+@pytest.mark.slow(
+    but=[
+        "turntable.axes = 0 given",
+        "turntable.stops_deg[1] = [0.0, 180.0]",
+        "turntable.delay = 0.0035",
+        "turntable = given",
+        "driver = given; allowed: left out where a turntable",
+    ]
+)
 @pytest.mark.parametrize("said", WRONG)
 def test_wrong_input_is_refused_by_its_key(said):
     settings = exact()

@@ -95,7 +95,7 @@ class Stream:
 
     def run(self, message, ticks, keep=50):
         """Return what was told; ``message(tick, stream) -> message``."""
-        self.stepper.states, self.stepper.tick = None, 0
+        self.stepper.restart()
         rows = {name: [] for name in ("manifold_point", "reference", "goal", "stream", "overrun")}
         pieces, courses, stream = [], [], np.zeros(4)
         for k in range(ticks):

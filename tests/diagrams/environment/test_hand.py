@@ -104,7 +104,7 @@ def test_the_hand_sees_the_links_and_the_truth(settings, load_scenario):
     settings.encoders.link_increments = [500.0]
     settings.hand = steady_hand([0.7, 0.1, 0.9], stiffness=100.0, force_limit=1e3)
     station = build_station(settings, SCENARIOS)
-    result = simulate(station, settings.simulation, 0.2, lambda *_: None)
+    result = simulate(station, settings.simulation, 0.05, lambda *_: None)
     diagram, root = station.diagram, result.root
     view = diagram.GetSubsystemByName("hand_view")
     seen = view.GetOutputPort("tool_pose").Eval(view.GetMyContextFromRoot(root))
@@ -137,6 +137,7 @@ def test_the_seed_decides(settings):
     assert np.abs(forces[0] - forces[2]).max() > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "part"),
     [
@@ -154,6 +155,7 @@ def test_hands_that_cannot_be(load_scenario, change, part):
         build_station(settings, SCENARIOS)
 
 
+@pytest.mark.slow
 def test_an_open_path_may_be_held_at_its_very_ends(settings):
     settings.path.shape = Line([0.8, -0.1, 1.0], [0.8, 0.4, 1.0])
     settings.reference.points = [0.1, 0.1]
@@ -165,6 +167,7 @@ def test_an_open_path_may_be_held_at_its_very_ends(settings):
     build_station(settings, SCENARIOS)
 
 
+@pytest.mark.slow
 def test_a_closed_path_counts_on(settings):
     """A target one lap later is the same place."""
     wrenches = []

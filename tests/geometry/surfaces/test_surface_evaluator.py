@@ -61,6 +61,17 @@ CASES = {
 }
 
 
+@pytest.mark.slow(
+    but=[
+        "splines-0.02",
+        "cylinder-0.0",
+        "sphere-0.02",
+        "torus--0.03",
+        "torus-0.02",
+        "paraboloid--0.03",
+        "plane-0.0",
+    ]
+)
 @pytest.mark.parametrize("height", [-0.03, 0.0, 0.02])
 @pytest.mark.parametrize("name", CASES)
 def test_a_way_beside_the_surface(name, height):
@@ -213,13 +224,17 @@ def test_without_memory():
     assert first is not second
 
 
+@pytest.fixture(name="oriented", scope="module")
+def fixture_oriented():
+    return SurfaceEvaluator(cylinder(0.09, (-0.1, 0.1)), 2, orientation=[1, 0, 0, 0])
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e200])
 @pytest.mark.parametrize("where", range(7))
-def test_input_that_is_not_finite(bad, where):
+def test_input_that_is_not_finite(oriented, bad, where):
     values = [0.1, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0]
     values[where] = bad
-    evaluator = SurfaceEvaluator(cylinder(0.09, (-0.1, 0.1)), 2, orientation=[1, 0, 0, 0])
-    row = evaluator(values[:3], values[3:5], values[5:])
+    row = oriented(values[:3], values[3:5], values[5:])
     if bad == 1e200 and np.all(np.isfinite(row)):
         return
     assert row[5] == ProjectionStatus.NOT_CONVERGED
@@ -296,7 +311,7 @@ def test_eta_over_a_far_jump():
     np.testing.assert_allclose(row[2:4], expected, atol=1e-6)
 
 
-@pytest.mark.slow(but=["splines", "cylinder", "sphere"])
+@pytest.mark.slow(but="cylinder")
 @pytest.mark.parametrize("name", CASES)
 def test_the_nearest_place_of_all_is_found(name):
     surface = CASES[name][0]

@@ -41,12 +41,23 @@ def _random(count):
     return [(rng.uniform(-3, 3), rng.uniform(-1, 1), rng.uniform(-0.6, 0.6)) for _ in range(count)]
 
 
+@pytest.fixture(name="projectors", scope="module")
+def fixture_projectors():
+    """Return what projects onto a surface of each kind."""
+    surfaces = {
+        "cylinder": cylinder(0.09, (-0.1, 0.1), TURNED),
+        "sphere": sphere(0.2, (-1.35, 1.35), TURNED),
+        "torus": torus(0.5, 0.1, TURNED),
+    }
+    return {name: GlobalProjector(surface) for name, surface in surfaces.items()}
+
+
 @pytest.mark.parametrize(("u", "v", "xi"), _random(12))
-def test_on_a_cylinder(u, v, xi):
+def test_on_a_cylinder(projectors, u, v, xi):
     """From outside and inside: alpha = -xi / r."""
     radius = 0.09 * (1.0 + xi)
     point = _place(radius * math.cos(u), radius * math.sin(u), 0.1 * v)
-    foot = GlobalProjector(cylinder(0.09, (-0.1, 0.1), TURNED)).project(point)
+    foot = projectors["cylinder"].project(point)
     assert foot.converged
     assert not foot.at_border
     assert _near(foot.theta[0], u)
@@ -64,12 +75,12 @@ def test_start_of_the_experiment_on_a_cylinder():
 
 
 @pytest.mark.parametrize(("u", "v", "xi"), _random(12))
-def test_on_a_sphere(u, v, xi):
+def test_on_a_sphere(projectors, u, v, xi):
     radius = 0.2 * (1.0 + xi)
     latitude = 1.3 * v
     flat = radius * math.cos(latitude)
     point = _place(flat * math.cos(u), flat * math.sin(u), radius * math.sin(latitude))
-    foot = GlobalProjector(sphere(0.2, (-1.35, 1.35), TURNED)).project(point)
+    foot = projectors["sphere"].project(point)
     assert foot.converged
     assert _near(foot.theta[0], u)
     assert foot.theta[1] == pytest.approx(latitude, abs=1e-11)
@@ -77,12 +88,12 @@ def test_on_a_sphere(u, v, xi):
 
 
 @pytest.mark.parametrize(("u", "v", "xi"), _random(12))
-def test_on_a_torus(u, v, xi):
+def test_on_a_torus(projectors, u, v, xi):
     angle = 3.0 * v
     tube = 0.1 * (1.0 + xi)
     flat = 0.5 + tube * math.cos(angle)
     point = _place(flat * math.cos(u), flat * math.sin(u), tube * math.sin(angle))
-    foot = GlobalProjector(torus(0.5, 0.1, TURNED)).project(point)
+    foot = projectors["torus"].project(point)
     assert foot.converged
     assert _near(foot.theta[0], u)
     assert _near(foot.theta[1], angle)
@@ -197,12 +208,16 @@ def test_it_stays_on_its_sheet():
         assert theta == pytest.approx((angle, 0.1), abs=1e-10)
 
 
+@pytest.fixture(name="project", scope="module")
+def fixture_project():
+    return SurfaceProjector(cylinder(0.09, (-0.1, 0.1))).project
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("where", range(5))
-def test_input_that_is_not_finite(bad, where):
+def test_input_that_is_not_finite(project, bad, where):
     values = [0.1, 0.0, 0.0, 0.2, 0.0]
     values[where] = bad
-    project = SurfaceProjector(cylinder(0.09, (-0.1, 0.1))).project
     foot = project(values[:3], (values[3], values[4]))
     assert not foot.converged
     assert math.isnan(foot.alpha)
