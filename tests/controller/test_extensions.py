@@ -102,6 +102,7 @@ def test_a_sensor_that_is_lost_stops_the_robot():
     assert bench.rest(3, lost)["fault"] != Fault.NONE
 
 
+@pytest.mark.slow(but="1.0")
 @pytest.mark.parametrize("request_value", [1.0, -0.5])
 def test_a_request_stops_the_robot(request_value):
     bench = Bench(stop_request=True)

@@ -34,6 +34,7 @@ def make(parameters, robot, *, oriented=False):
     return make_law(parameters, robot, manifold)
 
 
+@pytest.mark.slow(but="visco_elastic")
 @pytest.mark.parametrize("law", ["rigid", "visco_elastic", "elastic"])
 def test_gains_reach_their_coordinates(load_arm, law):
     r = RELATIVE_DEGREE[law]

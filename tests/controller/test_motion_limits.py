@@ -55,6 +55,7 @@ def test_a_motion_that_takes_too_much_is_slowed_and_one_that_fits_is_not(path):
     assert any("as asked for it takes" in line for line in warned.warnings)
 
 
+@pytest.mark.slow
 def test_the_fastest_motion_uses_what_the_reserve_leaves(path):
     made = follower(
         path, MotionLimits(speed="fastest", torque_rate=np.inf, reserve=0.4, dwell=0.05)

@@ -210,6 +210,9 @@ def test_a_law_that_does_not_suit_the_robot_is_named(path):
         assert any("damping of the joint torques" in w for w in follower.warnings) == is_named
 
 
+@pytest.mark.slow(
+    but="2-1.5-measured values of a joint contradict each other: v_J_3 and v_M_3 at eta ="
+)
 @pytest.mark.parametrize(
     ("row", "value", "said"),
     [

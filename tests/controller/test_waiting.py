@@ -91,6 +91,7 @@ def test_a_place_that_is_no_number_stops_it(loop):
     assert eta < 0.4
 
 
+@pytest.mark.slow
 def test_it_is_exported_as_c_with_its_obstacles(loop, tmp_path):
     follower, _ = loop
     pfsc_drake.export(follower, tmp_path)

@@ -222,6 +222,7 @@ def test_trajectory_tracking_for_a_delta_robot(delta):
     assert log["reference"][-1, 0] > 0.03
 
 
+@pytest.mark.slow
 def test_a_circle_for_a_three_axis_arm_with_a_hand(load_scenario):
     """Position only: the hand's frame and the path's coordinates without orientation."""
     settings = load_scenario("pfc_elastic_3r")

@@ -97,6 +97,7 @@ def test_coordinates_to_blame(six_axes):
     assert "q_" not in sentence
 
 
+@pytest.mark.slow
 def test_beyond_an_end(six_axes):
     """A push along the path, which the law alone resists, takes the tool over its start."""
     six_axes.reference.points, six_axes.controller.max_beyond_end = [0.004, 0.1], 2e-3
@@ -161,6 +162,7 @@ def test_a_sensor_that_never_worked(six_axes):
     assert station.fault(root) == "a measured value is not a finite number: q_J_1 at t = 0.000 s"
 
 
+@pytest.mark.slow
 def test_a_servo(six_axes):
     six_axes.controller.law = "velocity_servo"
     six_axes.simulation.sensor_failure.time = 0.0105
@@ -274,6 +276,7 @@ def test_a_wrist_that_aims_its_tool(through_the_wrist, num_joints, name):
     assert "q_5 = " in sentence and "(q_4 can move without the tool)" in sentence
 
 
+@pytest.mark.slow
 def test_a_tool_where_its_euler_angles_end(six_axes):
     """It starts tilted to the vertical, about the axis that the second angle turns about."""
     R_d = make_task(six_axes, FOLDER).start(np.zeros(3)).target.R_e

@@ -41,6 +41,7 @@ def test_joints_too_soft_for_the_law(scenario):
         assert "'elastic' or 'visco_elastic'" in warning
 
 
+@pytest.mark.slow
 def test_joints_so_soft_that_the_law_is_unstable(scenario):
     scenario.controller.law = "singular_perturbation"
     scenario.controller.boundary_layer_damping = [0.03, 0.03, 0.02]
@@ -81,6 +82,7 @@ def test_servos_faster_than_the_joints(scenario):
     assert warnings(scenario) == []
 
 
+@pytest.mark.slow
 def test_resonances_too_fast_for_the_elastic_law(scenario):
     # 19 Hz times 50 ms is 6 rad
     scenario.controller.sampling_time = 0.05
@@ -198,6 +200,7 @@ def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
     assert warnings(scenario) == []
 
 
+@pytest.mark.slow
 def test_free_angles_make_no_loop_unstable():
     scenario = shipped_scenario("pfc_comau_6r")
     gains = scenario.controller.gains["singular_perturbation"]

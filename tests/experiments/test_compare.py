@@ -169,6 +169,7 @@ def test_no_page_is_written_into_a_run_or_a_users_folder(make_run, tmp_path, ref
     assert "is no folder" in refused(*folders, out=other / "report.html")
 
 
+@pytest.mark.slow
 def test_a_page_is_written_anew(make_run, tmp_path):
     folders = [make_run("slow", 0.01), make_run("fast", 0.02, oriented=False)]
     out = tmp_path / "page"

@@ -52,6 +52,7 @@ def test_what_is_written_and_said(elastic):
     assert "joint_state" in (folder / "README.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_c_repeats_a_run_to_the_last_bit(elastic):
     folder, _, recorded = elastic

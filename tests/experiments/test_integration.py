@@ -107,6 +107,7 @@ def stiff(tmp_path):
     )
 
 
+@pytest.mark.slow(but="start.offset=[0.01, 0]")
 @pytest.mark.parametrize("start", ["start.offset=[0, 0]", "start.offset=[0.01, 0]"])
 def test_the_start_of_the_scenario_does_not_decide(start):
     """Without a way to the path, and the reference hardly moving yet, all else rests."""
@@ -124,6 +125,7 @@ def test_stiff_joints_get_shorter_steps(stiff):
     assert is_stable(chosen.scheme, chosen.step, modes)
 
 
+@pytest.mark.slow
 def test_friction_has_its_schemes():
     chosen = choose("pfc_elastic_6r", *RIGID, "friction.file=comau_racer_1_4")
     assert chosen.scheme in ("runge_kutta3", "runge_kutta5")
@@ -134,7 +136,7 @@ def test_a_step_is_never_longer_than_a_tick():
     assert choose("pfc_elastic_6r", *RIGID, "simulation.max_step=0.01").step == 1e-3
 
 
-@pytest.mark.slow(but="1e-06")
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1e-5, 1e-6])
 def test_steps_that_are_short_already_take_no_long_trial(step):
     chosen = choose("pfc_elastic_6r", *RIGID, f"simulation.max_step={step}")
@@ -158,6 +160,7 @@ def test_what_the_scenario_names_is_taken():
     assert str(chosen) == "runge_kutta2 in steps of 1 ms: as the scenario says"
 
 
+@pytest.mark.slow
 def test_a_run_says_it_and_its_copy_gives_the_same(run_scenario, tmp_path):
     bare = ("--set", "simulation.integrator=auto", "--duration", "0.1")
     first = run_scenario(tmp_path / "first", "pfc_elastic_3r", *bare)

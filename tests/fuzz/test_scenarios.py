@@ -52,7 +52,7 @@ def prepared_or_line(data, folder=SCENARIO_DIRECTORY):
     return True
 
 
-@pytest.mark.slow(but="parallel")
+@pytest.mark.slow
 @pytest.mark.parametrize("base", BASES)
 def test_scenarios_are_prepared_or_refused_in_one_line(guarded, examples, base):
     data = full_scenario(*BASES[base])

@@ -79,7 +79,7 @@ def test_torsion_of_a_helix():
     assert point[layout.normal] == pytest.approx(outwards, abs=1e-12)
 
 
-@pytest.mark.slow(but=["2-open", "2-closed", "4-around"])
+@pytest.mark.slow(but=["2-closed", "2-open"])
 @pytest.mark.parametrize("name", CURVES)
 @pytest.mark.parametrize("order", [2, 4])
 def test_what_the_law_is_told_is_the_frame_of_the_surface(name, order):

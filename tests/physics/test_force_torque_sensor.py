@@ -172,6 +172,7 @@ def test_noise_is_the_seeds(rigid):
     assert not np.any(np.isclose(run(1), run(2), rtol=0, atol=1e-9))
 
 
+@pytest.mark.slow(but="50.0")
 @pytest.mark.parametrize("frequency", [5.0, 50.0, 100.0, 200.0])
 def test_amplitude_falls_as_the_bandwidth_says(rigid, frequency):
     def load(t):

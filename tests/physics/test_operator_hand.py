@@ -137,6 +137,7 @@ def test_a_mass_is_brought_to_the_target():
     assert np.linalg.norm(wrench[-1, :3]) < 0.1
 
 
+@pytest.mark.slow
 def test_a_hand_at_rest_gives_no_more_energy_than_its_spring_holds():
     stiffness, start = 400.0, np.array([0.1, -0.05, 0.02])
     stored = 0.5 * stiffness * start @ start

@@ -95,6 +95,7 @@ def test_what_is_more_than_numbers_is_one_line(tmp_path, make, reason, read):
     assert reason in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_group_that_contains_itself_ends(tmp_path):
     path = tmp_path / "identification.h5"
     with h5py.File(path, "w") as file:

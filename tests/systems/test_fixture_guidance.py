@@ -94,6 +94,7 @@ def test_the_floor_holds_the_reference(robot):
     assert bench.record("near")[1] == pytest.approx(1e-3, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, 4])
 def test_a_filtered_reference_comes_to_rest_on_the_floor(robot, degree):
     bench = Bench(robot, FilterLead(degree, 3e-3, PERIOD), order=degree)

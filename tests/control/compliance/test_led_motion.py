@@ -65,6 +65,7 @@ def joints(robot, q, axes, speed):
     return np.linalg.solve(J, np.concatenate([np.zeros(3), velocity]))
 
 
+@pytest.mark.slow(but="2")
 @pytest.mark.parametrize("count", [1, 2])
 def test_the_motion_that_is_allowed_takes_a_joint_to_its_share(robot, count):
     """However fast the tool moves now; and what is slower is left as it is."""
@@ -87,6 +88,7 @@ def test_the_motion_that_is_allowed_takes_a_joint_to_its_share(robot, count):
     assert (wanted - allowed) @ (allowed - 0.5 * speed) > 0.0
 
 
+@pytest.mark.slow(but="2")
 @pytest.mark.parametrize("count", [1, 2])
 def test_of_all_limits_the_motion_next_to_the_wanted_one_is_found(robot, count):
     """Speeds, ends and singular postures, against a solver that is given all of them."""

@@ -34,6 +34,7 @@ def pulse(t):
     return np.array([8.0, -3.0]) * (0.1 <= t < 0.3)
 
 
+@pytest.mark.slow(but=["4", "1"])
 @pytest.mark.parametrize("relative_degree", [1, 2, 3, 4])
 def test_it_obeys_mass_damper_spring_behind_a_filter(relative_degree):
     impedance = NullSpaceImpedance(PARAMETERS, relative_degree, PERIOD)
@@ -60,7 +61,7 @@ def test_it_obeys_mass_damper_spring_behind_a_filter(relative_degree):
     assert np.allclose(state[1], x[-2:], rtol=0, atol=1e-8)
 
 
-@pytest.mark.slow(but="1")
+@pytest.mark.slow
 @pytest.mark.parametrize("relative_degree", [1, 2, 3, 4])
 def test_every_row_is_the_rate_of_the_row_above(relative_degree):
     fine = 1e-5

@@ -170,7 +170,7 @@ def test_a_known_wrench_is_found_to_the_noise_level(model):
     assert np.all(np.abs(error.mean(axis=0)) < np.repeat([0.08, 0.012], 3))
 
 
-@pytest.mark.slow(but="200.0-0.002-comau_racer_1_4")
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(("sensor_bandwidth", "share"), [(200.0, 0.002), (100.0, 0.05)])
 def test_inertia_of_a_fast_motion_is_taken_off(model, sensor_bandwidth, share):
@@ -210,6 +210,7 @@ def test_taring_waits_until_the_force_is_steady():
     assert rms(signals["wrench"][first:, :3]) < 0.6
 
 
+@pytest.mark.slow(but="60.0-0")
 @pytest.mark.parametrize(
     ("bias", "fault"), [(600.0, SensorFault.SATURATED), (60.0, SensorFault.NONE)]
 )

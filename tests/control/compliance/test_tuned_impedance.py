@@ -93,12 +93,14 @@ def pump(bench, cycles):
         bench.hold_at(0.0, 400)
 
 
+@pytest.mark.slow
 def test_nobody_can_pump_energy_out_of_it():
     bench = Bench(capacity=0.5, reserve=0.05)
     pump(bench, 10)
     assert bench.work >= bench.stored - 0.05 - 1e-9
 
 
+@pytest.mark.slow
 def test_without_the_tank_somebody_could():
     """What the test above is worth."""
     bench = Bench(capacity=1e6, reserve=1e6)

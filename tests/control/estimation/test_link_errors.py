@@ -84,6 +84,7 @@ def test_noise_of_torques_and_steps_of_encoders(drake_arm, kind, encoders):
     assert np.all(errors.noise[:, elastic] > [[1e-6], [1e-4]])
 
 
+@pytest.mark.slow(but=["differences", "steps"])
 @pytest.mark.parametrize("encoders", ["steps", "differences", "filtered"])
 def test_noise_of_what_motors_tell(drake_arm, encoders):
     robot, encoders = drake_arm("elastic").chain, ENCODERS[encoders]

@@ -20,6 +20,7 @@ def follow(estimator, samples):
     return np.array([x.full().reshape(-1, sample.numel()) for x in estimates])
 
 
+@pytest.mark.slow(but="2")
 @pytest.mark.parametrize("degree", [0, 1, 2])
 def test_polynomials_of_its_degree_are_followed_without_lag(degree):
     t = PERIOD * np.arange(1000)

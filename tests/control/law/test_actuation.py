@@ -233,6 +233,7 @@ def test_elastic_law_averages_over_the_hold(load_robot):
     assert 1.8 < naive[1] / naive[2] < 2.2
 
 
+@pytest.mark.slow(but="visco_elastic")
 @pytest.mark.parametrize("law", ["elastic", "visco_elastic"])
 def test_damped_drives_are_averaged_over_the_hold(load_robot, law):
     """The mean motor velocity over the interval, to second order, in Drake's plant."""

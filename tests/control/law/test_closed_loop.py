@@ -67,7 +67,7 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     check(robot, rigid, path, make_law(robot.chain, name, oriented), virtual_output)
 
 
-@pytest.mark.slow(but="velocity_servo")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["velocity_servo", "rigid", "visco_elastic", "elastic"])
 def test_a_path_on_a_surface(name, load_robot, make_law, virtual_output):
     """Along it, along the surface's normal, and sideways; the frame turns about the tangent."""

@@ -18,6 +18,7 @@ CASES = {
 STEP = 1e-5  # s, of a central difference along the plant's motion
 
 
+@pytest.mark.slow(but=["visco_elastic", "rigid", "velocity_servo"])
 @pytest.mark.parametrize("name", CASES)
 def test_the_highest_derivative_is_that_of_the_plant(
     name, load_robot, make_law, oriented_path, position_path

@@ -102,6 +102,7 @@ def test_shapes(law, load_robot):
     ]
 
 
+@pytest.mark.slow
 def test_only_sampled_laws_for_elastic_joints_are_extrapolated(load_robot):
     chain = load_robot("comau_racer_1_4_elastic_3r", (10.0,) * 3).chain
     for law in ("rigid", "visco_elastic", "elastic"):
@@ -142,6 +143,7 @@ def test_a_manifold_of_another_order_is_refused(load_robot):
         linearize(load_robot("comau_racer_1_4_3r").chain, "rigid", PathManifold(3, oriented=False))
 
 
+@pytest.mark.slow(but=["rigid", "velocity_servo"])
 @pytest.mark.parametrize("law", ["velocity_servo", "rigid", "elastic"])
 def test_the_decoupling_matrix_alone_is_that_of_the_law(law, load_robot, oriented_path):
     chain = load_robot("comau_racer_1_4_elastic").chain

@@ -29,6 +29,7 @@ def paced(goal, ticks, order=4, ways=None, **given):
     return np.array(rows), np.array(stops), np.array(overruns)
 
 
+@pytest.mark.slow(but=["1-0", "2-1", "4-2", "4-3"])
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_a_free_way_that_grows_and_shrinks_is_never_passed(seed, order):

@@ -62,7 +62,7 @@ class Station:
         return np.array(linearization.function(state, tau_ext, point)[6]).T
 
 
-@pytest.mark.slow(but="velocity_servo")
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_servo", "rigid", "visco_elastic", "elastic"])
 def test_one_more_coordinate_obeys_its_own_linear_dynamics(
     law, load_robot, make_law, position_path

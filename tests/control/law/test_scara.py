@@ -63,7 +63,7 @@ def test_kinematics_and_torques_are_drakes(load_robot):
         assert y_t == pytest.approx([reach.real, reach.imag, 0.18 + q[2]], abs=1e-12)
 
 
-@pytest.mark.slow(but="velocity_servo")
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_servo", "rigid", "visco_elastic", "elastic"])
 def test_outputs_obey_the_predicted_linear_dynamics(
     law, load_robot, make_law, virtual_output, path

@@ -56,7 +56,7 @@ def test_both_references_run_with_time(law, load_robot, make_law):
     assert np.allclose(velocity, poles * Y[0] + [*reference[1, :2], 0.0], atol=1e-10)
 
 
-@pytest.mark.slow(but="rigid")
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["rigid", "elastic"])
 def test_a_loop_at_rest_on_a_surface_has_the_poles_of_its_gains(law, load_robot):
     r, period, (theta, _) = RELATIVE_DEGREE[law], 2e-5, SITUATIONS["paraboloid"]

@@ -58,6 +58,7 @@ def worst_error(joints, damping, proportional):
     return max(errors)
 
 
+@pytest.mark.slow(but=["10000.0-6", "100000.0-3"])
 @pytest.mark.parametrize("n", [3, 6])
 @pytest.mark.parametrize("stiffness", [1e4, 1e5])
 def test_the_composite_law(n, stiffness):

@@ -38,6 +38,7 @@ def fixture_arm(load_robot, position_path, make_law):
     return make
 
 
+@pytest.mark.slow(but="visco_elastic-poles0")
 @pytest.mark.parametrize(
     ("law", "poles"),
     [("visco_elastic", (-20, -30, -40)), ("elastic", (-20, -30, -40, -50))],

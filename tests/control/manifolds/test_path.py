@@ -122,6 +122,7 @@ def outputs_over_time(path, point, motion, times, tool=WHOLE):
     return np.array(rows)
 
 
+@pytest.mark.slow(but=["on a surface-2", "oriented-1", "circle, alpha one half-2", "lemniscate-1"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_jets_are_derivatives_of_the_outputs(situation, seed):
     path, theta, offset = situation
@@ -172,6 +173,7 @@ def test_the_situations_are_what_their_names_say(situation, request):
     assert np.abs(rows[1:]).max() > 0.05
 
 
+@pytest.mark.slow(but=["lemniscate", "oriented"])
 def test_lower_orders_are_the_beginning_of_higher_ones(situation):
     path, theta, offset = situation
     motion = tool_motion(path, theta, np.asarray(offset), np.random.default_rng(3))

@@ -134,6 +134,7 @@ def test_wrong_input_is_refused(keys, message):
         SurfaceManifold(2, **keys)
 
 
+@pytest.mark.slow(but=["lead and tilt", "given"])
 @pytest.mark.parametrize("orientation", ["normal", "lead and tilt", "given"])
 def test_a_tool_in_the_reference_orientation_has_no_angles(orientation):
     theta, distance = SITUATIONS["saddle"]

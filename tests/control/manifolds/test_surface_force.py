@@ -63,6 +63,19 @@ def force(manifold, wrench, point, reference, **keys):
     return np.array(function(wrench, point, reference)).ravel()
 
 
+@pytest.mark.slow(
+    but=[
+        "none-cylinder",
+        "normal-saddle",
+        "given-saddle",
+        "axis-paraboloid",
+        "axis of a given one-saddle",
+        "euler-paraboloid",
+        "euler of a given one-cylinder",
+        "turn-saddle",
+        "turn of a given one-paraboloid",
+    ]
+)
 @pytest.mark.parametrize("name", SITUATIONS)
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
 def test_power_of_random_motions(name, orientation):

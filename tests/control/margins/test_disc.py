@@ -49,6 +49,7 @@ def test_a_loop_without_feedback_bears_any_gain():
     assert margin.gain == (0.0, np.inf)
 
 
+@pytest.mark.slow(but=["1", "2"])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_margin_is_the_smallest_disc_that_makes_the_loop_unstable(seed):
     A, B, K, closed = two_drives(np.random.default_rng(seed))
@@ -69,6 +70,7 @@ def test_the_margin_is_the_smallest_disc_that_makes_the_loop_unstable(seed):
         assert worst[1.02] > 1.0
 
 
+@pytest.mark.slow(but=["0", "3"])
 @pytest.mark.parametrize("seed", range(4))
 def test_all_drives_at_once_bear_the_common_margin(seed):
     rng = np.random.default_rng(seed)

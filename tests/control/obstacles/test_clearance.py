@@ -41,6 +41,7 @@ def _sampled(arm, shape, position, count=150):
     return least - RADIUS
 
 
+@pytest.mark.slow(but=["sphere", "column"])
 @pytest.mark.parametrize("kind", SHAPES)
 def test_distances_are_those_of_many_points(kind):
     rng, shape = np.random.default_rng(2), SHAPES[kind]

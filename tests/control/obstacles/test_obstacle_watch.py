@@ -136,6 +136,7 @@ def test_who_is_not_seen_at_first_keeps_it_waiting_until_he_is():
     assert pace > 0.9
 
 
+@pytest.mark.slow
 def test_the_way_is_free_ahead_of_one_who_comes_slowly_later():
     """He would be on the path in two seconds: the tool is past before, and does not wait."""
     crane, waited = _Crane(length=1.0), False
@@ -182,6 +183,7 @@ def test_nobody_within_his_limits_finds_the_tool_moving(seed, parameters):
     assert moved > 0.02
 
 
+@pytest.mark.slow
 def test_who_accelerates_no_faster_than_is_known_lets_it_go_on_sooner():
     """He has crossed and walks away: only that he cannot turn round at once lets it go."""
     ways = []

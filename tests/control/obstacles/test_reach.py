@@ -10,6 +10,7 @@ V, A = 1.6, 4.0
 REACH = Reach(V, A, 0.0)
 
 
+@pytest.mark.slow(but=["0.01-0.4", "0.01--1.6", "0.2-0.0", "0.2--0.7", "0.9-1.6", "0.9--0.7"])
 @pytest.mark.parametrize("receding", [-1.6, -0.7, 0.0, 0.4, 1.6])
 @pytest.mark.parametrize("gap", [0.01, 0.2, 0.9])
 def test_it_is_when_one_who_turns_round_and_runs_arrives(gap, receding):

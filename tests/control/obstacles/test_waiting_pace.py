@@ -86,7 +86,7 @@ def test_the_permitted_pace_is_the_largest_that_lags_may_be_filled_to(order):
     assert {0.0, 1.0} < set(seen)
 
 
-@pytest.mark.slow(but="1.0-1")
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_no_place_is_passed_faster_than_rest_when_its_time_is_used_up(order, sign):

@@ -88,6 +88,7 @@ def test_a_weight_leaves_less_in_one_direction():
     assert least <= duration < 1.03 * least
 
 
+@pytest.mark.slow
 def test_limits_that_are_left_out_at_first_are_kept():
     whole, partly = (fastest(2, 60, rate=30.0, watched=watched) for watched in (0.0, 0.9))
     assert partly[0] == pytest.approx(whole[0], rel=1e-4)

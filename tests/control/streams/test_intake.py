@@ -82,6 +82,7 @@ def test_control_points_never_change(run):
             assert np.array_equal(first, own[k])
 
 
+@pytest.mark.slow
 def test_arc_length_and_frame_are_those_of_the_whole_spline(run):
     spline, layout = whole_path(run), run.layout
     begun = np.flatnonzero(run.pieces == 1.0)
@@ -130,6 +131,7 @@ def test_laws_of_other_orders_get_the_same_end(order):
     assert run.stream[-1, 0] == StreamStatus.WAITING
 
 
+@pytest.mark.slow
 def test_a_stream_that_runs_dry_is_followed_to_its_last_point_and_goes_on_later():
     w = bend(40)
     times = even(39)
@@ -274,6 +276,7 @@ def test_a_sender_that_counts_anew_is_noticed(new):
         assert 15 <= off.argmin() <= 20
 
 
+@pytest.mark.slow(but="bad1")
 @pytest.mark.parametrize("bad", [[np.nan, 0.3, 1.0], [0.8, 9.0, 1.0]])
 def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
     w = bend(61)
@@ -304,7 +307,7 @@ def test_what_was_refused_is_remembered_at_rest():
     np.testing.assert_allclose(run.sigma[-1], w[25], rtol=0, atol=1e-6)
 
 
-@pytest.mark.slow(but="3-40")
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "count"), [(3, 40), *((k, 150) for k in range(4))])
 def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed, count):
     random = np.random.default_rng(seed)

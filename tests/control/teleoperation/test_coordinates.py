@@ -85,7 +85,7 @@ def random_port(seed, ticks=300, arriving=2e-3, **options):
 COUNTS = [2, pytest.param(50, marks=pytest.mark.slow)]
 
 
-@pytest.mark.slow(but=["waves-0-2", "position_force-1-2", "four_channel-0-2"])
+@pytest.mark.slow(but="position_force-1-2")
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("late", [0, 1])
 @pytest.mark.parametrize("coupling", ["waves", "position_force", "four_channel"])

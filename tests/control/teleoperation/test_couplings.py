@@ -74,7 +74,7 @@ def fixture_waves():
     return PointTeleoperation(station())
 
 
-@pytest.mark.slow(but="0.2")
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0.0, 0.1, 0.2])
 def test_waves_are_felt_as_a_line_with_a_load(delay):
     """A lossless line before a mass with damping, and before what is rigid."""
@@ -106,6 +106,7 @@ def test_a_passive_coupling_never_gives_more_than_its_tanks_held(coupling):
         assert energy.deepest < 1e-9
 
 
+@pytest.mark.slow
 def test_what_is_not_made_passive_gives_more():
     there = PointTeleoperation(station("position_force", passive=False))
     drawn = draw_sequence(3, 2.0)
@@ -156,6 +157,7 @@ def test_both_sides_meet_again_after_a_link_was_away(monkeypatch):
     assert energy_of(motion, PLANES).coupling >= 0.0
 
 
+@pytest.mark.slow(but=["1", "0"])
 @pytest.mark.parametrize("seed", range(4))
 def test_links_that_are_away_give_no_energy(monkeypatch, seed):
     random = np.random.default_rng(seed)

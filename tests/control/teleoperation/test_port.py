@@ -96,6 +96,7 @@ def test_steady_waves_leave_the_tank_as_it_is(late):
     np.testing.assert_allclose(np.diff(tanks[4:]), 0.0, atol=1e-13)
 
 
+@pytest.mark.slow(but=["waves-0", "position_force-1", "four_channel-0"])
 @pytest.mark.parametrize("late", [0, 1])
 @pytest.mark.parametrize("coupling", ["waves", "position_force", "four_channel"])
 def test_the_tank_keeps_its_law_and_is_never_overdrawn(coupling, late):

@@ -79,7 +79,7 @@ def test_a_push_moves_the_arm_as_in_drakes_own_simulation(three_axes, load_arm):
     assert log["push_point"].dim == log["push_force"].dim == 3
 
 
-@pytest.mark.slow(but="observed")
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["known", "observed"])
 def test_a_law_that_knows_of_a_push_stays_on_the_path(six_axes, source):
     """Two pulses and a hand on different links; beside the joint torques their time derivatives."""
@@ -133,6 +133,7 @@ def test_forces_on_links_are_in_manifold_axes_if_wanted(three_axes):
     assert log["push_force"].values[-1] == pytest.approx(axes @ [0.0, 50.0, 0.0], abs=0.1)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_pushed_is_refused(three_axes, load_scenario):
     three_axes.forces = [ForcePulse(link="link_2"), ForcePulse(link="elbow")]
     with pytest.raises(
@@ -162,6 +163,7 @@ def test_a_law_that_does_not_know_of_pushes_warns(six_axes):
         assert any("forces act on links" in line for line in warnings) == warned
 
 
+@pytest.mark.slow(but="known")
 @pytest.mark.parametrize("source", ["known", "observed"])
 def test_a_posture_is_told_of_pushes(six_axes, source):
     """Whatever the law itself is told."""

@@ -181,6 +181,7 @@ def test_tanks_hold_what_forces_take_in_a_tick():
         build_station(settings, SCENARIOS)
 
 
+@pytest.mark.slow
 def test_a_hand_may_be_a_little_beyond_the_ends_of_a_path():
     settings = shipped_scenario("teleop_path")
     settings.hand = HandParameters([HandWaypoint(0.0, [-0.4, 0, 0])], frame="manifold")

@@ -79,6 +79,7 @@ def test_a_plate_lies_in_the_magazine_at_the_start(station):
     assert not station.blocks.output(root, "gripper.wrench").any()
 
 
+@pytest.mark.slow
 def test_a_plate_that_is_held_is_where_the_tool_is():
     station = build("plate.start=held", "reference.points=[0.5, 0.5]", "start.posture_deg=[]")
     state, root = plate_state(station)

@@ -64,6 +64,7 @@ def test_a_push_leads_the_tool_and_stiffness_decides_how_far(tmp_path, settings)
     assert log["tank"].values.min() >= 0.0
 
 
+@pytest.mark.slow
 def test_a_person_who_is_not_there_does_nothing(settings):
     station = build_station(settings, SCENARIOS)
     result = simulate(station, settings.simulation, 0.1, lambda *_: None)

@@ -71,7 +71,11 @@ def test_the_ball_touches_where_the_tool_point_is_on_the_workpiece(station):
         ("workpiece.time_step=7e-4", ["workpiece.time_step", "whole fraction"]),
         ("workpiece.spacing=0", ["'workpiece': spacing"]),
         ("start.offset=[0.001, 0]", ["start", "mm inside of the workpiece", "start.offset[0]"]),
-        ("start.offset=[-0.01, 0]", ["start", "mm inside of the workpiece"]),
+        pytest.param(
+            "start.offset=[-0.01, 0]",
+            ["start", "mm inside of the workpiece"],
+            marks=pytest.mark.slow,
+        ),
         ("notch={}", ["notch", "null where there is a workpiece"]),
         ("surface.orientation={kind: given}", ["surface.orientation.kind", "normal"]),
         ("compliance.transversal.stiffness.value=100", ["press", "stiffness.value is 0"]),

@@ -97,6 +97,7 @@ def test_the_coupling_hardly_matters_to_singular_perturbation(settings):
     assert 1e-5 < change < 0.05 * deviation[""].max()
 
 
+@pytest.mark.slow
 def test_start_and_replay(coupled):
     station, root, log = run(coupled, 0.05)
     assert np.abs(log["v_J"].values[0]).max() < 1e-15
@@ -126,6 +127,7 @@ def test_robots_that_cannot_be_coupled(settings, model, rotors, part):
     assert str(caught.value).startswith("robot.rotor_coupling: ")
 
 
+@pytest.mark.slow
 def test_the_sensor_of_the_full_model_reads_what_a_joint_bears(settings, tmp_path):
     """With rotors on the base both plants move alike; one tells its reactions, the other not."""
     settings.controller.external_torque.source = "measured"
@@ -149,6 +151,7 @@ def test_a_sensor_needs_its_joint(coupled, joint, said):
         build_station(coupled, Path())
 
 
+@pytest.mark.slow
 def test_joint_damping_is_the_models_but_for_its_damping(settings, load_arm):
     settings.controller.law = "elastic"
     settings.robot.joint_damping = [10.0, 20.0, 30.0]

@@ -138,7 +138,7 @@ def _controlling(station):
     }
 
 
-@pytest.mark.slow(but="pfc_compliant_6r-rigid")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "law"),
     [

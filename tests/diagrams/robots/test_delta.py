@@ -45,6 +45,7 @@ def sources(diagram):
     }
 
 
+@pytest.mark.slow
 def test_friction_is_beside_the_drives():
     behind = sources(build_analytic("simulation.fused=false").diagram)
     assert behind["plant", "actuation"] == ("hold", "held")
@@ -72,6 +73,7 @@ def test_encoders_count_increments_of_the_slides():
     assert np.abs(measured - true).max() > 1e-5
 
 
+@pytest.mark.slow
 def test_a_push_deflects_as_the_gains_say():
     """Without integral action, e = -a_1^-1 A D^-1 J^T f: by the robot's own matrices."""
     force = np.array([3.0, -2.0, 4.0])

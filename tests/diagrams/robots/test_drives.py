@@ -219,6 +219,7 @@ def test_a_faster_servo_gets_the_velocity_of_the_tick(settings):
     assert deviation(station, signals).max() < 1e-3
 
 
+@pytest.mark.slow(but="increments1")
 @pytest.mark.parametrize("increments", [[], [2000.0]])
 def test_friction_acts_against_the_motion(settings, increments):
     """The true one, whatever the encoders make of it."""
@@ -236,7 +237,7 @@ def test_friction_acts_against_the_motion(settings, increments):
     np.testing.assert_allclose(torque[moving], expected[moving], atol=1e-6)
 
 
-@pytest.mark.slow(but="0.004-1")
+@pytest.mark.slow
 @pytest.mark.parametrize(("step", "softness"), [(TICK / 4, 1 / 16), (TICK / 4, 1.0), (4 * TICK, 1)])
 def test_stuck_joints_give_way_by_their_presliding(settings, step, softness):
     """Steps change nothing; a presliding that is given does."""
@@ -303,6 +304,7 @@ def test_friction_needs_rotors(settings, tmp_path):
         build_station(settings, tmp_path)
 
 
+@pytest.mark.slow
 def test_friction_of_the_robot_itself(settings):
     settings.friction.file = "comau_racer_1_4"
     by_name = run(settings, 0.1)[2]["friction_torque"]

@@ -9,6 +9,7 @@ from diagrams.robots.force_sensor import taring_warnings
 from experiments.scenario_file import find_scenario
 
 
+@pytest.mark.slow(but=["0.05-False", "0.049-True"])
 @pytest.mark.parametrize(("dwell", "late"), [(0.049, True), (0.05, False), (0.051, False)])
 def test_the_reference_should_not_set_off_before_the_sensor_is_tared(load_scenario, dwell, late):
     """From the sample on with which the window is full, the sensor is tared."""

@@ -35,6 +35,7 @@ def deviation(load_scenario):
     return run
 
 
+@pytest.mark.slow
 def test_torque_sensors_stand_for_encoders_on_the_links(deviation):
     assert deviation("motor_and_torque", "from_torque") < 2e-5
 

@@ -116,6 +116,7 @@ def test_a_force_deflects_as_a_spring(settings, axis):
     np.testing.assert_allclose(measured, applied, atol=0.3)
 
 
+@pytest.mark.slow
 def test_a_rigid_coordinate_does_not_yield(settings):
     settings.compliance.transversal = CoordinateImpedance()
     settings.compliance.tangential = soft()
@@ -125,6 +126,7 @@ def test_a_rigid_coordinate_does_not_yield(settings):
     assert np.abs(signals["reference"][:, 0] - 0.96).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_the_filter_knows_four_derivatives(settings):
     settings.reference.dwell = 0.1
     _, _, signals = run(settings, 0.3)

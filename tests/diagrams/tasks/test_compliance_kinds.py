@@ -90,6 +90,7 @@ def test_a_torque_pushes_along_a_path_that_turns_if_it_is_to(settings, with_turn
     assert log["manifold_force"].values[-1, 0] == pytest.approx(expected, abs=0.3)
 
 
+@pytest.mark.slow(but="2")
 @pytest.mark.parametrize("axis", range(3))
 def test_a_torque_turns_the_tool(settings, axis):
     """By tau / k about the axis of the torque, in the world, whatever the angles are called."""
@@ -137,6 +138,7 @@ def test_stiffness_that_changes_on_the_way_moves_nothing_at_once(arm, load_scena
     assert moved < 0.02 * abs(force / soft - force / stiff)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_is_never_tared_moves_nothing(arm, load_scenario):
     """Too restless to be tared: biased, pushed along, across and by a moving reference."""
     settings = arm(load_scenario("pfc_elastic_3r"))
@@ -157,6 +159,7 @@ def test_a_sensor_that_is_never_tared_moves_nothing(arm, load_scenario):
     assert np.ptp(log["eta_d"].values) > 0.02
 
 
+@pytest.mark.slow
 def test_rigid_coordinates_do_not_wait(arm, load_scenario):
     settings = arm(load_scenario("pfc_elastic_3r"))
     settings.compliance.transversal = impedance(3.0, 85.0, Profile(600.0))

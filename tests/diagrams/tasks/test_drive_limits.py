@@ -128,6 +128,7 @@ def test_other_robots_laws_and_surfaces_wait_too(name, load_exact_scenario):
     assert plan.waiting_time == pytest.approx(waited) and waited > 0.0
 
 
+@pytest.mark.slow
 def test_velocity_servos_keep_a_reserve_of_speed(settings):
     """On the same path the joints' speeds, not torques, are what is scarce."""
     given = settings(velocity=3.0, acceleration=20.0)
@@ -192,7 +193,7 @@ def test_a_wrist_that_becomes_singular_on_the_way_is_named_with_its_place(turnin
     assert eta - 1e-3 < float(place[1]) < eta + 6e-3
 
 
-@pytest.mark.slow(but="240.0-1")
+@pytest.mark.slow
 @pytest.mark.parametrize(("last", "found"), [(240.0, 1), (60.0, 0)])
 def test_a_joint_that_passes_its_limit_on_the_way_is_named_with_its_place(turning, last, found):
     """The last joint turns as the tool does, up to 166 deg."""

@@ -21,6 +21,7 @@ def filtered_rate(bandwidth):
     return np.trapezoid(weight * 16.0 * (x * (1.0 - x)) ** 2, t)
 
 
+@pytest.mark.slow(but=["20.0", "0.0"])
 @pytest.mark.parametrize("bandwidth", [200.0, 20.0, 0.0])
 def test_the_rate_of_the_torques_is_as_fast_as_the_bandwidth(load_scenario, bandwidth):
     """In the middle of a force that swells; a slow estimator lags behind, 0 asks for none."""

@@ -101,7 +101,7 @@ def test_a_largest_velocity_is_kept(fastest):
     assert plan.limiting.of_the_way(plan.speed)["velocity"] > 0.5
 
 
-@pytest.mark.slow(but="pfc_delta--0.05")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "way"),
     [("sfc_elastic_6r", 0.03), ("pfc_panda_7r", -0.1), ("pfc_delta", -0.05)],

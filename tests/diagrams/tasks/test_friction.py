@@ -44,6 +44,7 @@ def fixture_arm(load_scenario):
     return settings
 
 
+@pytest.mark.slow
 def test_every_source_keeps_the_tool_nearer_to_its_path(arm):
     found = {}
     for source, velocity, observer in (

@@ -355,6 +355,7 @@ def test_too_few_points_may_be_corners(tmp_path):
     make(Waypoints(file, corner_distance=0.01), law="rigid", folder=tmp_path)
 
 
+@pytest.mark.slow
 def test_noise_in_millimetres_is_one_of_the_unit(tmp_path):
     rng = np.random.default_rng(0)
     line = np.linspace([300.0, 0.0, 0.0], [500.0, 0.0, 0.0], 300)

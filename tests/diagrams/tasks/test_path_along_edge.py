@@ -16,6 +16,7 @@ def make(shape, law="rigid", folder=None):
     return make_path(PathParameters(shape), law, folder)
 
 
+@pytest.mark.slow(but=["elastic", "rigid"])
 @pytest.mark.parametrize("law", RELATIVE_DEGREE)
 def test_the_edge_is_as_smooth_as_the_law_needs(law):
     ball = Sphere([0.0, 0.0, 0.02], radius=0.35, latitudes_deg=[-40.0, 40.0])
@@ -30,6 +31,7 @@ def test_the_edge_is_as_smooth_as_the_law_needs(law):
     assert np.abs(np.hypot(ring_distance, height) - 0.1).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_near_tells_which_edge_is_meant():
     cut = Plane(first=[-0.5, 0.5], second=[-0.5, 0.5], origin=[0.0, 0.0, 0.06])
     for near, radius in (([0.1, 0.0, 0.0], 0.22), ([0.5, 0.0, 0.0], 0.38)):

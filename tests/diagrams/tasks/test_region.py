@@ -74,6 +74,7 @@ def test_a_paraboloid(coefficient, admissible, sign):
     assert_bounds(make(shape, admissible), surface, sign * np.sign(coefficient))
 
 
+@pytest.mark.slow(but=["below--1.0", "-1.0"])
 @pytest.mark.parametrize(("admissible", "sign"), [("above", 1.0), ("below", -1.0), ("", 1.0)])
 def test_what_is_open_has_an_upper_side(tmp_path, admissible, sign):
     """Also beyond the ends of what is extruded or turned."""
@@ -102,6 +103,7 @@ def test_what_is_open_has_an_upper_side(tmp_path, admissible, sign):
         assert_bounds(make(shape, admissible, tmp_path), surface, sign)
 
 
+@pytest.mark.slow(but="outside-1.0-False")
 @pytest.mark.parametrize(
     ("admissible", "sign", "clockwise"),
     [("inside", -1.0, False), ("outside", 1.0, True), ("outside", 1.0, False)],

@@ -197,6 +197,7 @@ def test_start_beyond_the_centre_of_curvature(load_scenario, start):
     refused(start, settings, "start.offset", "-0.06", "feasible neighbourhood")
 
 
+@pytest.mark.slow
 def test_unreachable_start(on_line, start):
     settings = on_line()
     settings.path.shape = Line([0.2, 0.0, 0.1], [0.2, 0.4, 0.1])  # inside the robot

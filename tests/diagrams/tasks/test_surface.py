@@ -255,6 +255,7 @@ def test_kinds_of_orientation_have_as_many_coordinates():
     }
 
 
+@pytest.mark.slow
 def test_a_hole_that_is_bridged_is_said(tmp_path):
     rng = np.random.default_rng(8)
     points = np.column_stack([rng.uniform(0.0, 0.3, (1500, 2)), np.zeros(1500)])

@@ -99,6 +99,7 @@ def test_starts_that_are_refused(task):
     refusal(start(pipe, position=[0.8, 0.0, 1.0]), "start")
 
 
+@pytest.mark.slow
 def test_a_start_between_two_sheets_is_refused(task, tmp_path):
     """Of a channel with straight walls 0.1 m apart; 1 mm off its middle one wall is 4 % nearer."""
     up, around = np.linspace(0.0, 0.3, 20), np.linspace(0.0, np.pi, 12)[1:-1]
@@ -118,6 +119,7 @@ def test_a_start_between_two_sheets_is_refused(task, tmp_path):
     np.testing.assert_allclose(begin.place[1], 0.15, atol=1e-9)
 
 
+@pytest.mark.slow(but="places1-theta_2")
 @pytest.mark.parametrize(
     ("places", "where"),
     [([[0.0, 0.0], [0.25, 0.0]], "theta_1"), ([[0.0, 0.0], [0.0, -0.25]], "theta_2")],

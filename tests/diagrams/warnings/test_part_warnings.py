@@ -17,6 +17,7 @@ from pfsc_drake.robot.robot_model import mass_function
 from tests.scenarios import shipped_scenario
 
 
+@pytest.mark.slow(but=["0.29", "0.31"])
 @pytest.mark.parametrize("share", [0.29, 0.31, 2.0])
 def test_an_increment_that_becomes_a_jump_of_the_torque(load_exact_scenario, share):
     """Increments by which the drive of the worst joint would be asked for a share of its torque."""

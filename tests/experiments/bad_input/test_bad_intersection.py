@@ -26,7 +26,11 @@ def shape(first, second, more=""):
             shape(FLOOR, "!Torus {origin: [0.85, 0, 0.8], ring_radius: 0.1, tube_radius: 0.03}"),
             ("path.shape.near: none given", "2 edges", "must be a point"),
         ),
-        (shape(FLOOR, FLOOR), ("path.shape.surfaces: coincide around",)),
+        pytest.param(
+            shape(FLOOR, FLOOR),
+            ("path.shape.surfaces: coincide around",),
+            marks=pytest.mark.slow,
+        ),
         (
             shape(
                 "!Plane {origin: [0.85, 0, 0.9]}",

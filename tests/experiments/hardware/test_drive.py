@@ -236,6 +236,7 @@ def test_a_reflex_ends_it():
     assert loop.drive.time == pytest.approx(0.251)
 
 
+@pytest.mark.slow
 def test_what_is_measured_is_watched():
     loop = Loop(panda()).begin().run(0.25)
     q = loop.robot.status().q

@@ -98,7 +98,7 @@ FAULTS = {
 OF_ELASTIC_JOINTS = ("controller killed", "100 ms of silence", "no number", "jump")
 
 
-@pytest.mark.slow(but="panda-wrong mode")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "fault"),
     [("panda", fault) for fault in FAULTS] + [("elastic", fault) for fault in OF_ELASTIC_JOINTS],
@@ -118,7 +118,7 @@ def test_a_fault_ends_at_rest_within_5_deg(kind, fault):
     assert 0.5 < np.rad2deg(max(farthest)) < 5.0
 
 
-@pytest.mark.slow(but="10")
+@pytest.mark.slow
 @pytest.mark.parametrize("ticks", [1, 5, 10])
 def test_what_is_bridged_is_no_fault(ticks):
     loop = moving("panda")

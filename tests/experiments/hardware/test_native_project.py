@@ -146,6 +146,7 @@ def test_forces_are_read_as_drake_reads_them(messages):
     assert not messages.decode_wrench(b"\0" + data[1:], ctypes.c_size_t(len(data)), found)
 
 
+@pytest.mark.slow(but="panda")
 @needs_gcc
 def test_the_loop_compiles_without_a_warning(bench):
     for source in ("drive.c", "recorder.c", "drive_lcm.c", "robot_weight.c"):

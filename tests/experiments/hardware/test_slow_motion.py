@@ -133,6 +133,7 @@ def fixture_chain():
     return read_arm(panda().robot, FOLDER).chain
 
 
+@pytest.mark.slow
 def test_friction_and_inertia_take_no_part(chain):
     robot = Obedient(chain)
     (q, torque), found = robot.checked(chain)
@@ -146,6 +147,7 @@ def flip(values, joint):
     return np.where(np.arange(7) == joint, -values, values)
 
 
+@pytest.mark.slow(but="2.0")
 @pytest.mark.parametrize("degrees", [2.0, -3.0])
 def test_a_zero_that_is_off(chain, degrees):
     off = np.deg2rad(degrees) * (np.arange(7) == 1)
@@ -161,6 +163,7 @@ def test_a_torque_with_the_wrong_sign(chain):
     assert verdict.startswith("most likely the torque of joint 4 has the wrong sign")
 
 
+@pytest.mark.slow
 def test_gravity_from_another_side(chain):
     upside_down = replace(chain, gravity=np.array([0.0, 0.0, 9.81]))
     _, found = Obedient(chain).checked(upside_down)

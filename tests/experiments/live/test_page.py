@@ -59,7 +59,7 @@ def boxes(browser, selector):
     return browser.evaluate(f"Array.from(document.querySelectorAll({selector!r}), {BOX})")
 
 
-@pytest.mark.slow(but="50")
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [5, 50])
 def test_all_switches_and_handles_are_seen_at_once(show, count):
     browser = show(*guided(count))

@@ -245,6 +245,7 @@ def test_a_hand_that_gained_more_than_the_tank_is_seen(rows):
     assert worst(log)["audit_bound"] < 0.0
 
 
+@pytest.mark.slow
 def test_what_a_budget_has_not_looked_at_limits_the_speed_and_is_no_alarm():
     """Six balls around the tool, two distances a tick: brute force tells how near the unseen are.
 

@@ -67,6 +67,7 @@ def test_words_for_slides(drawn_log):
     assert friction[6].get_ylabel() == "slide velocity\nin m/s"
 
 
+@pytest.mark.slow
 def test_words_for_joints(drawn_log):
     del drawn_log.signals["v_M"]
     for draw in (draw_velocities, draw_efforts, draw_friction):

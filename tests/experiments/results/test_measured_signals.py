@@ -35,6 +35,7 @@ def run(settings):
     return station, result.root, collect_log(station, result.root)
 
 
+@pytest.mark.slow
 def test_perfect_encoders_add_nothing(settings):
     _, _, log = run(settings)
     assert not [name for name in log.signals if name.endswith("_measured")]

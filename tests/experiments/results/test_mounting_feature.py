@@ -130,6 +130,7 @@ def lines(panel):
     }
 
 
+@pytest.mark.slow
 def test_the_use_case_has_the_panels_of_the_dissertation(drawn):
     panels = draw_use_case(drawn).canvas.axes
     assert [panel.get_title("left")[:3] for panel in panels] == [f"({x})" for x in "abcdefgh"]

@@ -75,6 +75,7 @@ def test_a_run_cut_short_is_judged_by_extremes_that_have_passed_their_bound():
     assert not missed_targets(found)
 
 
+@pytest.mark.slow(but=["< 1e-12-duration1-3", "> 1-duration3-0"])
 @pytest.mark.parametrize(
     ("bound", "duration", "status"),
     [

@@ -158,6 +158,7 @@ def test_the_bound_counts_what_a_hand_turns(turning):
     np.testing.assert_allclose(energy_above_bound(turning, 1.0), 1.0 + taken, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_how_it_is_turned_is_drawn(turning):
     turning.add("eta", turning["y_t"].values, "m")
     assert "led_turns" in [drawing.name for drawing in draw_figures(turning, [])]

@@ -57,7 +57,7 @@ def fault(tmp_path, capfd, mine):
     return check
 
 
-@pytest.mark.slow(but=["0", "11"])
+@pytest.mark.slow(but="11")
 @pytest.mark.parametrize("component", [0, 5, 6, 11])
 def test_nan_on_the_way(fault, component):
     failure = f"simulation.sensor_failure={{time: 0.0305, component: {component}}}"
@@ -79,6 +79,7 @@ def test_nan_on_the_way(fault, component):
     assert metrics["saturated_samples"]["value"] == 0.0
 
 
+@pytest.mark.slow
 def test_going_on_after_a_fault(mine, tmp_path, capfd):
     """The status stays 3; the log tells of both, and the arm stands in the end."""
     out = tmp_path / "out"
@@ -137,6 +138,7 @@ def test_singularity_on_the_way(fault, tmp_path):
     assert "joint 3 &#x27;motor_3&#x27; passes its limit of 80.0 deg at t = " in report
 
 
+@pytest.mark.slow
 def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
     """Drives too weak for the arm's weight: it sinks from a circle's top through its centre."""
     radius = 0.05

@@ -44,7 +44,7 @@ def place_on_path():
     return curve.derivatives(np.linspace(*curve.domain, 25_000), 0)[:, 0]
 
 
-@pytest.mark.slow(but="2")
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_held_or_said(tmp_path, capfd, place_on_path, seed):
     arguments = ["run", SCENARIO, "--out", str(tmp_path / "out"), "--no-figures", "--no-recording"]

@@ -26,7 +26,7 @@ def run(request, tmp_path_factory):
     return request.param, out, log, units
 
 
-@pytest.mark.slow(but="friction")
+@pytest.mark.slow
 def test_deviation(run):
     friction, out, log, _ = run
     late = log["t"] >= DWELL

@@ -62,6 +62,7 @@ def test_the_approach_to_the_path_waits_too(tmp_path):
     assert xi[waits] == pytest.approx(0.05, abs=2e-3) and xi[-1] < 1e-3
 
 
+@pytest.mark.slow
 def test_a_start_beside_the_path_needs_a_transition(tmp_path):
     with pytest.raises(InputError, match=r"start.transition = 0.0.*beside its path \(by 0.05"):
         _run(tmp_path, "start.offset=[0.05, 0.0]", "start.transition=0")

@@ -133,7 +133,7 @@ def test_signals_of_the_tool(three_axes, arm, law):
     np.testing.assert_allclose(result["eta"][rows, 0], eta, atol=1e-9)
 
 
-@pytest.mark.slow(but="elastic")
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["elastic", "rigid"])
 def test_orientation_of_the_tool(six_axes, six_axes_rigid, law):
     """The angles away from the path's orientation, from the logged pose and path parameter."""
@@ -197,6 +197,7 @@ def test_elastic_law_obeys_the_linear_dynamics(three_axes):
     assert np.abs(result["eta"] - result["eta_p"]).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_six_axes_obey_the_linear_dynamics(six_axes):
     coefficients = np.poly([-60.0, -60.0, -250.0, -350.0])[:0:-1]
     for signal, columns, start in (("xi", [0], 0.01), ("phi", [0, 1, 2], math.radians(1.0))):
@@ -236,6 +237,7 @@ def test_only_the_elastic_law_stays(three_axes):
     assert deviations["singular_perturbation"] > 5e-3
 
 
+@pytest.mark.slow(but="points1--1")
 @pytest.mark.parametrize(("points", "laps"), [([1.58, 1.68], 1), ([0.03, -0.07], -1)])
 def test_a_closed_path_counts_laps(three_axes, points, laps):
     length = LEMNISCATE.length  # 1.598 m

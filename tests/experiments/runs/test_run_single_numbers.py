@@ -13,7 +13,7 @@ COMMON = [
 ]
 
 
-@pytest.mark.slow(but="elastic--50-4")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "pole", "order"), [("elastic", -50, 4), ("singular_perturbation", -30, 2)]
 )

@@ -69,7 +69,7 @@ def _met(metric):
     return compare(metric["value"], float(number))
 
 
-@pytest.mark.slow(but="sfc_viscoelastic_3r-5e-06")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "bound"),
     [("sfc_viscoelastic_3r", 5e-6), ("sfc_elastic_6r", 2e-6), ("sfc_scan", 2e-6)],

@@ -50,6 +50,7 @@ def test_what_only_rises_has_no_bend():
         assert found.strength == found.rank > 0.9
 
 
+@pytest.mark.slow
 def test_chance_makes_no_bend():
     random = np.random.default_rng(5)
     found = [

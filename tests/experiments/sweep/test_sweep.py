@@ -133,9 +133,10 @@ def test_every_run_refused(address, tmp_path, capfd):
             "--workers 2: --scheduler brings its own",
         ),
         (["--vary", "duration=1,2", "--scheduler", "here"], "no Dask scheduler answers"),
-        (
+        pytest.param(
             ["--vary", "duration=1,2", "--scheduler", "tcp://127.0.0.1:1"],
             "--scheduler tcp://127.0.0.1:1: no Dask scheduler answers",
+            marks=pytest.mark.slow,
         ),
     ],
 )

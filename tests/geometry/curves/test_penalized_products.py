@@ -53,6 +53,7 @@ def test_the_penalty_is_the_energy_of_a_thin_plate():
     np.testing.assert_allclose(scaled / scaled[0], np.array(expected) / expected[0], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_cross_validation_finds_the_noise_and_nearly_the_best_penalty():
     theta, noise = places(1200), 0.01
     spline = PenalizedSpline(theta, wavy(theta) + noise * RNG.normal(size=1200), *KNOTS)

@@ -83,6 +83,7 @@ def test_corners_beyond_the_bounds_do_not_count():
     np.testing.assert_allclose(corners, [[0.05, np.sqrt(0.0275), 0.1]], rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow(but=["third1-touches the third", "third3-do not meet within their bounds, 0.2"])
 @pytest.mark.parametrize(
     ("third", "message"),
     [

@@ -66,6 +66,7 @@ CIRCLES = {
 }
 
 
+@pytest.mark.slow(but=["plane, sphere", "plane, cone", "sphere, cylinder"])
 @pytest.mark.parametrize("name", CIRCLES)
 def test_circles_are_found_as_circles(name):
     first, second, center, radius = CIRCLES[name]
@@ -109,6 +110,7 @@ def test_a_plane_along_the_axis_cuts_a_cylinder_in_two_lines():
     np.testing.assert_allclose(ends, expected, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_torus_is_cut_in_two_circles():
     edges = find_edges(floor(0.06), torus(0.3, 0.1), smoothness=3)
     radii = sorted(np.linalg.norm(edge.curve.cosine[0]) for edge in edges)
@@ -138,6 +140,7 @@ def dish_and_tube():
     return dish, cylinder(0.15, (-0.4, 0.4), Turned((0.87, 0.02, 0.85), tilted(AXIS)))
 
 
+@pytest.mark.slow(but="3-1e-06")
 @pytest.mark.parametrize(("smoothness", "tolerance"), [(2, 1e-4), (3, 1e-6), (5, 1e-8)])
 def test_a_spline_is_on_both_surfaces(smoothness, tolerance):
     """As near as asked for, along the cross product of the normals, and smooth where it closes."""
@@ -204,6 +207,7 @@ def test_edges_end_where_a_surface_does():
         assert np.abs(p[:, 2] + 0.5 * p[:, 0]).max() < 1e-6
 
 
+@pytest.mark.slow(but="1e-05")
 @pytest.mark.parametrize("beyond", [1e-3, 1e-5])
 def test_an_edge_that_leaves_for_a_moment_is_open(beyond):
     """Height 0.05 + 0.1 cos(angle) of an ellipse, and a tube that ends just below its top."""
@@ -232,6 +236,7 @@ def test_a_spline_surface_crosses_a_plane_three_times():
     assert all(np.ptp(places(edge.curve, 2)[0][:, 1]) == pytest.approx(0.3) for edge in edges)
 
 
+@pytest.mark.slow
 def test_the_edge_next_to_a_point_begins_there():
     near = np.array([-0.5, 0.2, 0.1])
     torus_cut = floor(0.06), torus(0.3, 0.1)
@@ -283,6 +288,14 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow(
+    but=[
+        "touch at \\\\[0.2, .*, .*\\\\] m",
+        "touch at \\\\[0, 0, 0.2\\\\] m",
+        "though they come as near as 0.0001 m",
+        "do not meet within their bounds, 0.2",
+    ]
+)
 @pytest.mark.parametrize("message", REFUSED)
 def test_surfaces_without_an_edge_are_refused(message):
     with pytest.raises(InputError, match=message) as caught:

@@ -33,6 +33,7 @@ def curve(request: pytest.FixtureRequest) -> Curve:
     return request.getfixturevalue(request.param)
 
 
+@pytest.mark.slow(but=["bumps", "lemniscate"])
 def test_agrees_with_quadrature(curve: Curve) -> None:
     s = ArcLength(curve)
     begin, end = curve.domain

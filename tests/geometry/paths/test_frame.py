@@ -46,6 +46,7 @@ def _reference(curve: Curve, normal: np.ndarray, per_segment: int) -> tuple[np.n
     return grid(per_segment), fine + (fine - coarse) / 15.0
 
 
+@pytest.mark.slow(but=["open_spline-600", "twisted-3000"])
 @pytest.mark.parametrize(
     ("name", "samples"),
     [("lemniscate", 3000), ("twisted", 3000), ("bumps", 800), ("open_spline", 600)],
@@ -211,6 +212,7 @@ def test_closed_spline_returns_after_a_lap() -> None:
     assert thetas[-1] == curve.period
 
 
+@pytest.mark.slow
 def test_noisy_waypoints_agree_with_an_integration_step_by_step() -> None:
     """Segments from short to long, bends as narrow as noise makes them, jumps of curvature."""
     random = np.random.default_rng(7)

@@ -53,7 +53,7 @@ def test_warm_start_finds_the_constructed_foot(
     assert result.theta == pytest.approx(theta, abs=1e-10)
 
 
-@pytest.mark.slow(but="1.0")
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_tracks_laps_and_the_crossing_without_changing_the_branch(direction: float) -> None:
     projector = Projector(LEMNISCATE)
@@ -97,6 +97,7 @@ def test_long_steps_do_not_skip_laps() -> None:
         assert result.theta == pytest.approx(2 * math.pi * lap, abs=1e-10)
 
 
+@pytest.mark.slow(but="1")
 @pytest.mark.parametrize("seed", range(4))
 def test_distance_never_grows_on_a_winding_curve(seed: int) -> None:
     rng = np.random.default_rng(seed)

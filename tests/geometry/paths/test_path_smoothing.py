@@ -38,6 +38,7 @@ def _distances(curve: Curve, points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(off - along * slope, axis=1)
 
 
+@pytest.mark.slow(but=["0.0002-0.001-5", "2e-05-0.0001-3", "0.0-1e-05-5"])
 @pytest.mark.parametrize("smoothness", [3, 5])
 @pytest.mark.parametrize(("noise", "tolerance"), [(2e-4, 1e-3), (2e-5, 1e-4), (0.0, 1e-5)])
 def test_a_noisy_circle_is_a_circle_again(smoothness: int, noise: float, tolerance: float) -> None:
@@ -60,6 +61,7 @@ def test_a_noisy_circle_is_a_circle_again(smoothness: int, noise: float, toleran
     assert theta[0] == 0.0
 
 
+@pytest.mark.slow(but=["0.0002-0.001-3", "2e-05-0.0001-5"])
 @pytest.mark.parametrize("smoothness", [3, 5])
 @pytest.mark.parametrize(("noise", "tolerance"), [(2e-4, 1e-3), (2e-5, 1e-4)])
 def test_a_noisy_wave(smoothness: int, noise: float, tolerance: float) -> None:

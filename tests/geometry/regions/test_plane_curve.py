@@ -51,7 +51,7 @@ def _encloses(corners, x, y):
     return bool(np.sum(crosses & (at > x)) % 2)
 
 
-@pytest.mark.slow(but="True-True")
+@pytest.mark.slow
 @pytest.mark.parametrize("clockwise", [False, True])
 @pytest.mark.parametrize("inside", [False, True])
 def test_an_extruded_closed_profile(clockwise, inside):

@@ -63,6 +63,7 @@ def test_distance_outside_is_that_of_a_quadratic_program(name):
     assert larger > 5
 
 
+@pytest.mark.slow(but="wedge of 20 degrees")
 @pytest.mark.parametrize("name", CORNERS)
 def test_it_is_lipschitz(name, examples):
     region = PolyhedronRegion(CORNERS[name])

@@ -167,6 +167,7 @@ def test_symbols_and_numbers_have_one_formula(name):
         assert math.isnan(region.distance(*y)[0])
 
 
+@pytest.mark.slow
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(st.floats(-9.0, 9.0), st.floats(-30.0, 3.0), st.floats(-3.0, 3.0))
 def test_the_cubic_of_a_paraboloid(curvature, exponent, height):

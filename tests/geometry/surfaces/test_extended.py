@@ -55,6 +55,17 @@ def test_within_the_domain_it_is_the_surface(pair):
         np.testing.assert_array_equal(extended.partials(theta, ORDER), _rows(surface, theta))
 
 
+@pytest.mark.slow(
+    but=[
+        "paraboloid-0-0",
+        "paraboloid-1-1",
+        "part of a cylinder-0-1",
+        "part of a cylinder-1-0",
+        "extruded-0-0",
+        "extruded-1-0",
+        "splines-0-1",
+    ]
+)
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("side", [0, 1])
 def test_it_goes_on_in_its_class(pair, axis, side):

@@ -103,7 +103,7 @@ def test_few_points_of_a_quadric_suffice():
     np.testing.assert_allclose(z, 0.3 * x**2 - 0.2 * x * y + 0.1 * y**2 + 0.05 * x, atol=1e-7)
 
 
-@pytest.mark.slow(but="0.00035")
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [3.5e-4, 1e-3])
 def test_no_point_is_missed_by_more_than_the_tolerance(tolerance, scanned):
     fit = fit_scattered(workpiece(), ScatteredFitOptions(tolerance=tolerance))
@@ -119,7 +119,7 @@ def roughness(surface):
     return float(np.mean(surface.partials(theta, 4)[:, 10:] ** 2))
 
 
-@pytest.mark.slow(but=["2.0", "6.283185307179586"])
+@pytest.mark.slow(but="6.283185307179586")
 @pytest.mark.parametrize("span", [2.0, 4.0, 2.0 * np.pi])
 def test_what_bends_over_is_seen_from_its_axis(span):
     fit = fit_scattered(tube(span))
@@ -205,7 +205,7 @@ def changed(row, value):
     ("points", "options", "reason"),
     [
         (sheets(0.05, 4000), {}, "folds over: on a plane two sheets lie over each other near"),
-        (sheets(0.008), {}, "single sheet"),
+        pytest.param(sheets(0.008), {}, "single sheet", marks=pytest.mark.slow),
         (tube(6.0), {"base": "plane"}, "folds over: on a plane"),
         (sphere(), {}, "do not determine the surface|leans over|folds over"),
         (np.linspace(0.0, 1.0, 200)[:, None] * [1.0, 0.5, 0.2], {}, "along one line"),

@@ -40,6 +40,7 @@ def _loop():
     return extruded_surface(interpolate(points, smoothness=4), (0.0, 1.0, 0.0), 0.2)
 
 
+@pytest.mark.slow(but=["ring of eights", "covered twice", "eight", "loop"])
 @pytest.mark.parametrize(
     "surface",
     [
@@ -56,6 +57,7 @@ def test_surfaces_that_meet_themselves(surface):
         check_single_sheet(surface)
 
 
+@pytest.mark.slow(but=["spiral", "torus", "slit tube", "cone", "tube", "plane", "sphere"])
 @pytest.mark.parametrize(
     "surface",
     [

@@ -47,6 +47,7 @@ def torques_of_drake(file, motion):
     return np.array(found)
 
 
+@pytest.mark.slow(but="comau")
 @pytest.mark.parametrize("name", ROBOTS)
 def test_is_loaded_with_the_same_parameters(name, request, tmp_path):
     subject = request.getfixturevalue(name)
@@ -159,6 +160,7 @@ def test_a_scenario_believes_what_was_identified(name, identified, comau):
     np.testing.assert_array_equal(believed.gather("stiffness"), own.gather("stiffness"))
 
 
+@pytest.mark.slow
 def test_a_scenario_takes_the_written_robot(identified):
     file = find_scenario("pfc_comau_6r")
     scenario = load_file(Scenario, file)

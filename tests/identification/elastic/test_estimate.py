@@ -64,6 +64,7 @@ def test_without_noise_all_is_found(locked):
     assert ("viscous" in found.parameters) is not locked
 
 
+@pytest.mark.slow(but="True")
 @pytest.mark.parametrize("locked", [True, False])
 def test_deviations_are_those_stated(locked):
     """Over many runs the squared errors in units of the covariance follow chi-squared."""

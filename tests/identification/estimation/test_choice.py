@@ -58,6 +58,7 @@ def test_coloured_noise_is_no_friction(comau, data):
         assert choose_friction(comau.regressor, comau.base, *motions).model.terms == ()
 
 
+@pytest.mark.slow
 def test_stribeck_is_found(comau, data):
     motion, other = data(stribeck)
     choice = choose_friction(comau.regressor, comau.base, motion, other)
@@ -72,6 +73,7 @@ def test_stribeck_is_found(comau, data):
     assert plain.variance_factor > result.variance_factor
 
 
+@pytest.mark.slow
 def test_friction_of_another_day(comau, measure, other_trajectory):
     """10 % more in all joints is no other form, and hides none."""
     other = other_trajectory.motion(other_trajectory.sample_times(100.0))
@@ -83,6 +85,7 @@ def test_friction_of_another_day(comau, measure, other_trajectory):
         assert [term.kind for term in choice.model.terms] == kinds
 
 
+@pytest.mark.slow
 def test_asymmetry_is_found(comau, data):
     choice = choose_friction(comau.regressor, comau.base, *data(two_directions))
     assert {(term.joint, term.kind) for term in choice.model.terms} == {(2, "offset"), (3, "slant")}

@@ -90,6 +90,7 @@ def test_signs_of_several_torques_are_named(arm, sound):
     assert "below zero" in found.negative
 
 
+@pytest.mark.slow(but=["signals0-pair0", "signals1-pair1", "signals2-pair2"])
 @pytest.mark.parametrize("pair", list(combinations(range(JOINTS), 2)))
 @pytest.mark.parametrize("signals", [("q",), ("tau",), ("q", "tau")])
 def test_exchanged_joints_are_named(arm, sound, pair, signals):
@@ -197,7 +198,7 @@ def test_noise_is_no_mistake(comau, measure, seed, options):
     assert find_mistake(comau.regressor, comau.base, measure(seed, **options)) is None
 
 
-@pytest.mark.slow(but="payload")
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["offset", "stribeck", "quadratic", "ripple", "payload"])
 def test_what_a_model_lacks_is_no_mistake_of_signals(comau, measure, kind):
     q, v, _ = comau.motion

@@ -103,6 +103,7 @@ CRANE = """\
 """
 
 
+@pytest.mark.slow
 def test_model_file_with_a_slide_and_no_shapes(tmp_path):
     file = tmp_path / "crane.urdf"
     file.write_text(CRANE)
@@ -131,6 +132,17 @@ def test_progress(found_and_told):
     assert "1 of 2 starts, best log det" in told[1][1]
 
 
+@pytest.mark.slow(
+    but=[
+        "change0-criterion = 'E'; must be one of D, condition",
+        "change1-starts = 0",
+        "change3-period = 0.0 s",
+        "change4-harmonics",
+        "change6-nowhere.yaml",
+        "change7-no joint 'elbow'",
+        "change9-hardest to keep is the height of the flange",
+    ]
+)
 @pytest.mark.parametrize(
     ("change", "says"),
     [

@@ -13,6 +13,7 @@ def best():
     return FourierTrajectory.load(shipped_excitation(name="excitation_optimal"))
 
 
+@pytest.mark.slow
 def test_shipped_excitation_keeps_all_and_beats_the_printed_one(
     comau, regressor, base, best, verified
 ):
@@ -34,6 +35,7 @@ def test_other_shipped_excitations(name, limits, verified):
     assert verified(subject, motion, limits).problems == []
 
 
+@pytest.mark.slow
 def test_shipped_excitation_between_samples(comau, comau_scene, comau_cell, best):
     t = np.random.default_rng(4).uniform(0.0, best.period, 400)
     q, v, a = best.motion(t)

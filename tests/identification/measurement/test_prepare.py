@@ -158,6 +158,17 @@ def test_the_file_without_fault(lines, regressor, tmp_path):
     np.testing.assert_allclose(again.tau, motion.tau, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow(
+    but=[
+        "late torques",
+        "late velocities",
+        "another period",
+        "no period",
+        "turned velocity",
+        "a column twice",
+        "velocity in deg/s",
+    ]
+)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_named(lines, regressor, tmp_path, fault):
     spoil, message = FAULTS[fault]

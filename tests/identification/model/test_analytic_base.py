@@ -89,6 +89,18 @@ def test_any_arm_of_turning_joints(twists, gravity):
     )
 
 
+@pytest.mark.slow(
+    but=[
+        "0-twists0",
+        "1-twists1",
+        "2-twists2",
+        "3-twists0",
+        "4-twists1",
+        "5-twists2",
+        "6-twists0",
+        "7-twists1",
+    ]
+)
 @pytest.mark.parametrize("twists", [[0, 90, 0, -90], [0, 0, 90, 90], [0, 40, -65, 20]])
 @pytest.mark.parametrize("seed", range(8))
 def test_rotors_wherever_they_sit(twists, seed):

@@ -57,6 +57,7 @@ def test_inverse_dynamics_is_lagranges(ours, lagrange, q, v, a):
         assert close(mine, expected)
 
 
+@pytest.mark.slow
 @given(travel, rates)
 def test_mass_matrix_and_coriolis_matrix_are_consistent(ours, lagrange, q, v):
     """D is positive definite; v'(D' - 2 C)v = 0 although C v alone is known."""

@@ -131,6 +131,16 @@ def fitted_inverse_dynamics(q, v, a) -> np.ndarray:
     return tau
 
 
+@pytest.mark.slow(
+    but=[
+        "0-comau_racer_1_4",
+        "1-comau_racer_1_4_elastic",
+        "2-comau_racer_1_4_3r",
+        "0-comau_racer_1_4_elastic_3r",
+        "1-franka_emika_panda",
+        "2-franka_emika_panda_elastic",
+    ]
+)
 @pytest.mark.parametrize("name", VARIANTS)
 @pytest.mark.parametrize("seed", range(3))
 def test_kinematics_are_those_of_the_dh_table(name, seed):
@@ -219,6 +229,13 @@ def test_flexible_joints_have_springs_dampers_and_no_limits(name):
         assert np.isinf(spring.joint().position_upper_limit())
 
 
+@pytest.mark.slow(
+    but=[
+        "0-comau_racer_1_4_elastic_3r",
+        "1-comau_racer_1_4_elastic",
+        "2-franka_emika_panda_elastic",
+    ]
+)
 @pytest.mark.parametrize("elastic", ELASTIC)
 @pytest.mark.parametrize("seed", range(3))
 def test_elastic_plant_obeys_the_equations_of_elastic_joints(elastic, seed):

@@ -203,6 +203,7 @@ def test_dynamics_match_drake(robot):
         assert np.allclose(torque.squeeze(), expected, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow(but=["with sliding joints", "one axis"])
 def test_higher_orders_are_time_derivatives(robot):
     """Torque and pose jets of order 4 against differentiation along a polynomial motion."""
     _, _, chain, _ = robot

@@ -215,6 +215,15 @@ def test_energy_is_dissipated():
     assert np.min(np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x))) > -stored
 
 
+@pytest.mark.slow(
+    but=[
+        "runge_kutta3-0.06-3.75",
+        "runge_kutta3-25.0-101.7",
+        "runge_kutta3-1.0-8.0",
+        "runge_kutta5-0.17-2.7",
+        "runge_kutta5-5.0-101.7",
+    ]
+)
 @pytest.mark.parametrize(
     ("inertia", "coulomb"), [(0.06, 3.75), (0.17, 2.7), (5.0, 101.7), (25.0, 101.7), (1.0, 8.0)]
 )

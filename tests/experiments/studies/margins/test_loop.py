@@ -94,7 +94,7 @@ def differences(loop, section, chosen):
     return np.column_stack(columns)
 
 
-@pytest.mark.slow(but="pfc_elastic_3r-overrides3")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [

@@ -35,7 +35,7 @@ def started(name, *overrides):
     return settings, folder, StationLoop(without_error(settings), folder)
 
 
-@pytest.mark.slow(but="pfc_viscoelastic_3r")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_a_parametric_loop_is_the_one_built_for_a_belief(name):
     settings, folder, walked = started(name, *LOOPS[name])

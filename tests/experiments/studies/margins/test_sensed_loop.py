@@ -84,6 +84,7 @@ def linear_modes(loop, section, differences) -> Modes:
     return modes(linear.A, loop.map.period)
 
 
+@pytest.mark.slow
 def test_a_heavy_payload_below_the_sensor_makes_a_light_admittance_chatter(light):
     """In the run the drives jump between their limits at 185 Hz."""
     loop, section = light

@@ -35,6 +35,7 @@ def stuck():
         return stuck_drives(at_rest(), SCENARIO_DIRECTORY, 6, lambda _: None)
 
 
+@pytest.mark.slow
 def test_a_disturbance_grows_as_it_is_said(stuck):
     settings = at_rest()
     settings.controller.friction.hold_at_rest = False
