@@ -75,7 +75,10 @@ class ControlledRobot:
     @property
     def logged_states(self) -> dict[str, OutputPort]:
         """Signal ``joint_state``, and ``joint_state_measured`` if the law takes another one."""
-        states, own = {"joint_state": self.true_state}, self.signals["joint_state"]
+        own, actual = self.signals["joint_state"], self.true_state
+        if isinstance(self.part, RemoteArm):  # nothing else is known of the links' side
+            actual = self.signals["found_state"]
+        states = {"joint_state": actual}
         if self.measured is self.true_state and not self.controller.estimates_state:
             return states
         return states | {"joint_state_measured": own}

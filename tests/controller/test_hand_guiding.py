@@ -85,7 +85,7 @@ def test_a_hand_feels_the_mass_and_damping_that_are_given(law, model):
     tool.pull(force)
     tool.run(time)
     assert tool.fault() == Fault.NONE
-    rate, lag = DAMPING / MASS, tool.follower.followed.guided.lead.lag
+    rate, lag = DAMPING / MASS, tool.follower.followed.lead.lag
     later = time - lag - 1.5e-3
     way = force / DAMPING * (later - (1.0 - np.exp(-rate * later)) / rate)
     moved = tool.pose().translation() - start.translation()
@@ -202,7 +202,7 @@ def test_servos_are_told_velocities_along_the_pull():
     follower = add_guidance(
         builder, plant, "tool_point", [], "velocity_servo", start=START, options=options
     )
-    assert follower.followed.guided.lead.lag == pytest.approx(0.006)
+    assert follower.followed.lead.lag == pytest.approx(0.006)
     stepper = follower.stepper()
     for _ in range(2):
         told = stepper.step(plant_state=follower.start_state, wrench=[30.0, 0, 0, 0, 0, 0])

@@ -64,3 +64,11 @@ def test_held_or_said(tmp_path, capfd, place_on_path, seed):
         assert ("the tool was up to" in told.out) == (far > BEARABLE)
     else:
         assert told.err.startswith("fault: ")
+
+
+@pytest.mark.parametrize(("judged_after", "status"), [("0.048", 3), ("0.049", 0)])
+def test_a_run_is_judged_if_it_lasts(three_axes, judged_after, status):
+    """However many of its samples are measured afterwards, each at a time of its own."""
+    bound = "targets={elastic: {rms_path_deviation: {bound: '< 1e-12'}}}"
+    run = three_axes(f"judged_after={judged_after}", bound, duration="0.047")
+    assert run.status == status

@@ -1,7 +1,6 @@
 """The last moments before a plate is mounted, through the command line."""
 
 import json
-import re
 
 import h5py
 import numpy as np
@@ -82,15 +81,3 @@ def test_the_operator_does_one_thing_after_the_other(log):
     phase = log["phase"][:, 0]
     assert np.all(np.diff(phase) >= 0)
     assert set(phase) >= {1, 2, 3, 4}  # lead, align, insert, release
-
-
-@pytest.mark.slow
-def test_the_recording_tells_what_the_operator_does(log, out):
-    page = (out / "recording.html").read_text(encoding="utf-8")
-    stages = json.loads(re.search(r"stages = (\[.*?\]), MOVE", page)[1])
-    with h5py.File(out / "log.h5") as file:
-        names = [str(name) for name in file["phase"].attrs["labels"]]
-    begins = np.flatnonzero(np.diff(log["phase"][:, 0], prepend=-1))
-    assert [stage["name"] for stage in stages] == [names[int(log["phase"][k, 0])] for k in begins]
-    assert [stage["time"] for stage in stages] == [pytest.approx(log["t"][k]) for k in begins]
-    assert "insert" in [stage["name"] for stage in stages]
