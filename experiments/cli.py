@@ -17,6 +17,7 @@ from typing import Annotated
 import typer
 
 from experiments.hardware_commands import drive_command, lead_command, robot_command
+from experiments.init_command import init_command
 from experiments.run_commands import (
     compare_command,
     list_command,
@@ -32,24 +33,35 @@ from experiments.study_commands import (
     study_command,
     teach_command,
 )
+from identification.cli import app as identification_app
 from reporting.provenance import version_line
 from reporting.terminal import grouped, run_app
 
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "list": list_command,
-    "schema": schema_command,
-    "run": run_command,
-    "live": live_command,
-    "compare": compare_command,
-    "sweep": sweep_command,
-    "study": study_command,
-    "teach": teach_command,
-    "margins": margins_command,
-    "export": export_command,
-    "replay": replay_command,
-    "robot": robot_command,
-    "drive": drive_command,
-    "lead": lead_command,
+# by panel of the help: command and example
+_COMMANDS: dict[str, dict[str, tuple[Callable[..., None], str]]] = {
+    "First steps": {
+        "init": (init_command, "my_arm.urdf teach_in.csv --out mine.yaml"),
+        "list": (list_command, ""),
+        "run": (run_command, "pfc_elastic_6r --set controller.law=rigid"),
+        "live": (live_command, "operator_hand_6r"),
+        "compare": (compare_command, "out/mine out/mine_off"),
+        "schema": (schema_command, "> scenario.schema.json"),
+    },
+    "Robustness": {
+        "margins": (margins_command, "pfc_elastic_6r"),
+        "sweep": (sweep_command, "pfc_elastic_6r --set model_error.mass=0.9:1.1:5"),
+        "study": (study_command, "robustness"),
+    },
+    "Robots": {
+        "robot": (robot_command, "pfc_panda_7r"),
+        "drive": (drive_command, "pfc_panda_7r --out out/driven"),
+        "lead": (lead_command, "teleop_path"),
+        "export": (export_command, "pfc_elastic_6r --out controller"),
+        "replay": (replay_command, "controller out/pfc_elastic_6r/log.h5"),
+    },
+    "Data": {
+        "teach": (teach_command, "out/operator_hand_6r"),
+    },
 }
 
 
@@ -63,11 +75,15 @@ def make_app(*, completion: bool = False) -> typer.Typer:
     app = typer.Typer(
         add_completion=completion,
         pretty_exceptions_enable=False,
+        rich_markup_mode="markdown",
         help="Path and surface following experiments, from scenario files to reports.",
     )
     app.callback()(_root)
-    for name, command in _COMMANDS.items():
-        app.command(name)(grouped(command))
+    for panel, commands in _COMMANDS.items():
+        for name, (command, example) in commands.items():
+            epilog = f"Example: `pfsc {name} {example}".rstrip() + "`"
+            app.command(name, rich_help_panel=panel, epilog=epilog)(grouped(command))
+    app.add_typer(identification_app, name="identify", rich_help_panel="Data")
     return app
 
 

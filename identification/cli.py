@@ -40,6 +40,7 @@ MOST_RUNS = 1000  # of an experiment
 app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
     help="From a robot to its model: excitation, experiment, estimation, consistency.",
 )
 

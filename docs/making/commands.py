@@ -11,10 +11,10 @@ import experiments.cli
 import identification.cli
 from docs.making.text import as_markdown, table
 
-# what is asked for exit status, and the commands
+# by program: prefix of labels, module that documents the exit status, commands
 _PROGRAMS = {
-    "experiments": (experiments.cli, experiments.cli.app),
-    "identification": (identification.cli, identification.cli.app),
+    "pfsc": ("experiments", experiments.cli, experiments.cli.app),
+    "pfsc identify": ("identification", identification.cli, identification.cli.app),
 }
 _TYPES = {Path: "PATH", float: "NUMBER", int: "INTEGER"}
 _HEAD = ["Argument or option", "Default", "Meaning"]
@@ -23,14 +23,15 @@ _HEAD = ["Argument or option", "Default", "Meaning"]
 def command_line() -> str:
     """Return every command of both programs, with its arguments and options, as Markdown."""
     page = []
-    for program, (module, app) in _PROGRAMS.items():
+    for program, (label, module, app) in _PROGRAMS.items():
         group: Any = typer.main.get_command(app)
-        page += [f"## `python -m {program}`", _said(group.help)]
+        page += [f"## `{program}`", _said(group.help)]
         page.append(as_markdown(_status(inspect.getdoc(module) or "")))
         rows = [_row(parameter) for parameter in group.params if parameter.name == "version"]
         page += [table(_HEAD, rows, "options")] if rows else []
         for name, command in group.commands.items():
-            page += _section(program, name, command)
+            if f"{program} {name}" not in _PROGRAMS:
+                page += _section(program, f"{label}-{name}", name, command)
     return "\n\n".join(page)
 
 
@@ -39,11 +40,12 @@ def _status(text: str) -> str:
     return next((part for part in text.split("\n\n") if part.startswith("Exit status")), "")
 
 
-def _section(program: str, name: str, command: Any) -> list[str]:
+def _section(program: str, label: str, name: str, command: Any) -> list[str]:
     shown = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
     needed = [p.name.upper() for p in shown if p.param_type_name == "argument" and p.required]
-    words = " ".join(["python -m", program, name, *needed])
-    parts = [f"({program}-{name})=", f"### `{name}`", _said(command.help), f"`{words}`"]
+    words = " ".join([program, name, *needed])
+    parts = [f"({label})=", f"### `{name}`", _said(command.help), f"`{words}`"]
+    parts += [_said(command.epilog)] if command.epilog else []
     rows = [_row(parameter) for parameter in shown]
     return [*parts, table(_HEAD, rows, "options")] if rows else parts
 

@@ -4,18 +4,20 @@ import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 from rich.console import Console
 
-from identification.elastic.estimate import JointEstimate
 from identification.options import Robot, Wording, read_number
 from identification.output import check_folder, make_folder, write_text
-from reporting.page import Table
 from reporting.progress import fraction_display
 from reporting.terminal import interruptible
+
+if TYPE_CHECKING:
+    from identification.elastic.estimate import JointEstimate
+    from reporting.page import Table
 
 
 def elastic_command(
@@ -107,7 +109,7 @@ def parameter_unit(parameter: str, joint_unit: str) -> str:
     return _UNITS[parameter][joint_unit != "rad"]
 
 
-def table_rows(estimates: Sequence[JointEstimate]) -> list[tuple[str, str, float, float, str]]:
+def table_rows(estimates: Sequence["JointEstimate"]) -> list[tuple[str, str, float, float, str]]:
     """Return joint, parameter, value, standard deviation and unit, line by line."""
     return [
         (e.name, name, e.value(name), e.deviation(name), parameter_unit(name, e.unit))
@@ -116,12 +118,14 @@ def table_rows(estimates: Sequence[JointEstimate]) -> list[tuple[str, str, float
     ]
 
 
-def joint_table(estimates: Sequence[JointEstimate]) -> Table:
+def joint_table(estimates: Sequence["JointEstimate"]) -> "Table":
     """Return the parameters of joints with their standard deviations.
 
     Args:
         estimates: Estimates of the joints.
     """
+    from reporting.page import Table
+
     rows: list[list[str | float]] = [
         [joint, name, value, deviation, 100.0 * deviation / abs(value) if value else np.inf, unit]
         for joint, name, value, deviation, unit in table_rows(estimates)
@@ -130,7 +134,7 @@ def joint_table(estimates: Sequence[JointEstimate]) -> Table:
     return Table("Elastic joints", "On the joint side.", head, rows)
 
 
-def write_table(path: str | Path, estimates: Sequence[JointEstimate]) -> None:
+def write_table(path: str | Path, estimates: Sequence["JointEstimate"]) -> None:
     """Write the parameters of joints with their standard deviations as CSV.
 
     Args:

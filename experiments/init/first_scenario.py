@@ -1,0 +1,219 @@
+"""A first scenario for a user's own robot and points, tried before it is written."""
+
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from diagrams.robots.model import is_delta
+from experiments.finished_run import RunOutcome
+from experiments.init.arm_choice import ArmChoice, Ask
+from experiments.init.points_choice import PointsChoice
+from experiments.init.scenario_text import ScenarioText
+from experiments.preparation import prepare
+from experiments.scenario_file import SCENARIO_DIRECTORY, ScenarioFile
+from experiments.simulated_run import RunOptions, run_scenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.reading import parse_yaml
+from reporting.progress import ProgressListener
+
+BANDWIDTH = 20.0  # 1/s, of all coordinates
+_FASTEST, _LEAST_TIME = 0.2, 4.0  # m/s, and s for the whole path
+_TRIALS = 3  # each at half the speed of the one before
+
+
+@dataclass(frozen=True)
+class InitOptions:
+    """What a user has chosen already; empty for a choice of the program.
+
+    Attributes:
+        tool_frame: Frame of the model that follows the points.
+        law: Law of the controller.
+        unit: Unit of the points.
+        orientation: ``down``, ``forward``, ``up`` or ``free``.
+        base_position: Position of the robot's base in the world [m], three numbers or none.
+    """
+
+    tool_frame: str = ""
+    law: str = ""
+    unit: str = ""
+    orientation: str = ""
+    base_position: tuple[float, ...] = ()
+
+
+class FirstScenario:
+    """A first scenario.
+
+    Args:
+        model: Name of a shipped model, or a URDF, SDF or MJCF file.
+        points: CSV file of points.
+        out: YAML file that is to be written.
+        options: Choices of the user.
+        ask: Returns one of several names, the first being the default.
+
+    Attributes:
+        choices: Key, value and reason of each choice.
+        outcome: Outcome of the trial run, once it has been tried.
+
+    Raises:
+        InputError: If model or points cannot be read, or do not suit each other.
+    """
+
+    def __init__(self, model: str, points: str, out: Path, options: InitOptions, ask: Ask) -> None:
+        if is_delta(model):
+            raise InputError(f"{model}: a DELTA robot; allowed: the model of a serial arm")
+        self._out, self._options, self._model = out, options, model
+        self._arm = ArmChoice(model, options.tool_frame, options.law, ask)
+        chain = self._arm.arm.chain
+        base = chain.links[0].p_PF + np.array(options.base_position or (0.0, 0.0, 0.0))
+        self._points = PointsChoice(points, options.unit, base, chain.reach)
+        self._speed = float(f"{min(_FASTEST, self._points.length / _LEAST_TIME):.1g}")
+        self._orientation: tuple[Mapping[str, object], str] = ({}, "")
+        self.outcome: RunOutcome | None = None
+
+    def find(self, progress: ProgressListener) -> None:
+        """Find an orientation with which it can start, and a speed at which it completes.
+
+        Args:
+            progress: Receives the simulated time and the name of the step.
+
+        Raises:
+            InputError: If there is none.
+        """
+        dimension, refused = self._arm.arm.chain.dimension, []
+        for orientation in self._points.orientations(dimension, self._options.orientation):
+            self._orientation = orientation
+            try:
+                prepare(self._file(), None, recording=False, progress=progress)
+            except InputError as error:
+                refused.append(str(error))
+            else:
+                break
+        else:
+            # what is said of a posture that was reached tells more
+            refused.sort(key=lambda message: "unreachable" in message)
+            raise InputError(
+                f"{self._points.file}: {refused[0].removeprefix(f'{self._out}: ')}; "
+                "--base-position, --unit, --orientation and --tool-frame choose otherwise"
+            )
+        reason = ""
+        for _ in range(_TRIALS):
+            self.outcome = outcome = self._try(progress)
+            reason = outcome.fault or "; ".join(outcome.broken)
+            if not reason:
+                return
+            self._speed = float(f"{self._speed / 2.0:.1g}")
+        raise InputError(
+            f"{self._points.file}: the trial run does not complete: {reason}; allowed: points that "
+            "the arm can follow; --orientation and --tool-frame choose otherwise"
+        )
+
+    def _try(self, progress: ProgressListener) -> RunOutcome:
+        with tempfile.TemporaryDirectory() as folder:
+            return run_scenario(
+                self._file(),
+                out=Path(folder) / "trial",
+                options=RunOptions(figures=False, recording=False),
+                progress=progress,
+            )
+
+    def _file(self) -> ScenarioFile:
+        return ScenarioFile(self._out, parse_yaml(self.text(), str(self._out)))
+
+    def _relative(self, file: str) -> str:
+        """Return a file as the scenario names it, which looks from its own folder."""
+        if not Path(file).suffix or file.startswith("package://"):
+            return file
+        return os.path.relpath(Path(file).expanduser().resolve(), self._out.resolve().parent)
+
+    @property
+    def choices(self) -> list[tuple[str, str, str]]:
+        """Key, value and reason of each choice."""
+        arm, points = self._arm, self._points
+        rows = [("robot.tool_frame", arm.tool_frame, arm.reasons.get("tool_frame", "as requested"))]
+        if arm.fixed_joints:
+            names = ", ".join(arm.fixed_joints)
+            rows.append(("robot.fixed_joints", names, arm.reasons["fixed_joints"]))
+        rows.append(("controller.law", arm.law, arm.reasons.get("law", "as requested")))
+        unit_reason = points.reasons.get(
+            "unit", "as requested" if self._options.unit else "the points are within reach"
+        )
+        rows.append(("path.shape.unit", points.unit, unit_reason))
+        if points.is_closed:
+            rows.append(("path.shape.closed", "true", points.reasons["closed"]))
+        if points.corner_distance:
+            corner = f"{points.corner_distance:g} m", points.reasons["corner_distance"]
+            rows.append(("path.shape.corner_distance", *corner))
+        setting, reason = self._orientation
+        shown = yaml.safe_dump(dict(setting), default_flow_style=True, width=1000).strip()
+        rows.append(("path.orientation", shown if setting else "of the file", reason))
+        rows.append(
+            ("reference.velocity", f"{self._speed:g} m/s", f"{points.length:.4g} m of path")
+        )
+        return rows
+
+    def measured(self) -> list[str]:
+        """Return lines on the trial run: its time and its deviations."""
+        metrics = {} if self.outcome is None else self.outcome.metrics
+        found = [
+            f"{name} {metrics[name].value:.3g} {metrics[name].unit}"
+            for name in ("max_path_deviation", "max_orientation_error", "max_torque_share")
+            if name in metrics
+        ]
+        return [f"trial run completed: {', '.join(found)}"] if found else []
+
+    def text(self) -> str:
+        """Return the text of the scenario."""
+        arm, points, options = self._arm, self._points, self._options
+        reasons = {key: reason for key, _, reason in self.choices}
+        schema = os.path.relpath(
+            SCENARIO_DIRECTORY / "scenario.schema.json", self._out.resolve().parent
+        )
+        text = ScenarioText(f"yaml-language-server: $schema={schema}")
+        text.add(0, "name", self._out.stem)
+        text.add(0, "robot")
+        text.add(1, "model", self._relative(self._model))
+        text.add(1, "tool_frame", arm.tool_frame, reasons["robot.tool_frame"])
+        if arm.fixed_joints:
+            text.add(1, "fixed_joints", arm.fixed_joints, reasons["robot.fixed_joints"])
+        if options.base_position:
+            text.add(1, "base_pose", {"position": list(options.base_position)})
+        text.add(0, "path")
+        shape: dict[str, object] = {"file": self._relative(points.file)}
+        shape |= {"unit": points.unit} if points.unit != "m" else {}
+        shape |= {"closed": True} if points.is_closed else {}
+        if points.corner_distance:
+            shape["corner_distance"] = points.corner_distance
+        text.add(1, "shape", shape, "; ".join(points.reasons.values()), tag="!Waypoints")
+        setting, reason = self._orientation
+        if setting:
+            text.add(1, "orientation", dict(setting), reason)
+        text.add(0, "controller")
+        text.add(1, "law", arm.law, reasons["controller.law"])
+        text.add(1, "gains")
+        text.add(2, arm.law)
+        gains = {"poles": "auto", "bandwidth": BANDWIDTH}
+        for coordinates, words in (("eta", "along"), ("xi", "across"), ("phi", "orientation")):
+            if coordinates != "phi" or setting.get("task") != "none":
+                text.add(3, coordinates, gains, f"{words}, 1/s")
+        text.add(0, "reference")
+        text.add(1, "points", [0, "end"], "arc lengths along the path, m")
+        text.add(1, "velocity", self._speed, "m/s")
+        text.add(1, "acceleration", float(f"{4.0 * self._speed:.2g}"), "m/s^2")
+        return str(text)
+
+    def write(self) -> None:
+        """Write the file.
+
+        Raises:
+            InputError: If it exists.
+        """
+        try:
+            with self._out.open("x") as file:
+                file.write(self.text())
+        except FileExistsError:
+            raise InputError(f"{self._out}: exists; allowed: a new file, --out FILE.yaml") from None

@@ -1,0 +1,120 @@
+"""Choices about a file of points: unit, closed or open, orientation."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import read_waypoints
+from pfsc_drake.geometry.files.number_table import UNITS, metres
+
+# orientations of the tool in the world [deg] about z, y, x, where the file has none
+POINTING = {
+    "down": [0.0, 0.0, 180.0],
+    "forward": [0.0, 90.0, 0.0],
+    "up": [0.0, 0.0, 0.0],
+}
+FREE = "free"
+_CLOSED = 1e-6  # of the length
+_SMALLEST = 0.01  # of the reach
+_SPARSE = 8  # points, below which a spline through them is no smooth path
+_LONGEST_BLEND = 0.02  # m
+
+
+class PointsChoice:
+    """Points that a tool is to follow.
+
+    Args:
+        file: CSV file, see :func:`~pfsc_drake.geometry.paths.waypoints.read_waypoints`.
+        unit: Unit of its positions; empty to choose it.
+        base: Position of the first joint [m], shape (3,).
+        reach: Largest distance of the tool from there [m].
+
+    Attributes:
+        unit: Unit of its positions.
+        length: Length of the polygon through the points [m].
+        is_closed: Whether the last point is the first one.
+        corner_distance: Distance from the corners at which straight lines are blended [m]; 0 for
+            a spline through all points.
+        has_orientation: Whether it has columns of orientation.
+        reasons: A phrase on each choice, by ``unit``, ``closed`` and ``corner_distance``.
+
+    Raises:
+        InputError: If the file cannot be read, or no unit puts the points into reach.
+    """
+
+    def __init__(self, file: str, unit: str, base: np.ndarray, reach: float) -> None:
+        self.file, self.reasons = file, dict[str, str]()
+        if unit and unit not in UNITS:
+            raise InputError(f"--unit {unit}: allowed: {', '.join(UNITS)}")
+        table = read_waypoints(Path(file))
+        farthest = {
+            name: float(np.linalg.norm(metres(name) * table.positions - base, axis=1).max())
+            for name in UNITS
+        }
+        size = float(np.ptp(table.positions, axis=0).max())
+        self.unit = unit or self._choose_unit(farthest, size, reach)
+        if not unit and self.unit != "m":
+            self.reasons["unit"] = (
+                f"in m the points would be up to {farthest['m']:.4g} m away; the robot reaches "
+                f"{reach:.4g} m"
+            )
+        positions = metres(self.unit) * table.positions
+        edges = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+        self.length, self.corner_distance = float(edges.sum()), 0.0
+        if 2 < len(positions) < _SPARSE:
+            self.corner_distance = float(f"{min(_LONGEST_BLEND, 0.3 * edges.min()):.1g}")
+            self.reasons["corner_distance"] = (
+                f"{len(positions)} points: straight lines with rounded corners"
+            )
+        gap = float(np.linalg.norm(positions[-1] - positions[0]))
+        self.is_closed = len(positions) > 3 and gap <= _CLOSED * self.length
+        if self.is_closed:
+            self.reasons["closed"] = "the last point is the first one"
+        self.has_orientation = table.quaternions is not None
+        self.yaw_alone = table.yaw_alone
+
+    def _choose_unit(self, farthest: dict[str, float], size: float, reach: float) -> str:
+        """Return m if all points are within reach then, else mm if the path is not tiny then."""
+        if farthest["m"] <= reach:
+            return "m"
+        if farthest["mm"] <= reach and metres("mm") * size >= _SMALLEST * reach:
+            return "mm"
+        raise InputError(
+            f"{self.file}: the points are up to {farthest['m']:.4g} m from the robot's first "
+            f"joint, or {farthest['mm']:.4g} m if they are in mm; the robot reaches {reach:.4g} m; "
+            "allowed: points within reach; --base-position X,Y,Z places the robot, --unit names "
+            "another unit"
+        )
+
+    def orientations(self, joints: int, chosen: str) -> list[tuple[dict[str, object], str]]:
+        """Return settings of ``path.orientation`` to try in turn, and a phrase on each.
+
+        Args:
+            joints: Number of joints.
+            chosen: ``down``, ``forward``, ``up`` or ``free``; empty to try one after the other.
+
+        Raises:
+            InputError: If the choice contradicts the file.
+        """
+        if chosen and chosen not in (*POINTING, FREE):
+            raise InputError(f"--orientation {chosen}: allowed: {', '.join((*POINTING, FREE))}")
+        if chosen in POINTING and self.has_orientation and not self.yaw_alone:
+            raise InputError(
+                f"--orientation {chosen}: {self.file} has columns of orientation; allowed: "
+                f"{FREE}, or none of it"
+            )
+        free: tuple[dict[str, object], str] = {"task": "none"}, "the position alone is followed"
+        if joints <= 3 or chosen == FREE:
+            return [free]
+        task = {4: "yaw", 5: "tool_axis"}.get(joints, "full")
+        words = {"yaw": "the turn about the vertical", "tool_axis": "the tool's z axis"}
+        followed = f"{joints} joints follow {words.get(task, 'the whole orientation')}"
+        own: dict[str, object] = {} if task == "full" else {"task": task}
+        if self.has_orientation and not self.yaw_alone:
+            return [(own, f"the file has it; {followed}")]
+        found = [
+            (own | {"keyframes": [{"angles_deg": POINTING[name]}]}, f"z axis {name}; {followed}")
+            for name in ([chosen] if chosen else POINTING)
+        ]
+        return found if chosen or self.yaw_alone else [*found, free]
