@@ -7,8 +7,8 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.controlled_robot import add_controlled_robot
-from diagrams.drawing.held_look import HeldLook
-from diagrams.drawing.mounting_look import MountingLook
+from diagrams.drawing.mounting_drawing import MountingDrawing
+from diagrams.drawing.moving_workpiece_drawing import MovingWorkpieceDrawing
 from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import Playback
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
@@ -58,12 +58,12 @@ def build_station(
 
     Args:
         scenario: The scenario.
-        folder: Where the scenario's relative file names start.
+        folder: Base folder of relative file names.
         progress: Receives the fraction done and the name of the step, where that takes its time.
-        like: The same but for the nominal model and the integration, if it has been built: its
-            task and its start are taken.
-        with_slope: Whether a workpiece that is pressed on is a spring, with the stiffness that
-            contact has there, and the plant continuous.
+        like: Station that differs in the nominal model and the integration only, if it has been
+            built: its task and its start are taken.
+        with_slope: Whether a workpiece that is pressed on is a spring with the stiffness of the
+            contact, and the plant continuous.
         parametric: Whether mass and stiffness parameters of the nominal model, a serial chain,
             are symbols: such a station is not simulated, but its blocks' networks differentiated.
         remote: Whether the robot is in another process: the station has a
@@ -71,7 +71,7 @@ def build_station(
             an environment, see :func:`~diagrams.scenario.schema.driven`.
 
     Returns:
-        The station; everything in the scenario that can be wrong has been checked.
+        The station; all input of the scenario has been checked.
 
     Raises:
         InputError: If the scenario cannot be built.
@@ -88,14 +88,14 @@ def build_station(
         require(False, "robot.model", scenario.robot.model, allowed)
     if parametric:
         assert isinstance(part, Arm)
-        part = replace(part, belief=part.belief.with_symbols())
+        part = replace(part, nominal_model=part.nominal_model.with_symbols())
     check_joints(scenario, task, part.robot.dimension)
     carrier = _add_carrier(builder, chosen, task, like)
     frame = None if carrier is None else carrier.frame
     start = (
         find_start(scenario.start, task, part, workpiece, mounting, frame)
         if like is None
-        else like.controlled.begun
+        else like.controlled.initial_conditions
     )
     chosen.check(task)
     placed = part, task, task.manifold, chosen.outside, start[0]
@@ -129,7 +129,7 @@ def _add_carrier(
     task: Task,
     like: Station | None,
 ) -> Holder | Turntable | None:
-    """Add the robot or the turntable that carries the workpiece, if one does."""
+    """Add the robot or the turntable that carries the workpiece, if there is one."""
     scenario = chosen.scenario
     if scenario.holder is not None:
         order, built = task.manifold.layout.order, None if like is None else like.holder
@@ -150,7 +150,7 @@ def _options(
     scenario = chosen.scenario
     remote, extensions = isinstance(part, RemoteArm), list[Extension]()
     if scenario.needs_sensor:
-        load, sensor = part.believed_load(scenario.sensor.joint), scenario.sensor
+        load, sensor = part.nominal_load(scenario.sensor.joint), scenario.sensor
         extensions.append(SensedForce(load, sensor.measurement_range, sensor))
         if around.mounting is not None:
             extensions.append(payload_of(around.mounting, part.gravity))
@@ -177,11 +177,11 @@ def _options(
 
 
 def draw_station(settings: Scenario, folder: FilePath, station: Station) -> RobotDrawing | None:
-    """Read what a station's robot looks like, or return None if that is known without files.
+    """Read the visual geometry of a station's robot; return None if it needs no files.
 
     Args:
-        settings: The scenario that is to be run.
-        folder: Where its relative file names start.
+        settings: The scenario.
+        folder: Base folder of relative file names.
         station: Its station.
     """
     if not isinstance(station.part, Arm):
@@ -204,26 +204,26 @@ def build_station_replay(
     motion: RecordedMotion,
     meshcat: Meshcat,
 ) -> Diagram:
-    """Return a diagram that draws a station's recorded motion while its time advances.
+    """Return a diagram that replays a station's recorded motion.
 
     Args:
         settings: The scenario that was run.
         station: Its station.
-        drawing: What its robot looks like, from :func:`draw_station`.
-        motion: What to draw.
-        meshcat: Where to draw.
+        drawing: Drawing of its robot, from :func:`draw_station`.
+        motion: The recorded motion.
+        meshcat: Meshcat instance to draw in.
     """
     playback = Playback(motion, meshcat, settings.simulation.frame_period)
     drawn = drawing_of(station.task)
-    look = None
+    workpiece = None
     if station.workpiece is not None:
-        look = station.workpiece.look(station.part.gravity)
+        workpiece = station.workpiece.drawing(station.part.gravity)
     if isinstance(station.part, DeltaPart):
-        return playback.build_delta(station.part.robot, drawn, look)
-    assert drawing is not None  # draw_station knows every other robot
-    plates = None if station.mounting is None else MountingLook(station.mounting)
-    held = None
+        return playback.build_delta(station.part.robot, drawn, workpiece)
+    assert drawing is not None  # draw_station draws every other robot
+    plates = None if station.mounting is None else MountingDrawing(station.mounting)
+    moving = None
     carrier = settings.holder or settings.turntable
     if carrier is not None:
-        held = HeldLook(carrier.workpiece, drawing.holder)
-    return playback.build(drawing, drawn, look, plates, held)
+        moving = MovingWorkpieceDrawing(carrier.workpiece, drawing.holder)
+    return playback.build(drawing, drawn, workpiece, plates, moving)

@@ -9,10 +9,10 @@ import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from diagrams.oscillation import oscillation_before
-from diagrams.robots.belief import believed_robot
 from diagrams.robots.joint_state import add_joint_state, add_torque_sensor, check_sides
+from diagrams.robots.nominal_model import nominal_robot
 from diagrams.robots.part import RobotPart
-from diagrams.robots.plant_friction import believed_friction
+from diagrams.robots.plant_friction import nominal_friction
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.signal_log import SignalLog
@@ -20,7 +20,7 @@ from diagrams.station_options import StationOptions
 from diagrams.station_warnings import controller_warnings
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.controller.controller import Controller
-from pfsc_drake.controller.fault_description import FoundFault
+from pfsc_drake.controller.fault_description import FaultReport
 from pfsc_drake.controller.options.follower_options import FollowerOptions
 from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
@@ -36,13 +36,13 @@ class ControlledRobot:
     """A robot with its controller.
 
     Attributes:
-        scenario: What is chosen of it.
+        scenario: Its scenario.
         part: The robot.
         controller: Its controller.
         start: Start of its tool.
         initial_state: State of its model at the start.
-        true_state: The true ``[q_J, v_J, q_M, v_M]``.
-        measured: The same as measured.
+        true_state: Actual ``[q_J, v_J, q_M, v_M]``.
+        measured: Measured ``[q_J, v_J, q_M, v_M]``.
     """
 
     scenario: Scenario
@@ -59,7 +59,7 @@ class ControlledRobot:
         return self.controller.task
 
     @property
-    def begun(self) -> tuple[StartPoint, np.ndarray]:
+    def initial_conditions(self) -> tuple[StartPoint, np.ndarray]:
         """Start of the tool, and state of the robot's model there."""
         return self.start, self.initial_state
 
@@ -74,7 +74,7 @@ class ControlledRobot:
 
     @property
     def logged_states(self) -> dict[str, OutputPort]:
-        """Signal ``joint_state``, and ``joint_state_measured`` if the law takes another one."""
+        """Signal ``joint_state``, and ``joint_state_measured`` if the law receives another one."""
         own, actual = self.signals["joint_state"], self.true_state
         if isinstance(self.part, RemoteArm):  # nothing else is known of the links' side
             actual = self.signals["found_state"]
@@ -90,32 +90,32 @@ class ControlledRobot:
 
     @cached_property
     def access(self) -> ControllerAccess:
-        """Faults and commands of the controller, fused with others or not."""
+        """Faults and commands of the controller, its blocks fused or not."""
         return self.controller.access
 
     def set_start(self, blocks: BlockAccess, root: Context) -> None:
-        """Put the robot at its start.
+        """Set the start of robot and projector.
 
         Args:
             blocks: Blocks of the diagram.
             root: Context of the diagram.
         """
-        self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), self.initial_state)
-        self.set_place(blocks, root, self.start.place)
+        self.part.set_state(self.part.plant.GetMyMutableContextFromRoot(root), self.initial_state)
+        self.set_projection(blocks, root, self.start.projection)
 
-    def set_place(self, blocks: BlockAccess, root: Context, place: np.ndarray) -> None:
-        """Choose the position on the manifold, on which branch of it, where the tool is.
+    def set_projection(self, blocks: BlockAccess, root: Context, projection: np.ndarray) -> None:
+        """Set the projection of the tool onto the manifold, which selects the branch.
 
         Args:
             blocks: Blocks of the diagram.
             root: Context of the diagram.
-            place: As the projector remembers it.
+            projection: State of the projector.
         """
         name = self.controller.get_name()
-        blocks.set_state(root, f"{name}.{self.task.projector_name}.place", place)
+        blocks.set_state(root, f"{name}.{self.task.projector_name}.projection", projection)
 
-    def found_fault(self, log: SignalLog, blocks: BlockAccess, root: Context) -> FoundFault | None:
-        """Return the cause of a stop by the controller, if there is one.
+    def found_fault(self, log: SignalLog, blocks: BlockAccess, root: Context) -> FaultReport | None:
+        """Return the cause of a stop by the controller, or None.
 
         Args:
             log: Log of its signals.
@@ -137,8 +137,8 @@ class ControlledRobot:
         signal: str,
         column: int,
         suspects: np.ndarray | None = None,
-    ) -> FoundFault:
-        """Return a sentence on a fault, and when it came.
+    ) -> FaultReport:
+        """Return a sentence on a fault, and its time.
 
         Args:
             fault: The fault.
@@ -147,22 +147,22 @@ class ControlledRobot:
             root: Context of the diagram.
             signal: Logged signal with the fault.
             column: Its column.
-            suspects: Implausible components of the joint state; those of the controller if omitted.
+            suspects: Implausible components of the joint state; by default the controller's.
         """
         now, before = log.first_instant(blocks, root, signal, column)
         if suspects is None:
             suspects = self.access.suspects(blocks, root)
         oscillating = oscillation_before(now.time, log, root, self.controller.law)
         sentence = self.controller.describe_fault(fault, now, before, suspects, oscillating)
-        return FoundFault(sentence, now.time)
+        return FaultReport(sentence, now.time)
 
     def warnings(self) -> list[str]:
-        """Return doubts about the robot and its controller, one sentence each."""
+        """Return warnings about the robot and its controller, one sentence each."""
         plan, scenario, controller = self.task.drive_plan, self.scenario, self.controller
         return [
             *self.task.warnings,
             *scenario.model_error.warnings,
-            *([] if plan is None else plan.said),
+            *([] if plan is None else plan.messages),
             *self.part.start_warnings(scenario.start, self.start_posture, self.start.target),
             *controller_warnings(scenario, self.part, controller),
         ]
@@ -187,20 +187,20 @@ def add_controlled_robot(
         task: Task of its tool.
         start: Start of the tool, and state of the robot's model there.
         options: Options of the controller.
-        like: The same but for the model or the integration, if it has been built.
+        like: Robot that differs in the model or the integration only, if it has been built.
 
     Raises:
         InputError: If the controller cannot be built.
     """
-    believed, scenario, period = part.belief.robot, chosen.scenario, chosen.period
+    nominal, scenario, period = part.nominal_model.robot, chosen.scenario, chosen.period
     remote, parameters = isinstance(part, RemoteArm), scenario.controller
-    friction = believed_friction(part, parameters.friction.believed, chosen.friction)
+    friction = nominal_friction(part, parameters.friction.believed, chosen.friction)
     if not remote:
-        check_sides(believed, parameters, scenario.encoders)
+        check_sides(nominal, parameters, scenario.encoders)
     with naming_reference():
         controller = Controller(
             task,
-            believed_robot(believed, scenario.encoders, period, friction),
+            nominal_robot(nominal, scenario.encoders, period, friction),
             options,
             start[0],
             (part.coordinates.link_rows @ start[1])[: part.robot.dimension],

@@ -1,4 +1,4 @@
-"""The controllers of a station as one network, from what is measured to the drives."""
+"""The controllers of a station as one network, from measured signals to drive commands."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,8 +13,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import network_of
 
-# outputs of the controller in C, beside the commands to the drives; and of a robot that holds the
-# workpiece
+# outputs of the controller in C, beside the commands to the drives; and those of a workpiece robot
 _OUTPUTS, _OF_HOLDER = ("manifold_state", "status", "fault", "reference"), ("fault",)
 
 
@@ -24,13 +23,13 @@ class ControllerPart:
 
     Attributes:
         network: Their network; inputs and outputs are named as the controllers' ports, those of a
-            robot that holds the workpiece with the prefix ``holder_``.
+            workpiece robot with the prefix ``holder_``.
         period: Sampling time [s].
         inputs: Ports of the station's controllers with the network's inputs, by name.
-        outputs: The same of its outputs: ``drive_torque`` or ``velocity_reference``,
-            ``manifold_state``, ``status``, ``fault``, ``reference``; where another robot holds
-            the workpiece ``holder_drive_torque`` and ``holder_fault``; then standard deviations,
-            where links are found without encoders on them.
+        outputs: Ports with the network's outputs, by name: ``drive_torque`` or
+            ``velocity_reference``, ``manifold_state``, ``status``, ``fault``, ``reference``; with a
+            workpiece robot ``holder_drive_torque`` and ``holder_fault``; then standard deviations
+            of a link state that is estimated.
     """
 
     network: Network
@@ -85,12 +84,12 @@ def controller_part(station: Station) -> ControllerPart:
     for key, (controller, name) in chosen.items():
         wiring.outputs[key] = controller.get_name(), name
         outputs[key] = controller.GetOutputPort(name)
-    network = wiring.network().restricted(list(chosen))
+    network = wiring.network().subnetwork(list(chosen))
     return ControllerPart(network, own.period, {n: inputs[n] for n in network.inputs}, outputs)
 
 
 def _refuse_others(system: System) -> None:
-    """Refuse systems that are no blocks in a controller."""
+    """Refuse a controller with systems that are no blocks."""
     if isinstance(system, BlockSystem):
         return
     if not isinstance(system, Diagram):

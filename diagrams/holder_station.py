@@ -27,8 +27,8 @@ from pfsc_drake.control.estimation.reaction import Reaction
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
-from pfsc_drake.controller.carrier import CarriedFrame, Derivatives, MeasuredReaction
-from pfsc_drake.controller.fault_description import FoundFault
+from pfsc_drake.controller.carrier import Derivatives, MeasuredReaction, WorkpieceFrame
+from pfsc_drake.controller.fault_description import FaultReport
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.robot_model import pose_function
@@ -44,8 +44,8 @@ class PrefixingBuilder(DiagramBuilder):
     """Builder that adds systems to another builder, a prefix before their names.
 
     Args:
-        builder: The builder that the systems stand in.
-        prefix: What the names begin with.
+        builder: Builder that receives the systems.
+        prefix: Beginning of their names.
     """
 
     def __init__(self, builder: DiagramBuilder, prefix: str) -> None:
@@ -67,7 +67,7 @@ class Holder:
 
     Attributes:
         robot: The robot, whose tool frame is the workpiece's, with its controller.
-        parameters: What the scenario says of it.
+        parameters: Its parameters in the scenario.
         signals: Signals for the log, by names with the prefix.
         reaction: Reaction of the process on the workpiece, its inputs open, if there is one.
     """
@@ -97,8 +97,8 @@ class Holder:
         """Planned motion of the workpiece over time."""
         return self.robot.controller.planned_frame(_placement(self.parameters))
 
-    def found_fault(self, log: SignalLog, blocks: BlockAccess, root: Context) -> FoundFault | None:
-        """Return the cause of a stop by the controller, if there is one.
+    def found_fault(self, log: SignalLog, blocks: BlockAccess, root: Context) -> FaultReport | None:
+        """Return the cause of a stop by the controller, or None.
 
         Args:
             log: Log of the station.
@@ -106,10 +106,10 @@ class Holder:
             root: Context of the diagram.
         """
         found = self.robot.found_fault(log.of(HOLDER), blocks, root)
-        return found and FoundFault(f"{_WHO}: {found.sentence}", found.time)
+        return found and FaultReport(f"{_WHO}: {found.sentence}", found.time)
 
     def warnings(self) -> list[str]:
-        """Return doubts about the robot and its controller, one sentence each."""
+        """Return warnings about the robot and its controller, one sentence each."""
         return [f"{_WHO}: {line}" for line in self.robot.warnings()]
 
 
@@ -125,9 +125,9 @@ def add_holder(
 
     Args:
         builder: Builder of the diagram.
-        station: Options of the station, with a holder.
-        order: Relative degree of the other robot's law, for which the motion is needed.
-        like: The same but for the integration, if it has been built.
+        station: Options of the station, whose scenario has such a robot.
+        order: Relative degree of the other robot's law, which needs the motion.
+        like: Robot that differs in the integration only, if it has been built.
 
     Raises:
         InputError: If it cannot be built, or does not suit the other robot.
@@ -137,18 +137,18 @@ def add_holder(
     assert holder is not None
     chosen = StationOptions(own, folder)
     model = scenario.robot.model
-    require(not is_delta(model), "robot.model", model, "a serial arm where there is a holder")
+    require(not is_delta(model), "robot.model", model, "a serial arm, with a workpiece robot")
     named, before = PrefixingBuilder(builder, HOLDER), None if like is None else like.robot
     period, reacts = scenario.controller.sampling_time, bool(scenario.forces)
     with naming_holder():
         _check(holder, period, order)
         task = make_task(own, folder, station.progress) if before is None else before.task
-        part = add_arm(named, chosen.belief_source.holding(holder.workpiece))
+        part = add_arm(named, chosen.nominal_model_source.holding(holder.workpiece))
         check_joints(own, task, part.robot.dimension)
-        start = find_start(own.start, task, part) if before is None else before.begun
+        start = find_start(own.start, task, part) if before is None else before.initial_conditions
         senses = reacts and own.controller.external_torque.source == "measured"
         derivatives = cast(Derivatives, holder.derivatives)
-        frame = CarriedFrame(order, derivatives, holder.highest, _placement(holder))
+        frame = WorkpieceFrame(order, derivatives, holder.highest, _placement(holder))
         options = dc.replace(
             chosen.follower,
             carries=True,
@@ -176,12 +176,12 @@ def add_holder(
 def _add_reaction(
     builder: DiagramBuilder, part: Arm, true_state: OutputPort, period: float
 ) -> tuple[BlockSystem, OutputPort]:
-    """Let a robot bear the process on the workpiece that it holds.
+    """Apply the reaction of the process to the robot that holds the workpiece.
 
     Args:
         builder: Builder of the diagram.
         part: The robot, whose tool frame is the workpiece's.
-        true_state: Its true ``[q_J, v_J, q_M, v_M]``.
+        true_state: Its actual ``[q_J, v_J, q_M, v_M]``.
         period: Sampling time [s].
 
     Returns:
@@ -192,12 +192,12 @@ def _add_reaction(
     builder.Connect(true_state, view.GetInputPort("joint_state"))
     reaction = builder.AddNamedSystem("process_reaction", BlockSystem(Reaction(), period))
     builder.Connect(view.GetOutputPort("tool_pose"), reaction.GetInputPort("workpiece_pose"))
-    # both robots bear the same over a sample
+    # held over a sample, so that the same wrench acts on both robots
     hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
     builder.Connect(reaction.GetOutputPort("reaction"), hold.GetInputPort("value"))
-    held = hold.GetOutputPort("held")
-    part.connect_wrench(builder, held, true_state)
-    return reaction, held
+    wrench = hold.GetOutputPort("held")
+    part.connect_wrench(builder, wrench, true_state)
+    return reaction, wrench
 
 
 @contextmanager
@@ -213,7 +213,7 @@ def naming_holder() -> Iterator[None]:
 
 
 def _alone(own: Scenario) -> Scenario:
-    """Return the scenario of a robot that holds, for warnings: it has no force sensor itself."""
+    """Return the scenario of a workpiece robot, for warnings: it has no force sensor itself."""
     torque = own.controller.external_torque
     if torque.source != "measured":
         return own
@@ -222,9 +222,9 @@ def _alone(own: Scenario) -> Scenario:
 
 
 def _check(holder: HolderParameters, period: float, order: int) -> None:
-    """Refuse a robot that cannot hold the workpiece for another one."""
+    """Refuse a workpiece robot that does not suit the other robot."""
     model, own, law = holder.robot.model, holder.controller.sampling_time, holder.controller.law
-    require(not is_delta(model), "robot.model", model, "a serial arm, which turns what it holds")
+    require(not is_delta(model), "robot.model", model, "a serial arm, which turns the workpiece")
     holder.workpiece.check()
     allowed = f"a law of relative degree {order} or more, as the other robot's is"
     require(RELATIVE_DEGREE[law] >= order, "controller.law", law, allowed)

@@ -1,4 +1,4 @@
-"""Explicit integration schemes: what they cost, and which steps they stay stable with."""
+"""Explicit integration schemes: cost, and steps with which they are stable."""
 
 from dataclasses import dataclass, replace
 
@@ -16,19 +16,19 @@ STABILITY = {
 }
 # modes become faster by up to this factor where the posture changes
 _MARGIN = 1.25
-# 1/s, growth of an oscillation by the integration alone that any loop can bear
+# 1/s, growth of an oscillation by the integration alone that every loop tolerates
 _GROWTH = 0.1
 _DIFFERENCE = 1e-6  # of a state variable, for derivatives
 
 
 @dataclass(frozen=True)
 class Integration:
-    """How a station is integrated, and why.
+    """Integration scheme and step of a station, with the reason for the choice.
 
     Attributes:
         scheme: Drake's name of the scheme.
         step: Its fixed, or with error control its largest step [s].
-        reason: Why, for the report.
+        reason: Reason for the choice, for the report.
     """
 
     scheme: str
@@ -43,15 +43,15 @@ class Integration:
         """Return simulation parameters that name this scheme and step.
 
         Args:
-            parameters: What else is wanted.
+            parameters: The other parameters.
         """
         return replace(parameters, integrator=self.scheme, max_step=self.step)
 
 
 def is_stable(scheme: str, step: float, modes: np.ndarray) -> bool:
-    """Return whether a scheme lets no mode grow that would not grow by itself.
+    """Return whether the numerical solution grows only where the exact one does.
 
-    Modes that are faster by a quarter must not grow either, since they depend on the posture.
+    Modes that are faster by a quarter are checked too, since they depend on the posture.
 
     Args:
         scheme: One of ``STABILITY``.
@@ -68,9 +68,9 @@ def is_stable(scheme: str, step: float, modes: np.ndarray) -> bool:
 
 
 def continuous_modes(diagram: Diagram, root: Context) -> np.ndarray:
-    """Return the eigenvalues of what a diagram integrates, linearized [1/s].
+    """Return the eigenvalues of a diagram's linearized continuous dynamics [1/s].
 
-    Whatever is sampled is held, as it is between two ticks.
+    Sampled signals are held constant.
 
     Args:
         diagram: The diagram.

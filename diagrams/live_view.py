@@ -8,6 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, InputPort
 
+from diagrams.drawing.legend import TOOL_COLOR
 from diagrams.drawing.replay import arrange_scene, body_origins, camera_and_target
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.delta import DeltaPart
@@ -17,22 +18,21 @@ from diagrams.tasks.task_drawing import drawing_of
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, RobotVisualizer
 from pfsc_drake.systems.drawing.tool_visualizer import ForceArrows, ToolVisualizer, TrailVisualizer
 
-_WAY = Rgba(0.9, 0.25, 0.1, 1.0)
-_PIECES = 400  # of the tool's way that stay
+_PIECES = 400  # of the tool's trail that stay
 _TARGET, _TARGET_RADIUS, _HAND = "hand_target", 0.012, Rgba(0.95, 0.65, 0.05, 1.0)  # m
 
 
 @dataclass(frozen=True)
 class LiveFrame:
-    """What there is to see of a station at an instant.
+    """Visible state of a station at an instant.
 
     Attributes:
         positions: Positions of the plant that is drawn, shape (nq,).
         tool_pose: ``[y_t, R_e]``, shape (12,).
         manifold_point: The manifold next to the tool, shape (layout.size,).
         force: Between hand and robot, world axes [N], shape (3,), see :func:`felt_force`.
-        target: Where a hand that holds the tool wants it to be [m], shape (3,), if one does.
-        led: Where a hand that is far away has the tool [m], shape (3,), if it is.
+        target: Target of the hand that guides the tool [m], shape (3,), if there is one.
+        commanded: Point commanded by the leader device [m], shape (3,), in a teleoperation.
     """
 
     positions: np.ndarray
@@ -40,35 +40,34 @@ class LiveFrame:
     manifold_point: np.ndarray
     force: np.ndarray
     target: np.ndarray | None = None
-    led: np.ndarray | None = None
+    commanded: np.ndarray | None = None
 
     @property
     def hand(self) -> np.ndarray:
-        """Where the hand is, in the world of the tool [m], shape (3,)."""
-        return self.tool_pose[:3] if self.led is None else self.led
+        """Position of the hand, in the world of the tool [m], shape (3,)."""
+        return self.tool_pose[:3] if self.commanded is None else self.commanded
 
 
 def felt_force(signals: dict[str, np.ndarray]) -> np.ndarray:
-    """Return the force on the tool, or what a hand feels that is far away, shape (3,) [N].
+    """Return the force on the tool, or the force rendered by a leader device, shape (3,) [N].
 
     Args:
-        signals: Values now, by signal, as of :meth:`SignalLog.now`.
+        signals: Current values by signal, from :meth:`SignalLog.now`.
     """
     return signals["leader_motor"] if "leader_motor" in signals else signals["wrench_ext"][:3]
 
 
 class LiveView:
-    """Draws a station frame by frame.
+    """View of a station, drawn frame by frame.
 
-    It is a diagram of its own: what is simulated does not know who looks at it, and the time in
-    here counts frames.
+    It is a diagram of its own, independent of the simulated one; its time counts frames.
 
     Args:
         station: The station.
-        drawing: What its robot looks like, if that had to be read.
+        drawing: Drawing of its robot, if that is read from files.
         first: The first frame.
-        meshcat: Where to draw.
-        largest_force: Whose arrow is the longest [N].
+        meshcat: Meshcat instance to draw in.
+        largest_force: Force with the longest arrow [N].
     """
 
     def __init__(
@@ -82,14 +81,13 @@ class LiveView:
         builder, self._ports = DiagramBuilder(), dict[str, int]()
         self._frames, self._meshcat = 0, meshcat
         meshcat.SetObject(_TARGET, Sphere(_TARGET_RADIUS), _HAND)
-        # the time in here counts frames
-        period = 1.0
+        period = 1.0  # the time counts frames
         self._export(
             builder, "manifold_point", drawing_of(station.task).add(builder, meshcat, period)
         )
-        trail = TrailVisualizer("path_following", _WAY, meshcat, period, longest=_PIECES)
+        trail = TrailVisualizer("path_following", TOOL_COLOR, meshcat, period, longest=_PIECES)
         builder.AddNamedSystem("trail", trail)
-        self._export(builder, "way", trail.GetInputPort("point"))
+        self._export(builder, "trail_point", trail.GetInputPort("point"))
         arrows = builder.AddNamedSystem(
             "arrows", ForceArrows(1, largest_force, meshcat, period, "tool_force")
         )
@@ -107,9 +105,9 @@ class LiveView:
 
         Args:
             frame: The frame.
-            interrupted: Whether the tool's way does not lead there from the last one.
+            interrupted: Whether the tool's trail is interrupted between the last one and this one.
         """
-        # what is remembered of the last frame is remembered when time leaves it
+        # states are updated when time leaves the last frame
         self._simulator.AdvanceTo(self._frames + 0.5)
         self._fix(frame, interrupted=interrupted)
         self._frames += 1
@@ -128,7 +126,7 @@ class LiveView:
             "tool_pose": frame.tool_pose,
             "manifold_point": frame.manifold_point,
             "tool_point": tool_point,
-            "way": np.full(3, np.nan) if interrupted else tool_point,
+            "trail_point": np.full(3, np.nan) if interrupted else tool_point,
             "force": frame.force,
         }
         diagram, root = self._simulator.get_system(), self._simulator.get_mutable_context()
@@ -147,7 +145,7 @@ class LiveView:
         meshcat: Meshcat,
         period: float,
     ) -> None:
-        """Add the robot, and look at it."""
+        """Add the robot, and aim the camera at it."""
         outline = np.concatenate(drawing_of(station.task).outline())
         if isinstance(station.part, DeltaPart):
             delta = DeltaVisualizer(station.part.robot, meshcat, period)
@@ -155,7 +153,7 @@ class LiveView:
             self._export(builder, "positions", delta.GetInputPort("slide_positions"))
             arrange_scene(outline[:, 2], meshcat)
             return
-        assert drawing is not None  # every other robot is read
+        assert drawing is not None  # of every other robot
         robot = RobotVisualizer(drawing.plant, drawing.parts, meshcat, period)
         builder.AddNamedSystem("robot", robot)
         self._export(builder, "positions", robot.GetInputPort("positions"))
@@ -165,10 +163,10 @@ class LiveView:
     def _add_workpiece(
         self, builder: DiagramBuilder, station: Station, meshcat: Meshcat, period: float
     ) -> None:
-        """Add what the tool may touch, if anything."""
+        """Add the workpiece, if there is one."""
         if station.workpiece is None:
             return
-        look = station.workpiece.look(station.part.gravity)
-        draw_workpiece(look, meshcat)
-        tool = builder.AddNamedSystem("tool", ToolVisualizer(look.tool_parts, meshcat, period))
+        workpiece = station.workpiece.drawing(station.part.gravity)
+        draw_workpiece(workpiece, meshcat)
+        tool = builder.AddNamedSystem("tool", ToolVisualizer(workpiece.tool_parts, meshcat, period))
         self._export(builder, "tool_pose", tool.GetInputPort("tool_pose"))

@@ -2,8 +2,7 @@
 
 A controlled robot is continuous between its ticks and jumps at them. From right after one tick to
 right after the next its state obeys a smooth map as long as nothing switches. The state of this map
-is everything that the diagram remembers: the plant's motion, what is held for it, filters,
-observers, the controller's memory.
+is the state of the whole diagram: plant, holds, filters, observers, controller.
 """
 
 from collections.abc import Callable
@@ -12,23 +11,23 @@ import numpy as np
 from pydrake.systems.analysis import InitializeParams, Simulator
 from pydrake.systems.framework import Context, Diagram, System
 
-# s, by which the section lies behind the tick, so that the tick is not made again
+# s, by which the section lies behind the tick, so that the tick is not repeated
 _BEHIND = 1e-9
 
 
 class OnePeriodMap:
     """A diagram's state right after a tick as a function of its state after the tick before.
 
-    Variables are numbered through: the continuous state, then all discrete states. What a diagram
-    remembers beside (abstract state) stays as it is at the section.
+    Variables are numbered through: the continuous state, then all discrete states. Abstract states
+    keep their values of the section.
 
     Args:
         diagram: The diagram.
-        period: Sampling time [s], of which every other in the diagram is a whole fraction.
-        configure: Tells a simulator how to integrate.
+        period: Sampling time [s]; every other one in the diagram is a whole fraction of it.
+        configure: Configures the integrator of a simulator.
 
     Attributes:
-        context: Where the map arrived last.
+        context: Context of the diagram after the last evaluation.
         size: Number of variables.
         num_continuous: Number of continuous ones among them, which stand first.
     """
@@ -51,7 +50,7 @@ class OnePeriodMap:
         self.num_continuous = sizes[0]
 
     def rows(self, system: System) -> np.ndarray:
-        """Return where a system's continuous and discrete state stand among the variables.
+        """Return the indices of a system's continuous and discrete state among the variables.
 
         Args:
             system: A system of the diagram.
@@ -94,7 +93,7 @@ class OnePeriodMap:
         return self.pass_tick()
 
     def pass_tick(self) -> np.ndarray:
-        """Make the tick that was approached; return the variables after it, shape (size,)."""
+        """Execute the tick that was approached; return the variables after it, shape (size,)."""
         self._simulator.AdvancePendingEvents()
         return self.variables(self.context)
 
@@ -108,10 +107,10 @@ class OnePeriodMap:
         return (round(section.get_time() / self.period) + 1) * self.period
 
     def approach(self, section: Context, x: np.ndarray | None = None) -> None:
-        """Go to the next tick, which is not made yet.
+        """Advance to the next tick, without executing it.
 
-        What watches differences between ticks finds there what it finds in a run; right after a
-        tick it would compare a state with itself.
+        A block that monitors differences between ticks finds the values of a run there; right after
+        a tick it would compare a state with itself.
 
         Args:
             section: Context right after a tick; unchanged.
@@ -127,9 +126,9 @@ class OnePeriodMap:
         self._simulator.AdvanceTo(self.next_tick(section))
 
     def as_sampled(self) -> Context:
-        """Return the context at the tick that was approached, as what samples finds it.
+        """Return the context at the tick that was approached, as sampling blocks find it.
 
-        A discrete plant, which remembers contact beside its state, has made its step then.
+        A discrete plant, which has an abstract state for contact, has made its step then.
         """
         if not self.context.num_abstract_states():
             return self.context

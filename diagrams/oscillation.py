@@ -1,4 +1,4 @@
-"""Oscillation of drive commands: what an unstable loop shows before anything else does."""
+"""Oscillation of drive commands, the first sign of an unstable loop."""
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -6,16 +6,16 @@ from pydrake.systems.framework import Context
 from diagrams.signal_log import SignalLog
 from pfsc_drake.control.law.following_law import FollowingLaw
 
-# s, over which commands are looked at
+# s, over which commands are examined
 WINDOW = 0.1
-# of a drive's limit, by which its command must swing, and how often within the window
+# least amplitude as a share of the drive's limit, and least number of swings within the window
 _SHARE, _SWINGS = 0.25, 8
 
 
 def oscillating_drives(commands: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """Return the drives whose commands swing to and fro, by index.
+    """Return the drives whose commands oscillate, by index.
 
-    One oscillates if its command goes up and down, in turns, by a quarter of its limit or more
+    A drive oscillates if its command goes up and down, in turns, by a quarter of its limit or more
     each time, eight times or more.
 
     Args:
@@ -41,11 +41,11 @@ def _swings(values: np.ndarray, least: float) -> int:
 
 
 def oscillation_before(time: float, log: SignalLog, root: Context, law: FollowingLaw) -> np.ndarray:
-    """Return the drives whose commands swung to and fro before an instant, by index.
+    """Return the drives whose commands oscillated before an instant, by index.
 
     Args:
         time: The instant [s].
-        log: Log with what the law told its drives.
+        log: Log with the commands to the drives.
         root: Context of the diagram.
         law: The law.
     """

@@ -1,8 +1,8 @@
 """The derivative of the map of one sampling period of a whole diagram.
 
-That of blocks is taken from their expressions, exactly. What is no block, above all the plant, is
-differentiated by central differences, while what the blocks put out is held. Both are joined where
-they are wired. So nothing of the controller is modelled a second time.
+Blocks are differentiated exactly, by their expressions. The other systems, above all the plant, are
+differentiated by central differences with the outputs of the blocks held. Both derivatives are
+joined along the wires, so that no part of the controller is modelled twice.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ from pfsc_drake.systems.block_system import BlockSystem, is_tick, last_tick
 
 # relative to a variable, or absolute if that is larger
 _DIFFERENCE = 1e-6
-# the same of what is put out: a plant answers almost linearly, and by little within an interval
+# the same for outputs: a plant answers almost linearly, and by little within an interval
 _DIFFERENCE_OF_OUTPUTS = 1e-2
 # part of a central difference by which the two one-sided ones may differ; more is a switch
 _BEND = 0.05
@@ -28,18 +28,18 @@ _ROUNDING = 1e-11
 
 @dataclass(frozen=True)
 class RestSlope:
-    """Derivative of what is no block, from right after a tick to right after the next.
+    """Derivative of the systems that are no blocks, from one tick to the next.
 
     Attributes:
-        of_inputs: Slope of what the plant gives the blocks at that tick, by its variables and by
-            what the blocks put out.
-        of_own: The same of its variables.
-        given: What it gives each system of blocks at that tick, by input.
+        of_inputs: Derivative of the blocks' inputs at the next tick with respect to the variables
+            of these systems and to the outputs of the blocks.
+        of_own: Derivative of the variables of these systems, likewise.
+        inputs: Inputs of each system of blocks at that tick, by name.
     """
 
     of_inputs: tuple[np.ndarray, np.ndarray]
     of_own: tuple[np.ndarray, np.ndarray]
-    given: Sequence[Mapping[str, np.ndarray]]
+    inputs: Sequence[Mapping[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class SectionDerivative:
     """Derivative of the map of one period.
 
     Attributes:
-        A: ``dx_{k+1} / dx_k``, shape (n, n), the variables being those that were asked for.
-        rest: What is not the blocks' in it, one for each interval between ticks of blocks.
-        wires: What the blocks put out at the last tick, by ``block.output``.
+        A: ``dx_{k+1} / dx_k`` of the chosen variables, shape (n, n).
+        rest: Contribution of the systems that are no blocks, one for each interval between ticks.
+        wires: Outputs of the blocks at the last tick, by ``block.output``.
     """
 
     A: np.ndarray
@@ -58,19 +58,19 @@ class SectionDerivative:
 
 
 class PeriodDerivative:
-    """What differentiates a diagram's map of one period.
+    """Differentiation of a diagram's map of one period.
 
     Args:
         one_period: The map.
-        diagram: Its diagram. Blocks of it are those at its top, fused or not, which sample at the
-            period or at whole fractions of it. What they put out between their ticks must not
-            depend on what moves there, where something continuous is fed with it.
-        configure: Tells a simulator how to integrate.
-        smooth: Variables that have a slope whatever differences say, as those of a plant.
+        diagram: Its diagram. Its blocks are those at its top level, fused or not, which sample at
+            the period or at whole fractions of it. Outputs that feed a continuous system must be
+            constant between ticks.
+        configure: Configures the integrator of a simulator.
+        smooth: Variables that are differentiable whatever differences say, as those of a plant.
 
     Attributes:
-        rest: Where the variables stand that are no block's.
-        states: Where each state of a block stands, by ``block.state``.
+        rest: Indices of the variables that belong to no block.
+        states: Indices of each state of a block, by ``block.state``.
     """
 
     def __init__(
@@ -95,30 +95,29 @@ class PeriodDerivative:
         step = min([one_period.period, *(system.period for system in self._blocks)])
         self._intervals = round(one_period.period / step)
         self._free = OnePeriodMap(diagram, step, configure)
-        # where what blocks put out is held
+        # here outputs of blocks are held
         self._held = OnePeriodMap(diagram, step, configure)
         self.states: dict[str, np.ndarray] = {}
         for system, rows in zip(self._blocks, self._states, strict=True):
             self.states |= {system.full_name(name): where for name, where in rows.items()}
         self._find_wires(diagram)
-        # with the same variables and the same rest, whatever blocks do at their ticks, the rest
-        # arrives at the same
-        self._is_led_by_states = (
+        # then the rest moves by the states alone, whatever the blocks compute at the tick
+        self._driven_by_states = (
             self._intervals == 1
             and not self._direct
-            and all(name in self._blocks[k].network.shown for k, name in self._leading)
+            and all(name in self._blocks[k].network.state_outputs for k, name in self._driving)
         )
 
     @property
     def can_be_parametrized(self) -> bool:
-        """Whether what blocks do at a tick moves nothing else before the next."""
-        return self._is_led_by_states
+        """Whether outputs computed at a tick act on the other systems only after the next."""
+        return self._driven_by_states
 
     def parametrize(self, diagram: Diagram) -> None:
-        """Take blocks that depend on parameters, for :meth:`at`.
+        """Set blocks that depend on parameters, for :meth:`at`.
 
         Args:
-            diagram: The same but that its blocks have parameters.
+            diagram: The same diagram, with parameters in its blocks.
         """
         found = (diagram.GetSubsystemByName(system.get_name()) for system in self._blocks)
         self._parametric = [NetworkSlope(system.network) for system in found]
@@ -134,45 +133,48 @@ class PeriodDerivative:
 
         Args:
             section: Context right after a tick; unchanged.
-            chosen: Indices of the variables to look at, shape (n,); all if omitted, where rows
-                of what blocks remember and never tell are left zero. A column without a slope, that
-            of a flag or a limit that is just reached, is zero.
-            rest: What is not the blocks', if it is known: of a diagram whose blocks alone differ.
+            chosen: Indices of the variables, shape (n,); by default all, with zero rows for states
+                that no output depends on. The column of a variable without a slope, such as a flag
+                or a limit that is just reached, is zero.
+            rest: Contribution of the other systems, if it is known from a diagram that differs in
+                its blocks only.
             parameters: Values for the parameters of :meth:`parametrize`, instead of the blocks'
-                own. Where other parameters change what the rest is led by, they are not enough.
+                own. They are not enough where they change the inputs of the other systems.
         """
         A: np.ndarray | None = None
-        start, made = section, []
+        start, slopes = section, []
         for interval in range(self._intervals):
             tick = self._free.next_tick(start)
-            if rest and self._is_led_by_states:  # what is no block arrives where it did
-                points = self._points(start, rest[interval].given, tick, parameters)
-                made.append(rest[interval])
+            if rest and self._driven_by_states:  # the other systems arrive at the same state
+                points = self._points(start, rest[interval].inputs, tick, parameters)
+                slopes.append(rest[interval])
             else:
                 self._free.approach(start)
                 sampled = self._free.as_sampled()
-                given = self._given_at(sampled)
-                points = self._points(sampled, given, tick, parameters)
-                made.append(rest[interval] if rest else self._slope_of_rest(start, sampled, given))
-            wanted = chosen if self._intervals == 1 else None
-            step = self._joined(points, made[-1], tick, wanted)
+                inputs = self._inputs_at(sampled)
+                points = self._points(sampled, inputs, tick, parameters)
+                slopes.append(
+                    rest[interval] if rest else self._slope_of_rest(start, sampled, inputs)
+                )
+            rows = chosen if self._intervals == 1 else None
+            step = self._joined(points, slopes[-1], tick, rows)
             A = step if A is None else step @ A
             if interval + 1 < self._intervals:
                 self._free.pass_tick()
                 start = self._free.context.Clone()
         assert A is not None  # there is an interval
         wires = self._wires(points)
-        return SectionDerivative(A if chosen is None else A[np.ix_(chosen, chosen)], made, wires)
+        return SectionDerivative(A if chosen is None else A[np.ix_(chosen, chosen)], slopes, wires)
 
     def wires(self, section: Context) -> dict[str, np.ndarray]:
-        """Return what blocks put out at the next tick, by ``block.output``.
+        """Return the outputs of blocks at the next tick, by ``block.output``.
 
         Args:
             section: Context right after a tick; unchanged.
         """
         self._map.approach(section)
         sampled = self._map.as_sampled()
-        return self._wires(self._points(sampled, self._given_at(sampled), sampled.get_time()))
+        return self._wires(self._points(sampled, self._inputs_at(sampled), sampled.get_time()))
 
     def _wires(self, points: Sequence[SlopeAt]) -> dict[str, np.ndarray]:
         found: dict[str, np.ndarray] = {}
@@ -181,20 +183,20 @@ class PeriodDerivative:
         return found
 
     def _find_wires(self, diagram: Diagram) -> None:
-        """Number what blocks are fed with, and what they put out that others are fed with."""
+        """Number the inputs of the blocks, and the outputs that are connected."""
         self._inputs: dict[tuple[int, str], np.ndarray] = {}
         self._outputs: dict[tuple[int, str], np.ndarray] = {}
         self._num_inputs = self._num_outputs = 0
         # from blocks to the rest, from the rest to blocks, from blocks to blocks
         self._fed: list[tuple[np.ndarray, InputPort]] = []
-        self._leading: set[tuple[int, str]] = set()
-        self._given: list[InputPort] = []
+        self._driving: set[tuple[int, str]] = set()
+        self._ports: list[InputPort] = []
         self._direct: list[tuple[np.ndarray, np.ndarray]] = []
         numbers = {system: k for k, system in enumerate(self._blocks)}
         connections = diagram.connection_map()
-        place = {system: k for k, system in enumerate(diagram.GetSystems())}
+        rank = {system: k for k, system in enumerate(diagram.GetSystems())}
         # the map's own order is that of addresses, and not the same in two equal diagrams
-        for target, i in sorted(connections, key=lambda key: (place[key[0]], int(key[1]))):
+        for target, i in sorted(connections, key=lambda key: (rank[key[0]], int(key[1]))):
             source, o = connections[target, i]
             port, output = target.get_input_port(i), source.get_output_port(o)
             if target not in numbers and not target.num_output_ports():
@@ -206,16 +208,16 @@ class PeriodDerivative:
                     self._num_outputs += port.size()
                 if target not in numbers:
                     self._fed.append((self._outputs[key], port))
-                    self._leading.add(key)
+                    self._driving.add(key)
             if target in numbers:
                 into = self._num_inputs + np.arange(port.size())
                 self._inputs[numbers[target], port.get_name()] = into
                 self._num_inputs += port.size()
-                self._given.append(port)
+                self._ports.append(port)
                 if source in numbers:
                     self._direct.append((into, self._outputs[key]))
 
-    def _given_at(self, root: Context) -> list[dict[str, np.ndarray]]:
+    def _inputs_at(self, root: Context) -> list[dict[str, np.ndarray]]:
         """Return the inputs of all blocks."""
         return [
             {
@@ -228,21 +230,21 @@ class PeriodDerivative:
     def _points(
         self,
         root: Context,
-        given: Sequence[Mapping[str, np.ndarray]],
+        inputs: Sequence[Mapping[str, np.ndarray]],
         time: float,
         parameters: Mapping[str, float] | None = None,
     ) -> list[SlopeAt]:
-        """Return the derivatives of all blocks at a tick that is not made yet."""
+        """Return the derivatives of all blocks at a tick that is not executed yet."""
         points = []
         slopes = self._slopes if parameters is None else self._parametric
-        for system, slope, u in zip(self._blocks, slopes, given, strict=True):
+        for system, slope, u in zip(self._blocks, slopes, inputs, strict=True):
             own = system.GetMyContextFromRoot(root)
             x = {name: system.state(own, name) for name in system.states}
             points.append(slope.at(x, u, last_tick(time, system.period), parameters))
         return points
 
     def _slope_of_rest(
-        self, start: Context, sampled: Context, given: Sequence[Mapping[str, np.ndarray]]
+        self, start: Context, sampled: Context, inputs: Sequence[Mapping[str, np.ndarray]]
     ) -> RestSlope:
         put_out = np.zeros(self._num_outputs)
         for (k, name), part in self._outputs.items():
@@ -252,7 +254,7 @@ class PeriodDerivative:
         z = np.concatenate([x[self.rest], put_out])
         middle = self._moved(start, x, z)
         slope = np.zeros((len(middle), len(z)))
-        # what is not known yet stays so
+        # values that are not known yet (NaN) stay so
         finite = np.isfinite(middle)
         for column in np.flatnonzero(np.isfinite(z)):
             share = _DIFFERENCE if column < n else _DIFFERENCE_OF_OUTPUTS
@@ -268,10 +270,10 @@ class PeriodDerivative:
             is_smooth = bend <= _BEND * scale + _ROUNDING * np.maximum(1.0, np.abs(middle[finite]))
             if np.all(is_smooth) or column >= n or self._smooth[column]:
                 slope[finite, column] = (forward - backward) / (2.0 * delta)
-        return RestSlope((slope[:m, :n], slope[:m, n:]), (slope[m:, :n], slope[m:, n:]), given)
+        return RestSlope((slope[:m, :n], slope[:m, n:]), (slope[m:, :n], slope[m:, n:]), inputs)
 
     def _moved(self, start: Context, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return what blocks are fed with and the rest's variables, one interval later."""
+        """Return the blocks' inputs and the rest's variables, one interval later."""
         root, x = self._held.context, x.copy()
         x[self.rest] = z[: len(self.rest)]
         for part, port in self._fed:
@@ -279,9 +281,11 @@ class PeriodDerivative:
             port.FixValue(own, z[len(self.rest) + part])
         self._held.approach(start, x)
         sampled = self._held.as_sampled()
-        given = [port.Eval(port.get_system().GetMyContextFromRoot(sampled)) for port in self._given]
+        inputs = [
+            port.Eval(port.get_system().GetMyContextFromRoot(sampled)) for port in self._ports
+        ]
         arrived = self._held.pass_tick() if self._is_sampled else self._held.variables(root)
-        return np.concatenate([*given, arrived[self.rest]])
+        return np.concatenate([*inputs, arrived[self.rest]])
 
     def _joined(
         self, points: Sequence[SlopeAt], rest: RestSlope, time: float, chosen: np.ndarray | None
@@ -299,7 +303,7 @@ class PeriodDerivative:
                 names = [name for name in states if np.isin(states[name], chosen).any()]
             elif self._intervals == 1:
                 names = point.reaching(wires)
-            if not is_tick(time, system.period):  # remembers what it did
+            if not is_tick(time, system.period):  # its state is unchanged
                 D[self._memory[k], self._memory[k]], names = 1.0, []
             rows = [states[name] for name in names]
             rows += [size + self._outputs[k, name] for name in ports]
@@ -317,7 +321,7 @@ class PeriodDerivative:
         for into, put_out in self._direct:
             u_x[into], u_y[into] = 0.0, 0.0
             u_y[into, put_out] = 1.0
-        # what goes from blocks through the rest and back within the tick comes to an end
+        # blocks and the rest have no algebraic loop, so that the matrix is regular
         u_x[:] = np.linalg.solve(np.eye(len(u_x)) - u_y @ y_u, u_x + u_y @ y_x)
         A = A + next_u @ u_x
         A[np.ix_(own, own)] += rest.of_own[0]

@@ -1,4 +1,4 @@
-"""A robot with its friction, sensors and environment, and nobody who controls it."""
+"""A robot with its friction, sensors and environment, without a controller."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +22,7 @@ from diagrams.station_start import find_start
 from pfsc_drake.checks import require
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.controller.assembly import acts_on_motors
-from pfsc_drake.controller.believed import Believed
+from pfsc_drake.controller.nominal_robot import NominalRobot
 from pfsc_drake.drivers.messages import ControlMode
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.systems.block_system import BlockSystem
@@ -36,15 +36,15 @@ class RobotStation:
     Attributes:
         diagram: The diagram.
         part: The robot in it.
-        command: What its drives are told: torques, or velocities of its servos.
-        mode: Which of both.
-        measured: System and port that the measured joint state comes from, by name.
-        torque: The same of the torques in its elastic joints, None of a rigid robot.
-        wrench: The same of what the force sensor measures, None without one.
+        command: Commands to its drives: torques, or velocities of its servos.
+        mode: Kind of the commands.
+        measured: System and port of the measured joint state, by name.
+        torque: System and port of the torques in its elastic joints, None for a rigid robot.
+        wrench: System and port of the wrench at the force sensor, None without one.
         initial_state: State of the robot's model at the start.
-        place: Place on the manifold at the start, as the projector remembers it.
+        projection: State of the projector at the start.
         projector: Name of the projector.
-        ticks_late: After how many ticks torques act that the driver passes on.
+        ticks_late: Number of ticks after which torques act.
     """
 
     diagram: Diagram
@@ -55,32 +55,32 @@ class RobotStation:
     torque: tuple[str, str] | None
     wrench: tuple[str, str] | None
     initial_state: np.ndarray
-    place: np.ndarray
+    projection: np.ndarray
     projector: str
     ticks_late: int = 0
 
     @cached_property
     def blocks(self) -> BlockAccess:
-        """What the diagram's blocks remember and put out, fused or not."""
+        """States and outputs of the diagram's blocks, fused or not."""
         return BlockAccess(self.diagram)
 
     def set_start(self, root: Context) -> None:
-        """Put the robot at the start of the scenario, where its drives hold its weight.
+        """Set the start of the scenario, with drive torques that hold the robot's weight.
 
         Args:
             root: Context of the diagram.
         """
-        self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), self.initial_state)
-        self.blocks.set_state(root, f"{self.projector}.place", self.place)
+        self.part.set_state(self.part.plant.GetMyMutableContextFromRoot(root), self.initial_state)
+        self.blocks.set_state(root, f"{self.projector}.projection", self.projection)
         n = self.part.robot.dimension
         if self.mode is ControlMode.TORQUE:
             q = (self.part.coordinates.link_rows @ self.initial_state)[:n]
             weight = gravity_function(self.part.robot)(q).full().ravel()
-            self.tell(root, weight)
+            self.set_command(root, weight)
             self.blocks.set_state(root, "hold.held", np.tile(weight, 1 + self.ticks_late))
 
-    def tell(self, root: Context, values: np.ndarray) -> None:
-        """Tell the drives what to do.
+    def set_command(self, root: Context, values: np.ndarray) -> None:
+        """Set the commands to the drives.
 
         Args:
             root: Context of the diagram.
@@ -107,8 +107,8 @@ class RobotStation:
             return np.zeros(self.part.robot.dimension)
         return self._read(root, self.torque)
 
-    def sensed(self, root: Context) -> np.ndarray | None:
-        """Return what the force sensor measures, shape (6,) [N, Nm], None without one.
+    def measured_wrench(self, root: Context) -> np.ndarray | None:
+        """Return the wrench at the force sensor, shape (6,) [N, Nm], None without one.
 
         Args:
             root: Context of the diagram.
@@ -116,7 +116,7 @@ class RobotStation:
         return None if self.wrench is None else self._read(root, self.wrench)
 
     def _read(self, root: Context, source: tuple[str, str]) -> np.ndarray:
-        """Return what a block puts out, or another system of the diagram."""
+        """Return the value of an output of a block, or of another system of the diagram."""
         name, port = source
         if not self.diagram.HasSubsystemNamed(name):
             return self.blocks.output(root, f"{name}.{port}")
@@ -126,18 +126,18 @@ class RobotStation:
 
 
 def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
-    """Build the robot of a scenario, and what is around it, without a controller.
+    """Build the robot of a scenario and its environment, without a controller.
 
     Args:
         scenario: The scenario.
-        folder: Where its relative file names start.
+        folder: Base folder of relative file names.
 
     Raises:
         InputError: If the scenario cannot be built, or needs a controller beside the robot.
     """
     for key in ("plate", "operator", "holder", "turntable"):
-        given = getattr(scenario, key) is not None
-        require(not given, key, "given", "null where the controller is elsewhere")
+        absent = getattr(scenario, key) is None
+        require(absent, key, "given", "null where the controller is elsewhere")
     model = scenario.robot.model
     require(not is_delta(model), "robot.model", model, "an arm, where the controller is elsewhere")
     known = not isinstance(scenario.path.shape, Streamed)
@@ -161,12 +161,12 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         period,
         scenario.encoder_period,
     )
-    # where its tool is, not where a controller expects it
-    on_motors = acts_on_motors(scenario.controller.law, Believed(part.robot))
+    # by the actual pose of the tool, not by that of the nominal model
+    on_motors = acts_on_motors(scenario.controller.law, NominalRobot(part.robot))
     tool = BlockSystem(ToolKinematics(part.robot, on_motors), period)
     builder.AddNamedSystem("tool_kinematics", tool)
     builder.Connect(true_state, tool.GetInputPort("joint_state"))
-    projector = BlockSystem(task.projecting, period)
+    projector = BlockSystem(task.projection_block, period)
     builder.AddNamedSystem(task.projector_name, projector)
     builder.Connect(tool.GetOutputPort("tool_pose"), projector.GetInputPort("tool_pose"))
     around = Environment(part, task, task.manifold, chosen.outside, start)
@@ -182,7 +182,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         failure = scenario.simulation.force_sensor_failure
         wrench = _name(add_force_sensor(builder, part, scenario.sensor, failure, period, ports))
     command = builder.AddNamedSystem("command", ConstantVectorSource(np.zeros(n)))
-    # the link is the first tick of a delay, and the low pass the driver's
+    # the link is the first tick of the delay; the low pass is part of the driver
     late = max(scenario.driver.ticks(period) - 1, 0)
     beyond_the_link = DriverParameters(delay=late * period)
     drive = {"drive": command.get_output_port(), "joint_state": joint_state}
@@ -206,7 +206,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         torque,
         wrench,
         initial_state,
-        start.place,
+        start.projection,
         task.projector_name,
         late,
     )

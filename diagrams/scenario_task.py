@@ -24,7 +24,7 @@ from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest, straight_lines, together
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
-from pfsc_drake.controller.fixtures import free_motion, make_lead
+from pfsc_drake.controller.fixtures import free_motion, make_command_dynamics
 from pfsc_drake.controller.tasks.path_task import PathTask, is_on
 from pfsc_drake.controller.tasks.space_task import SpaceTask
 from pfsc_drake.controller.tasks.stream_task import StreamTask
@@ -46,26 +46,26 @@ def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = 
 
     Args:
         scenario: The scenario.
-        folder: Where its relative file names start.
+        folder: Base folder of relative file names.
         progress: Receives the fraction done and the name of the step, where that takes its time.
 
     Raises:
-        InputError: If the manifold or the motion along it cannot be made, or regions are given that
-            have no effect.
+        InputError: If the manifold or the motion along it cannot be created, or regions have no
+            effect.
     """
     manifold, chosen = scenario.controller.manifold, _ScenarioTasks(scenario, folder, progress)
     if manifold == "space":
         return chosen.space_task()
     for key, why in {"regions": "kept out of regions", "guides": "pulled to guides"}.items():
-        given = getattr(scenario.fixtures, key, [])
+        items = getattr(scenario.fixtures, key, [])
         allowed = (
-            f"none with controller.manifold = {manifold}; only a tool led through space is {why}"
+            f"none with controller.manifold = {manifold}; only a tool guided through space is {why}"
         )
-        require(not given, f"fixtures.{key}", f"{len(given)} given", allowed)
+        require(not items, f"fixtures.{key}", f"{len(items)} given", allowed)
     if manifold == "surface":
         return chosen.surface_task()
     if isinstance(scenario.path.shape, Streamed):
-        allowed = "path where way points come while the tool moves"
+        allowed = "path where waypoints come while the tool moves"
         require(manifold == "path", "controller.manifold", manifold, allowed)
         known = scenario.path, scenario.controller, scenario.start, scenario.duration
         return stream_task(*known, folder)
@@ -85,12 +85,13 @@ class _ScenarioTasks:
         scenario, folder, progress = self.scenario, self.folder, self.progress
         parameters, law, start = scenario.path, scenario.controller.law, scenario.start
         surface = surface_of_path(parameters, scenario.surface)
-        said: OrientationParameters | SurfaceOrientationParameters
+        orientation: OrientationParameters | SurfaceOrientationParameters
         if surface is None:
-            path, said = make_path(parameters, law, folder, progress), parameters.orientation
+            path = make_path(parameters, law, folder, progress)
+            orientation = parameters.orientation
         else:
             path = make_path_on_surface(parameters, surface, law, folder, progress)
-            said = surface.orientation
+            orientation = surface.orientation
         points = scenario.reference.arc_lengths(path.length)
         for eta in points:
             if not is_on(path, eta):
@@ -103,7 +104,7 @@ class _ScenarioTasks:
             path,
             rest_to_rest(points, **_limits(scenario.reference)),
             RELATIVE_DEGREE[law],
-            followed_angles(said),
+            followed_angles(orientation),
             tracks=scenario.controller.manifold == "trajectory",
             offset=start.offset,
             rotation_deg=start.rotation_deg,
@@ -122,7 +123,7 @@ class _ScenarioTasks:
                 "controller.manifold = surface: there is none; write surface: {shape: !Plane {..}}"
             )
         try:
-            made = make_surface(parameters.shape, law, self.folder, self.progress)
+            sheet = make_surface(parameters.shape, law, self.folder, self.progress)
         except InputError as error:
             raise InputError(f"surface.shape: {error}") from None
         manifold = make_surface_manifold(RELATIVE_DEGREE[law], parameters)
@@ -130,7 +131,7 @@ class _ScenarioTasks:
         if start.theta and not start.position:
             require_numbers("start.theta", start.theta, 2)
         task = SurfaceTask(
-            made.surface,
+            sheet.surface,
             manifold,
             motion,
             parameters.orientation.quaternion,
@@ -140,8 +141,8 @@ class _ScenarioTasks:
             rotation_deg=start.rotation_deg,
             max_alpha=scenario.controller.max_alpha,
         )
-        task.fit = made.fit
-        task.warnings += made.notes
+        task.fit = sheet.fit
+        task.warnings += sheet.notes
         task.warnings += _euler_warnings_at_start(task)
         return task
 
@@ -151,24 +152,26 @@ class _ScenarioTasks:
         parameters, start = scenario.fixtures or FixtureParameters(), scenario.start
         period, duration = scenario.controller.sampling_time, scenario.duration
         admittance = free_motion(scenario.compliance, period)
-        lead = make_lead(
+        lead = make_command_dynamics(
             RELATIVE_DEGREE[scenario.controller.law],
             parameters,
             period,
             lag=parameters.lag_behind(scenario.servo.bandwidth),
             delay=scenario.servo.bus_delay,
         )
-        said, given = parameters.orientation, start.position
-        place = SpaceManifold(
-            RELATIVE_DEGREE[scenario.controller.law], said.quaternion, **followed_angles(said)
+        orientation, position = parameters.orientation, start.position
+        space = SpaceManifold(
+            RELATIVE_DEGREE[scenario.controller.law],
+            orientation.quaternion,
+            **followed_angles(orientation),
         )
         allowed = "the tool point where it starts [m], 3 numbers"
-        require(bool(given), "start.position", given, allowed)
-        first = np.array(given, dtype=float)
+        require(bool(position), "start.position", position, allowed)
+        first = np.array(position, dtype=float)
         require(duration > 0.0, "duration", duration, "a positive number [s]")
         fixtures, warnings = make_fixtures(parameters, first, folder, progress)
         task = SpaceTask(
-            place,
+            space,
             first,
             fixtures,
             admittance,
@@ -179,10 +182,10 @@ class _ScenarioTasks:
             duration=duration,
         )
         task.warnings += warnings
-        if place.is_oriented:
-            R_d = place.orientation(place.point(given)[None])
+        if space.is_oriented:
+            R_d = space.orientation(space.point(position)[None])
             task.warnings += euler_warnings(
-                place.tool.euler, R_d, "fixtures", lambda _: "everywhere"
+                space.tool.euler, R_d, "fixtures", lambda _: "everywhere"
             )
         return task
 
@@ -196,8 +199,8 @@ def _limits(reference: ReferenceParameters) -> dict[str, float]:
 
 
 def _euler_warnings_along(path: Path, task: PathTask, block: str) -> list[str]:
-    """Return :func:`euler_warnings` of a path's orientation, which a block of a scenario gives."""
-    euler = task.place.tool.euler
+    """Return :func:`euler_warnings` of a path's orientation, of a block of the scenario."""
+    euler = task.projected_manifold.tool.euler
     if path.orientation is None or euler is None:
         return []
     theta = np.linspace(*path.position.domain, _ORIENTATIONS)
@@ -224,21 +227,21 @@ def _surface_motion(reference: ReferenceParameters) -> PiecewisePolynomialCurve:
 
 def _euler_warnings_at_start(task: SurfaceTask) -> list[str]:
     """Return :func:`euler_warnings` of the orientation where the tool starts."""
-    euler = task.place.tool.euler
+    euler = task.projected_manifold.tool.euler
     if euler is None:
         return []
     try:
-        foot = task.evaluator.project_globally(task.first)
-        point = task.evaluator.evaluate_at(foot.theta)
-    except InputError:  # which is reported when the start is looked for
+        closest = task.evaluator.project_globally(task.first)
+        point = task.evaluator.evaluate_at(closest.theta)
+    except InputError:  # which is reported when the start is computed
         return []
     return euler_warnings(
-        euler, task.place.orientation(point[None]), "surface", lambda _: "at the start"
+        euler, task.projected_manifold.orientation(point[None]), "surface", lambda _: "at the start"
     )
 
 
 def check_joints(scenario: Scenario, task: Task, num_joints: int) -> None:
-    """Refuse a robot that cannot follow, or would lose its orientation by oversight.
+    """Refuse a robot with too few joints, or a task that leaves the orientation open by oversight.
 
     Args:
         scenario: The scenario.
@@ -246,9 +249,9 @@ def check_joints(scenario: Scenario, task: Task, num_joints: int) -> None:
         num_joints: Number of joints of the robot.
 
     Raises:
-        InputError: If so.
+        InputError: If the number of joints does not suit the task.
     """
-    names = [coordinate.name for coordinate in task.place.coordinates]
+    names = [coordinate.name for coordinate in task.projected_manifold.coordinates]
     if isinstance(task, StreamTask):
         few = f"{num_joints} joints for {len(names)} outputs ({', '.join(names)})"
         require(num_joints >= len(names), "path", few, "path.orientation.task: tool_axis or none")
@@ -265,10 +268,10 @@ def inverted_start(task: Task, start: StartPoint) -> tuple[ToolTarget, str] | No
         task: The task.
         start: Its start.
     """
-    R_e, place = start.target.R_e, task.place
-    if R_e is None or not isinstance(place, SurfaceManifold) or place.offset is None:
+    R_e, surface = start.target.R_e, task.projected_manifold
+    if R_e is None or not isinstance(surface, SurfaceManifold) or surface.offset is None:
         return None
-    axes = place.axes(task.point(start)).full()
+    axes = surface.axes(task.point(start)).full()
     # the tangent stays, which leaves the frame right-handed
     turned = axes @ np.diag([1.0, -1.0, -1.0]) @ axes.T @ R_e
     advice = (

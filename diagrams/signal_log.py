@@ -21,7 +21,7 @@ class SignalLog:
     Attributes:
         sink: The log.
         rows: Rows of each signal in the log's data.
-        delay: By how much later than they were true the sink gets them [s].
+        delay: Time by which the sink receives the signals late [s].
     """
 
     sink: VectorLogSink
@@ -51,7 +51,7 @@ class SignalLog:
         return times, {name: data[rows].T for name, rows in self.rows.items()}
 
     def now(self, blocks: BlockAccess, root: Context) -> dict[str, np.ndarray]:
-        """Return the signals as they are, logged or not.
+        """Return the current values of the signals, logged or not.
 
         Args:
             blocks: Blocks of the diagram.
@@ -63,13 +63,13 @@ class SignalLog:
     def first_instant(
         self, blocks: BlockAccess, root: Context, signal: str, column: int
     ) -> tuple[FaultInstant, FaultInstant | None]:
-        """Return the first instant at which a logged fault was there, and the one before.
+        """Return the first instant of a logged fault, and the one before.
 
         Args:
             blocks: Blocks of the diagram.
             root: Context of the diagram, in which the fault holds.
             signal: Logged signal with the fault.
-            column: Column of the signal, where the fault is.
+            column: Column of the fault in the signal.
         """
         times, raw = self.read(root)
         faults = np.flatnonzero(raw[signal][:, column])
@@ -94,11 +94,11 @@ def add_log(
 ) -> SignalLog:
     """Log signals at a fixed period; one log costs less time per sample than several.
 
-    What is logged is what whoever is sampled at a tick sees at that tick. A discrete plant with
-    sampled ports has made the step that begins with the tick by then; the log publishes before
-    that, when the memories of encoders and observers stand for the last tick and the plant does
-    not: differences of the two, torques above all, would be those of no instant. So there the
-    signals are held by whatever is sampled, and published a tick later.
+    Logged values are those that a sampled block reads at the tick. A discrete plant with sampled
+    ports has then made the step that begins with the tick. The log publishes before that step, when
+    the states of encoders and observers belong to the last tick and the state of the plant does
+    not: their differences, above all torques, would mix two instants. With such a plant the signals
+    are therefore held and published a tick later.
 
     Args:
         builder: Builder of the diagram.

@@ -14,7 +14,7 @@ from diagrams.turntable_station import Turntable
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.controller.controller import Controller
 from pfsc_drake.controller.tasks.task import Task
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEndpoint
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel
@@ -40,7 +40,7 @@ class Site:
         robot: The robot with its controller.
         around: All that acts on the robot.
         remote: Whether the robot is in another process.
-        carrier: Robot or turntable that carries the workpiece, if one does.
+        carrier: Robot or turntable that carries the workpiece, if there is one.
         signals: Signals by name: ``true_state``, ``measured_state``, all outputs of the controller,
             and those of the other parts.
         logged: Signals for the log.
@@ -60,7 +60,7 @@ class Site:
     logged: dict[str, OutputPort] = field(default_factory=dict)
     operator: Operator | None = None
     pen: OperatorPanel | None = None
-    leader: TeleoperationEnd | None = None
+    leader: TeleoperationEndpoint | None = None
     servo: ServoAccess | None = None
 
     @property
@@ -80,9 +80,9 @@ class Site:
 
     @property
     def controllers(self) -> list[Controller]:
-        """Controller of the robot, and that of a robot that holds the workpiece."""
-        held = [self.carrier.robot] if isinstance(self.carrier, Holder) else []
-        return [robot.controller for robot in (self.robot, *held)]
+        """Controllers of the robot and, if there is one, of the workpiece robot."""
+        others = [self.carrier.robot] if isinstance(self.carrier, Holder) else []
+        return [robot.controller for robot in (self.robot, *others)]
 
     def add(self, name: str, block: Block, **sources: OutputPort) -> BlockSystem:
         """Add a block that is sampled with the controller, and return its system.
@@ -98,7 +98,7 @@ class Site:
         return system
 
     def show(self, **signals: OutputPort) -> None:
-        """Take signals by name, and into the log.
+        """Add signals, also to the log.
 
         Args:
             signals: Signals by name.

@@ -1,4 +1,4 @@
-"""What running, logging and measuring need to know of a station."""
+"""A built station: diagram, log, robot and task of a run."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -14,7 +14,7 @@ from diagrams.site import Site
 from diagrams.turntable_station import Turntable
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.controller.fault_description import FoundFault
+from pfsc_drake.controller.fault_description import FaultReport
 from pfsc_drake.controller.law_warnings import MODES
 from pfsc_drake.controller.tasks.path_task import PathTask
 from pfsc_drake.controller.tasks.task import StartPoint, Task
@@ -26,28 +26,28 @@ from pfsc_drake.systems.fuse import BlockAccess
 
 
 class Station:
-    """A built station and what is needed to run it.
+    """A built station with access to its parts.
 
     Args:
         diagram: The diagram.
         site: Its parts.
         log: Log of the signals that its parts show, by their names.
-        workpiece: What the tool may touch, if anything.
+        workpiece: Workpiece that the tool may touch, if there is one.
 
     Attributes:
         diagram: The diagram.
         controlled: The robot, with its controller.
-        log: The log. ``joint_state`` is the actual one, what the law receives
-            ``joint_state_measured`` where that differs.
-        controllers: Controller of the robot, and that of a robot that holds the workpiece.
+        log: The log. ``joint_state`` is the actual joint state; ``joint_state_measured`` is the one
+            that the law receives, where that differs.
+        controllers: Controllers of the robot and, if there is one, of the workpiece robot.
         servo: Velocity servos, if there are any.
-        workpiece: What the tool may touch, if anything.
+        workpiece: Workpiece that the tool may touch, if there is one.
         operator: A person who guides the tool while the robot moves, if one does.
         mode_labels: Names of the values of a logged signal ``mode``, if there is one.
         mounting: Plates that are mounted, if there are any.
         ticks_late: Number of samples after which commanded torques act.
-        holder: The robot that holds the workpiece which the path is on, if one does.
-        turntable: The turntable that carries the workpiece which the path is on, if one does.
+        holder: Robot that holds the workpiece with the path, if there is one.
+        turntable: Turntable that carries the workpiece with the path, if there is one.
         crossing: Obstacles, if there are any.
         pen: Input of waypoints that a person draws, if one does.
         leader: Link to a leader in another process, if there is one.
@@ -77,7 +77,7 @@ class Station:
 
     @property
     def robot(self) -> RobotModel:
-        """The robot as it is."""
+        """Model of the simulated robot."""
         return self.part.robot
 
     @property
@@ -116,18 +116,18 @@ class Station:
         return self.controlled.controller.on_motors
 
     @property
-    def initial_place(self) -> np.ndarray:
-        """Position on the manifold at the start, as the projector remembers it."""
-        return self.start.place
+    def initial_projection(self) -> np.ndarray:
+        """State of the projector at the start."""
+        return self.start.projection
 
     @cached_property
     def warnings(self) -> list[str]:
-        """Doubts about the station, one sentence each."""
+        """Warnings about the station, one sentence each."""
         return self.controlled.warnings() + ([] if self.holder is None else self.holder.warnings())
 
     @cached_property
     def blocks(self) -> BlockAccess:
-        """What the diagram's blocks remember and put out, fused or not."""
+        """States and outputs of the diagram's blocks, fused or not."""
         return BlockAccess(self.diagram)
 
     @property
@@ -147,10 +147,10 @@ class Station:
         return self.task.end
 
     def set_start(self, root: Context) -> None:
-        """Put the robot at the start of the scenario, where its drives hold its weight.
+        """Set the start of the scenario, with drive torques that hold the robot's weight.
 
-        A discrete plant's first step is one of what the drives did before the first tick, and so
-        are those of drives that act late: without this the robot would fall for as long.
+        A discrete plant's first step uses the torques from before the first tick, and so do the
+        first steps with delayed drives: without these torques the robot would fall meanwhile.
 
         Args:
             root: Context of the diagram.
@@ -163,39 +163,37 @@ class Station:
         if self.holder is not None:
             self.holder.robot.set_start(self.blocks, root)
 
-    def tell_way_points(self, root: Context, message: np.ndarray) -> None:
-        """Set what the station hears from the next tick on of way points that a person draws.
+    def send_waypoints(self, root: Context, message: np.ndarray) -> None:
+        """Set the message with waypoints that a person draws, from the next tick on.
 
         Args:
             root: Context of the diagram.
-            message: Laid out as the task's path says.
+            message: Message in the layout of the task's path.
         """
         assert self.pen is not None
         context = self.pen.GetMyMutableContextFromRoot(root)
         self.pen.GetInputPort("controls").FixValue(context, message)
 
-    def set_place(self, root: Context, place: np.ndarray) -> None:
-        """Choose where on the manifold, on which branch of it, the tool is.
+    def set_projection(self, root: Context, projection: np.ndarray) -> None:
+        """Set the projection of the tool onto the manifold, which selects the branch.
 
         Args:
             root: Context of the diagram.
-            place: As the projector remembers it.
+            projection: State of the projector.
         """
-        self.controlled.set_place(self.blocks, root, place)
+        self.controlled.set_projection(self.blocks, root, projection)
 
-    def place_robot(self, root: Context, state: np.ndarray) -> None:
-        """Put the robot into a state.
+    def set_robot_state(self, root: Context, state: np.ndarray) -> None:
+        """Set the state of the robot.
 
         Args:
             root: Context of the diagram.
             state: ``[q, v]`` of its model, see :class:`PlantCoordinates`.
         """
-        self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), state)
+        self.part.set_state(self.part.plant.GetMyMutableContextFromRoot(root), state)
 
     def fault(self, root: Context) -> str | None:
-        """Return why a system of the station is in its safe state, and where it came to be.
-
-        None if none is.
+        """Return the cause for which a system of the station is in its safe state, or None.
 
         Args:
             root: Context of the diagram.
@@ -203,10 +201,10 @@ class Station:
         found = self.found_fault(root)
         return None if found is None else found.sentence
 
-    def found_fault(self, root: Context) -> FoundFault | None:
-        """Return why a system of the station is in its safe state, and since when, if one is.
+    def found_fault(self, root: Context) -> FaultReport | None:
+        """Return cause and time of the transition of a system to its safe state, or None.
 
-        The controller, which is told of the others' faults, comes first.
+        The controller, which receives the others' faults, comes first.
 
         Args:
             root: Context of the diagram.
@@ -223,10 +221,10 @@ class Station:
         found = self.controlled.describe(
             fault, self.log, self.blocks, root, "servo_fault", 0, suspects
         )
-        return FoundFault(f"{servo.name}: {found.sentence}", found.time)
+        return FaultReport(f"{servo.name}: {found.sentence}", found.time)
 
     def mode_name(self, mode: int) -> str:
-        """Return what a value of the signal ``mode`` is called.
+        """Return the name of a value of the signal ``mode``.
 
         Args:
             mode: The value.
@@ -234,11 +232,11 @@ class Station:
         return self.mode_labels[mode] if 0 <= mode < len(self.mode_labels) else str(mode)
 
     def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:
-        """Return what else is worth a look in a run, by name, if anything is.
+        """Return further lengths of a run, by name.
 
         Args:
             y_t: Motion of the tool point [m], shape (samples, 3).
         """
         if self.workpiece is None:
             return {}
-        return self.workpiece.lengths(y_t, self.initial_place, self.part.gravity)
+        return self.workpiece.lengths(y_t, self.initial_projection, self.part.gravity)

@@ -10,10 +10,10 @@ from diagrams.environment.leader import teleoperated
 from diagrams.environment.mounting import Mounting, make_mounting
 from diagrams.environment.workpieces import NotchedWorkpiece, PressedWorkpiece
 from diagrams.robots.arm import add_arm
-from diagrams.robots.belief import BeliefSource
 from diagrams.robots.delta import add_delta, free_step
 from diagrams.robots.drives import ServoOptions
 from diagrams.robots.model import is_delta
+from diagrams.robots.nominal_model import NominalModelSource
 from diagrams.robots.part import RobotPart
 from diagrams.robots.plant_friction import FrictionOptions
 from diagrams.robots.remote_arm import add_remote_arm
@@ -39,7 +39,7 @@ class StationOptions:
 
     Attributes:
         scenario: The scenario.
-        folder: Where its relative file names start.
+        folder: Base folder of relative file names.
         progress: Receives the fraction done and the name of the step, where that takes its time.
     """
 
@@ -53,10 +53,10 @@ class StationOptions:
         return self.scenario.controller.sampling_time
 
     @property
-    def belief_source(self) -> BeliefSource:
+    def nominal_model_source(self) -> NominalModelSource:
         """Origin of the nominal model of the robot."""
         scenario, controller = self.scenario, self.scenario.controller
-        return BeliefSource(
+        return NominalModelSource(
             scenario.robot,
             controller.model,
             scenario.model_error,
@@ -81,7 +81,7 @@ class StationOptions:
 
     @property
     def outside(self) -> Outside:
-        """Forces on the robot from outside."""
+        """External forces on the robot."""
         scenario = self.scenario
         hand = scenario.hand if scenario.teleoperation is None else None
         forces = scenario.forces, scenario.hold_back, scenario.pushes, hand
@@ -89,7 +89,7 @@ class StationOptions:
 
     @property
     def follower(self) -> FollowerOptions:
-        """Options of the controller that are those of a user's diagram."""
+        """Options of the controller that a diagram of the user's own has too."""
         scenario = self.scenario
         return FollowerOptions(
             controller=scenario.controller,
@@ -115,7 +115,7 @@ class StationOptions:
             require_whole_fraction("workpiece.time_step", pressed.time_step, self.period)
             if not isinstance(task, SurfaceTask):
                 raise InputError("workpiece = given: must be null where the task is no surface")
-            return PressedWorkpiece(task.surface, task.place, pressed)
+            return PressedWorkpiece(task.surface, task.projected_manifold, pressed)
         if notch is None:
             return None
         require_whole_fraction("notch.time_step", notch.time_step, self.period)
@@ -124,10 +124,10 @@ class StationOptions:
         return NotchedWorkpiece(task.path, notch)
 
     def spring(self, workpiece: Workpiece | None) -> SurfaceSpring | None:
-        """Return a workpiece that is pressed on as a spring, if there is one.
+        """Return the spring that models a workpiece under pressure, or None.
 
         Args:
-            workpiece: What the tool touches, if anything.
+            workpiece: Workpiece that the tool touches, if there is one.
         """
         press = self.scenario.compliance.press
         if press is None or press.force == 0.0 or not isinstance(workpiece, PressedWorkpiece):
@@ -147,8 +147,8 @@ class StationOptions:
         if scenario.plate is None:
             return None
         for key in ("notch", "workpiece"):
-            given = getattr(scenario, key) is not None
-            require(not given, key, "given", "null where there is a plate")
+            absent = getattr(scenario, key) is None
+            require(absent, key, "given", "null where there is a plate")
         has_hand = scenario.hand is not None
         return make_mounting(scenario.plate, task, has_hand=has_hand, period=self.period)
 
@@ -164,7 +164,7 @@ class StationOptions:
         parameters, compliance = self.scenario.teleoperation, self.scenario.compliance
         if parameters is None:
             return []
-        allowed = "null where nothing yields to what a sensor measures (compliance)"
+        allowed = "null where nothing complies with measured forces (compliance)"
         require(compliance.needs_sensor, "teleoperation", "given", allowed)
         turns = ComplianceParameters(rotational=compliance.rotational).is_given
         allowed = "null where the tool's orientation is stiff (compliance.rotational)"
@@ -178,15 +178,21 @@ class StationOptions:
 
         Args:
             builder: Builder of the diagram.
-            workpiece: What the tool may touch, if anything.
+            workpiece: Workpiece that the tool may touch, if there is one.
             remote: Whether the robot is in another process.
 
         Raises:
             InputError: If the robot cannot be read, or does not suit the scenario.
         """
-        scenario, model, source = self.scenario, self.scenario.robot.model, self.belief_source
+        scenario, model, source = (
+            self.scenario,
+            self.scenario.robot.model,
+            self.nominal_model_source,
+        )
         if remote:
-            require(not is_delta(model), "robot.model", model, "an arm, where it stands elsewhere")
+            require(
+                not is_delta(model), "robot.model", model, "an arm, where it is in another process"
+            )
             return add_remote_arm(builder, source, has_sensor=scenario.needs_sensor)
         if not is_delta(model):
             arm = add_arm(builder, source, workpiece)
@@ -195,23 +201,23 @@ class StationOptions:
             return arm
         step = free_step(self.period, scenario.simulation.max_step)
         part = add_delta(builder, source, step, workpiece)
-        # what cannot be read is said before what it could not do
+        # errors of reading come before those of unsuitable parameters
         self._check_delta()
         return part
 
     def check(self, task: Task) -> None:
-        """Refuse obstacles where progress cannot wait for them, and what a moving point excludes.
+        """Refuse obstacles, oscillations and transitions that the task does not support.
 
         Args:
             task: Task of the tool.
 
         Raises:
-            InputError: If so.
+            InputError: If the task does not support one of them.
         """
         scenario, swings = self.scenario, self.scenario.reference.swings
         if scenario.obstacles is not None:
-            given, allowed = scenario.compliance.is_given, "left out where progress waits"
-            require(not given, "compliance", "given", allowed)
+            complies, allowed = scenario.compliance.is_given, "left out where progress waits"
+            require(not complies, "compliance", "given", allowed)
             waits = task.is_planned and not task.manifold.follows_time
             allowed = (
                 "null unless controller.manifold is path or surface, on which progress can wait"
@@ -237,7 +243,7 @@ class StationOptions:
         return 1.0 / servo.bandwidth + servo.bus_delay
 
     def _check_delta(self) -> None:
-        """Refuse what only robots that turn their tool or bend have."""
+        """Refuse options for robots that turn their tool or have elastic joints."""
         scenario, start, surface = self.scenario, self.scenario.start, self.scenario.surface
         law, drives = (
             scenario.controller.law,

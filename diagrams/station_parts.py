@@ -1,14 +1,14 @@
 """Parts of a station: each reads signals of the others by name, and adds its own.
 
-A part is a function of a :class:`~diagrams.site.Site`. It adds nothing where a scenario has none of
-its kind. They are added in the order of :data:`PARTS`; the inputs of controllers are connected
+A part is a function of a :class:`~diagrams.site.Site`. It adds nothing where the scenario has no
+such part. Parts are added in the order of :data:`PARTS`; the inputs of controllers are connected
 afterwards.
 """
 
 from collections.abc import Callable
 
 from diagrams.environment.leader import LeaderSide
-from diagrams.environment.measured_obstacles import add_obstacles, add_told_obstacles
+from diagrams.environment.measured_obstacles import add_obstacles, add_reported_obstacles
 from diagrams.environment.operator import add_operator
 from diagrams.holder_station import HOLDER, Holder
 from diagrams.robots.drives import add_drives
@@ -28,7 +28,7 @@ def _controller(site: Site) -> None:
     site.show(**{name: robot.signals[name] for name in controller.logged})
     site.signals |= {"true_state": robot.true_state, "measured_state": robot.measured}
     site.logged |= robot.logged_states
-    if site.remote:  # the links' side as it is found is all that is known of the robot
+    if site.remote:  # joint_state is the estimate itself
         site.logged.pop("found_joint_state", None)
     part = robot.part
     if isinstance(part, RemoteArm):
@@ -37,7 +37,7 @@ def _controller(site: Site) -> None:
 
 
 def _carrier(site: Site) -> None:
-    """Connect what carries the workpiece with the controller, and both faults with each other."""
+    """Connect the carrier of the workpiece with the controller, and both faults with each other."""
     carrier = site.carrier
     if isinstance(carrier, Turntable):
         added = carrier.add(site.builder, site.period)
@@ -48,7 +48,7 @@ def _carrier(site: Site) -> None:
         other = carrier.robot.signals
         site.signals |= {"frame_jet": other["frame_jet"], "stop_request": other["fault"]}
         site.logged |= carrier.signals
-        # a sample later: both at once would ask each other
+        # a sample later: otherwise each would depend on the other
         hold = site.add(f"{HOLDER}stop", Hold(1), value=site.signals["fault"])
         holds = carrier.robot.controller
         holds.connect(site.builder, "stop_request", hold.GetOutputPort("held"))
@@ -56,7 +56,7 @@ def _carrier(site: Site) -> None:
 
 def _obstacles(site: Site) -> None:
     if site.scenario.obstacles is not None:
-        add = add_told_obstacles if site.remote else add_obstacles
+        add = add_reported_obstacles if site.remote else add_obstacles
         site.show(**add(site.builder, site.scenario.obstacles, site.period))
 
 
@@ -65,9 +65,9 @@ def _waypoints(site: Site) -> None:
     if isinstance(task, ScenarioStream):
         source, site.pen = task.add_source(site.builder, site.signals["stream"], site.period)
         site.signals["waypoints"] = source
-        robot, course = site.robot.part.robot, site.signals["course"]
-        known = robot, site.signals["true_state"], course, site.period
-        site.show(true_place=task.add_true_place(site.builder, *known))
+        robot, path = site.robot.part.robot, site.signals["growing_path"]
+        known = robot, site.signals["true_state"], path, site.period
+        site.show(actual_projection=task.add_actual_projection(site.builder, *known))
 
 
 def _operator(site: Site) -> None:
@@ -94,7 +94,7 @@ def _leader(site: Site) -> None:
 def _environment(site: Site) -> None:
     ports, carrier = dict(site.signals), site.carrier
     if carrier is None:
-        # forces act where the tool is, also if a law follows another point
+        # forces act at the tool, also if a law follows another point
         ports["manifold_point"] = ports["closest_point"]
     operator = site.operator if site.scenario.teleoperation is None else None
     reaction = carrier.reaction if isinstance(carrier, Holder) else None

@@ -1,4 +1,4 @@
-"""Where a robot starts: the place of its tool, its posture, and how the law sees it."""
+"""Start of a robot: pose of its tool, posture, and state of the plant."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import StartParameters
 from diagrams.scenario_task import inverted_start
-from pfsc_drake.controller.moving_start import placed
+from pfsc_drake.controller.moving_start import target_in_world
 from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
@@ -21,18 +21,18 @@ def find_start(
     mounting: Mounting | None = None,
     frame: np.ndarray | None = None,
 ) -> tuple[StartPoint, np.ndarray]:
-    """Return where the tool starts, and the state of the plant there, at rest.
+    """Return the start of the tool, and the state of the plant there, at rest.
 
     Args:
-        parameters: What the scenario says of it.
-        task: What the tool is to do.
+        parameters: Its parameters in the scenario.
+        task: Task of the tool.
         part: The robot.
-        workpiece: What the tool touches, if anything.
-        mounting: Where plates come from and go, if there are any.
+        workpiece: Workpiece that the tool touches, if there is one.
+        mounting: Poses of magazine and frame, if plates are mounted.
         frame: Pose of the frame that carries the manifold, ``[p_WC, R_WC by rows]``, if it moves.
 
     Raises:
-        InputError: If the start or the way from there is known to be out of reach.
+        InputError: If the start or a position of the motion is known to be out of reach.
     """
     shift = np.zeros(3)
     if workpiece is not None:
@@ -43,8 +43,8 @@ def find_start(
     if mounting is not None:
         start = mounting.start(start, task)
     q_J = _posture(parameters, task, part, start, frame)
-    # what is carried is on its way to reach, or out of it
-    for position, where in () if frame is not None else task.way():
+    # a workpiece that moves may bring its path into reach, or out of it
+    for position, where in () if frame is not None else task.tool_positions():
         part.check_reach(position, where)
     return start, part.state_at_rest(q_J)
 
@@ -56,10 +56,10 @@ def _posture(
     start: StartPoint,
     frame: np.ndarray | None,
 ) -> np.ndarray:
-    """Return the joints at the start, shape (N,); say it if only the inverted one is in reach."""
+    """Return the joints at the start, shape (N,); advise if only the inverted pose is in reach."""
 
     def found(target: ToolTarget) -> np.ndarray:
-        return part.posture(target if frame is None else placed(target, frame), parameters)
+        return part.posture(target if frame is None else target_in_world(target, frame), parameters)
 
     try:
         return found(start.target)

@@ -1,4 +1,4 @@
-"""What is said beforehand of the controller that a scenario chooses."""
+"""Warnings before a run about the controller of a scenario."""
 
 from functools import cache
 
@@ -15,12 +15,12 @@ from diagrams.warnings.part_warnings import (
     stiff_fixtures,
 )
 from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
-from diagrams.warnings.untold_forces import (
+from diagrams.warnings.unmodelled_forces import (
     ExpectedForces,
-    bearable_way,
     largest_force,
-    untold_forces,
-    untold_friction,
+    tolerable_deflection,
+    uncompensated_friction,
+    unmodelled_forces,
 )
 from pfsc_drake.controller.controller import Controller
 from pfsc_drake.controller.law_warnings import (
@@ -35,44 +35,44 @@ from pfsc_drake.physics.operator_hand import LiveHandParameters
 
 
 def controller_warnings(scenario: Scenario, part: RobotPart, controller: Controller) -> list[str]:
-    """Return doubts about a scenario's controller, one sentence each.
+    """Return warnings about a scenario's controller, one sentence each.
 
     Args:
         scenario: The scenario.
         part: The robot.
         controller: The controller.
     """
-    parameters, robot, task = scenario.controller, part.belief.robot, controller.task
-    law, rest, sampled = controller.law, controller.rest, cache(controller.sampled)
+    parameters, robot, task = scenario.controller, part.nominal_model.robot, controller.task
+    law, rest, sampled = controller.law, controller.rest, cache(controller.sampled_loop)
     link_state = np.append(controller.start_posture, np.zeros(robot.dimension))
-    bearable = bearable_way(parameters.manifold, scenario.fixtures, scenario.compliance)
-    said = law_warnings(parameters, robot, law, link_state, sampled)
+    tolerable = tolerable_deflection(parameters.manifold, scenario.fixtures, scenario.compliance)
+    warnings = law_warnings(parameters, robot, law, link_state, sampled)
     if not parameters.law_record.commands_torque:
-        said += servo_warnings(scenario.servo.bandwidth, robot, link_state)
+        warnings += servo_warnings(scenario.servo.bandwidth, robot, link_state)
     q_J, period = link_state[: robot.dimension], parameters.sampling_time
-    said += coarse_encoders(scenario.encoders, period, robot, law, q_J)
-    said += untold_forces(
-        expected_forces(scenario), bearable, parameters, robot, law, rest, sampled
+    warnings += coarse_encoders(scenario.encoders, period, robot, law, q_J)
+    warnings += unmodelled_forces(
+        expected_forces(scenario), tolerable, parameters, robot, law, rest, sampled
     )
     if scenario.friction.is_given:
-        said += untold_friction(bearable, parameters, law)
-    said += observed_force_warnings(scenario.compliance, robot, law, rest)
-    said += obstacle_warnings(scenario.obstacles)
-    said += rest_warnings(scenario.teleoperation, scenario.hand, scenario.duration)
-    said += unused_parameters(parameters, law)
+        warnings += uncompensated_friction(tolerable, parameters, law)
+    warnings += observed_force_warnings(scenario.compliance, robot, law, rest)
+    warnings += obstacle_warnings(scenario.obstacles)
+    warnings += rest_warnings(scenario.teleoperation, scenario.hand, scenario.duration)
+    warnings += unused_parameters(parameters, law)
     if scenario.fixtures is not None and isinstance(task, SpaceTask):
-        said += stiff_fixtures(scenario.fixtures, task)
-        said += firm_guides(task.guides, [hand.force_limit for hand in _hands(scenario)])
+        warnings += stiff_fixtures(scenario.fixtures, task)
+        warnings += firm_guides(task.guides, [hand.force_limit for hand in _hands(scenario)])
     if scenario.needs_sensor:
         if scenario.compliance.needs_sensor:
-            said += taring_warnings(scenario.sensor.taring_time, scenario.reference.dwell)
-        load = part.believed_load(scenario.sensor.joint)
-        said += sensed_load_warnings(sensor_loop(scenario), robot, load, law, rest)
-    return said
+            warnings += taring_warnings(scenario.sensor.taring_time, scenario.reference.dwell)
+        load = part.nominal_load(scenario.sensor.joint)
+        warnings += sensed_load_warnings(sensor_loop(scenario), robot, load, law, rest)
+    return warnings
 
 
 def expected_forces(scenario: Scenario) -> ExpectedForces:
-    """Return the forces from outside that a scenario tells beforehand.
+    """Return the external forces that a scenario specifies.
 
     Args:
         scenario: The scenario.
@@ -92,7 +92,7 @@ def _hands(scenario: Scenario) -> list[HandParameters | LiveHandParameters]:
 
 
 def sensor_loop(scenario: Scenario) -> SensorLoop:
-    """Return a scenario's force sensor and what answers to it.
+    """Return the loop over a scenario's force sensor.
 
     Args:
         scenario: The scenario.

@@ -14,7 +14,7 @@ from pfsc_drake.checks import require_whole_ticks
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.turntable import TurntableAxes, turntable_motion_function
-from pfsc_drake.controller.carrier import Derivatives, TurntableMotion, delayed
+from pfsc_drake.controller.carrier import Derivatives, TurntableMotion, delay_curve
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.physics.turntable import TurntableDrive
 from pfsc_drake.systems.block_system import BlockSystem
@@ -30,7 +30,7 @@ class Turntable:
     """A turntable that carries the workpiece.
 
     Attributes:
-        parameters: What the scenario says of it.
+        parameters: Its parameters in the scenario.
     """
 
     parameters: TurntableParameters
@@ -41,32 +41,32 @@ class Turntable:
         return turntable_command(self.parameters)
 
     @property
-    def _believed(self) -> TurntableAxes:
+    def _nominal(self) -> TurntableAxes:
         return turntable_axes(self.parameters, self.parameters.placement_error.transform())
 
     @property
     def frame(self) -> np.ndarray:
         """Nominal pose of the workpiece at the start, ``[p_WC, R_WC by rows]``, shape (12,)."""
         begin = self.command.derivatives(0.0, 0)[0]
-        return np.array(turntable_motion_function(self._believed, 0)(begin)).ravel()
+        return np.array(turntable_motion_function(self._nominal, 0)(begin)).ravel()
 
     @cached_property
     def motion(self) -> ca.Function:
-        """Function of the true angles and rates to the true frame and its rate."""
+        """Function of the actual angles and rates to the actual frame and its rate."""
         return turntable_motion_function(turntable_axes(self.parameters, RigidTransform()), 1)
 
     @property
     def known_motion(self) -> TurntableMotion:
-        """Motion of the workpiece as the controller of a robot knows it."""
+        """Motion of the workpiece in the model of the robot's controller."""
         table = self.parameters
         delay = table.delay if table.believed_delay is None else table.believed_delay
         derivatives = cast(Derivatives, table.derivatives)
-        return TurntableMotion(self._believed, self.command, delay, derivatives, table.highest)
+        return TurntableMotion(self._nominal, self.command, delay, derivatives, table.highest)
 
     @cached_property
     def planned(self) -> PiecewisePolynomialCurve:
         """Planned motion of the workpiece over time."""
-        command, poses = self.command, turntable_motion_function(self._believed, 0)
+        command, poses = self.command, turntable_motion_function(self._nominal, 0)
         times = np.linspace(*command.domain, int(np.ceil(command.domain[1] / _STEP)) + 1)
         angles = command.derivatives(times, 0)[:, 0]
         values = np.array(poses.map(len(times))(angles.T)).T
@@ -80,14 +80,14 @@ class Turntable:
             period: Sampling time [s].
 
         Returns:
-            ``turntable_motion``, true angles and rates, and ``table_angles`` as measured.
+            ``turntable_motion``, actual angles and rates, and ``table_angles``, measured.
 
         Raises:
             InputError: If the table has no axes or stops, or a delay is no whole number of periods.
         """
         table, n = self.parameters, len(self.parameters.axes)
         ticks = require_whole_ticks("turntable.delay", table.delay, period, _MOST_TICKS)
-        timed = TimedReference(delayed(self.command, table.lag), 1, n, period)
+        timed = TimedReference(delay_curve(self.command, table.lag), 1, n, period)
         followed = builder.AddNamedSystem(f"{TURNTABLE}followed", BlockSystem(timed, period))
         block = TurntableDrive(n, table.increments, ticks)
         drive = builder.AddNamedSystem(f"{TURNTABLE}drive", BlockSystem(block, period))
@@ -103,7 +103,7 @@ def turntable_axes(parameters: TurntableParameters, shift: RigidTransform) -> Tu
 
     Args:
         parameters: The turntable.
-        shift: Where it is taken to stand, in its own axes, beside where it stands.
+        shift: Pose error of its base, in its own axes.
     """
     directions = np.array([axis.direction for axis in parameters.axes])
     return TurntableAxes(
@@ -121,20 +121,20 @@ def turntable_command(parameters: TurntableParameters) -> PiecewisePolynomialCur
         parameters: The turntable.
     """
     stops = np.deg2rad(parameters.stops_deg)
-    ways = np.abs(np.diff(stops, axis=0)).max(axis=1)
-    places = np.concatenate([[0.0], np.cumsum(ways)])
+    distances = np.abs(np.diff(stops, axis=0)).max(axis=1)
+    travel = np.concatenate([[0.0], np.cumsum(distances)])
     along = rest_to_rest(
-        places.tolist(),
+        travel.tolist(),
         velocity=np.deg2rad(parameters.velocity_deg),
         acceleration=np.deg2rad(parameters.acceleration_deg),
         dwell=parameters.dwell,
     )
     middle = 0.5 * (along.breakpoints[1:] + along.breakpoints[:-1])
     reached = along.derivatives(middle, 0)[:, 0, 0]
-    move = np.clip(np.searchsorted(places, reached, side="right") - 1, 0, len(ways) - 1)
-    slopes = np.diff(stops, axis=0)[move] / ways[move, None]
+    move = np.clip(np.searchsorted(travel, reached, side="right") - 1, 0, len(distances) - 1)
+    slopes = np.diff(stops, axis=0)[move] / distances[move, None]
     table = along.coefficients * slopes[:, None, :]
-    table[:, 0] += stops[move] - slopes * places[move, None]
+    table[:, 0] += stops[move] - slopes * travel[move, None]
     return PiecewisePolynomialCurve(
         along.breakpoints, table, known_smoothness=int(min(along.smoothness, table.shape[1]))
     )

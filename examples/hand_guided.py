@@ -1,6 +1,6 @@
 """A hand pulls the tool through a ball that it must not enter; the tool slides around it.
 
-The pull is scripted: the plant feels it, and the controller measures it. Run it with
+The pull is scripted: it acts on the plant, and the controller measures it. Run it with
 
     python examples/hand_guided.py
 """
@@ -23,10 +23,10 @@ PULL = np.array([0.0, 20.0, 0.0])  # N
 
 
 class Hand(LeafSystem):
-    """Pulls at the origin of a frame, more and more within a tenth of a second."""
+    """Force at the origin of a frame that increases within a tenth of a second."""
 
     def __init__(self, tool: Frame) -> None:
-        """Take hold of a tool."""
+        """Apply the force to a tool."""
         super().__init__()
         self._tool, applied = tool, Value[list[ExternallyAppliedSpatialForce]]
         self.DeclareVectorOutputPort("wrench", 6, self._measure)
@@ -45,7 +45,7 @@ class Hand(LeafSystem):
 
 
 def main() -> None:
-    """Simulate two seconds, and print how deep the tool was in the ball and how far it went."""
+    """Simulate two seconds; print the largest depth in the ball and the distance travelled."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(time_step=0.0))
     Parser(plant).AddModels(str(models_directory() / "comau_racer_1_4" / "comau_racer_1_4.sdf"))
@@ -67,13 +67,13 @@ def main() -> None:
     root = simulator.get_mutable_context()
     context = plant.GetMyMutableContextFromRoot(root)
     plant.SetPositionsAndVelocities(context, follower.start_state)
-    way = [np.array(START)]
+    trail = [np.array(START)]
     for time in np.arange(0.005, 2.0, 0.005):
         simulator.AdvanceTo(time)
-        way.append(tool.CalcPoseInWorld(context).translation())
-    deepest = max(0.0, -min(ball.distance(*point)[0] for point in way))
-    length = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
-    print(f"{1e3 * deepest:.3f} mm deep in the ball at most, {1e3 * length:.0f} mm of way")
+        trail.append(tool.CalcPoseInWorld(context).translation())
+    deepest = max(0.0, -min(ball.distance(*point)[0] for point in trail))
+    length = np.linalg.norm(np.diff(trail, axis=0), axis=1).sum()
+    print(f"{1e3 * deepest:.3f} mm deep in the ball at most, {1e3 * length:.0f} mm travelled")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""The same controller without Drake around it: joint state in, torques out, once a millisecond.
+"""A controller outside of a Drake diagram: joint state in, torques out, once a millisecond.
 
 Drake reads the model; the loop itself is one compiled function. Here the robot rests at the start,
-so that the torques are those that hold its weight and set it in motion.
+so that the torques hold its weight and begin its motion.
 
     python examples/no_drake.py
 """
@@ -21,7 +21,7 @@ TICKS = 2000
 
 
 def main() -> None:
-    """Step the controller, and print torques and time."""
+    """Step the controller; print torques and time."""
     plant = MultibodyPlant(time_step=0.0)
     model = models_directory() / "comau_racer_1_4" / "comau_racer_1_4_elastic.sdf"
     Parser(plant).AddModels(str(model))
@@ -31,15 +31,14 @@ def main() -> None:
 
     controller = follower.stepper()
     measured = follower.start_state  # [q, v], from your robot
-    told = controller.step(plant_state=measured)
-    print("drive torques [Nm]:", np.round(told["drive_torque"], 1))
+    outputs = controller.step(plant_state=measured)
+    print("drive torques [Nm]:", np.round(outputs["drive_torque"], 1))
 
     begin = time.perf_counter()
     for _ in range(TICKS):
-        told = controller.step(plant_state=measured)
-    print(
-        f"{1e6 * (time.perf_counter() - begin) / TICKS:.0f} us a tick, fault {told['fault'][0]:.0f}"
-    )
+        outputs = controller.step(plant_state=measured)
+    duration = 1e6 * (time.perf_counter() - begin) / TICKS
+    print(f"{duration:.0f} us a tick, fault {outputs['fault'][0]:.0f}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Your robot, your path, your diagram: a controller in ten lines.
+"""Path following in a diagram of your own, in ten lines.
 
 A six-axis arm follows a closed spline through four points. Run it with
 
@@ -18,7 +18,7 @@ POINTS = [[0.9, -0.3, 0.8], [1.0, 0.0, 0.9], [0.9, 0.3, 0.8], [0.8, 0.0, 0.75]] 
 
 
 def main() -> None:
-    """Simulate a second, and print how far the tool is from the path."""
+    """Simulate a second; print the distance of the tool from the path."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     model = models_directory() / "comau_racer_1_4" / "comau_racer_1_4_elastic.sdf"

@@ -12,7 +12,7 @@ import os
 
 from pfsc_drake.lazy_names import lazy_names
 
-# threads of BLAS compete with the processes side by side, and take longer than one does alone
+# BLAS threads compete with parallel processes, and then take longer than a single one
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 __all__, __getattr__, __dir__ = lazy_names(__name__)

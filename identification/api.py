@@ -1,4 +1,4 @@
-"""From measured motions to a model, from scripts and notebooks, as the command line has it."""
+"""Identification from scripts and notebooks, with the same steps as the command line."""
 
 import html
 import logging
@@ -16,7 +16,7 @@ from identification.findings import Findings
 from identification.measurement.columns import Reading
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.subject import Subject, load_subject
-from identification.options import Known, Shown
+from identification.options import BoundsOptions, PageOptions
 from identification.output import check_folder
 from identification.pages import identify
 from identification.report.tables import torque_table
@@ -33,14 +33,14 @@ from reporting.provenance import FIGURES, listed_results
 
 @dataclass(frozen=True)
 class Identification:
-    """What measured motions tell about a robot, and the folder in which it is kept.
+    """Result of an identification, and the folder in which it is saved.
 
-    A notebook shows what the model leaves of the torques, beside their noise.
+    A notebook shows the residual torques of the model, beside their noise.
 
     Attributes:
-        robot: What it was loaded by.
-        folder: With ``identification.h5``, the page and its figures.
-        findings: All that was found: runs, choice of friction, prediction.
+        robot: Argument that it was loaded from.
+        folder: Folder with ``identification.h5``, the page and its figures.
+        findings: All results: runs, choice of friction, prediction.
     """
 
     robot: str
@@ -59,17 +59,17 @@ class Identification:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is doubtful, one sentence each."""
+        """Warnings, one sentence each."""
         return self.findings.notes
 
     @property
     def report(self) -> Path:
-        """The page to open in a browser."""
+        """The page for the browser."""
         return self.folder / "report.html"
 
     @property
     def figures(self) -> dict[str, Path]:
-        """Pictures by name."""
+        """Images by name."""
         names = [name for name in listed_results(self.folder) if FIGURES in name]
         return {Path(name).stem: self.folder / name for name in names}
 
@@ -95,20 +95,20 @@ def simulate(
     tool: bool = False,
     quiet: bool = False,
 ) -> list[Path]:
-    """Simulate an experiment: rotors, friction, servo, encoders, noise; return a file of each run.
+    """Simulate an experiment: rotors, friction, servo, encoders, noise; return its files.
 
     Args:
         robot: Shipped robot, SDF or URDF file, or scenario with a robot.
         out: Folder for the files.
-        excitation: ``excitation.yaml`` of the motion; None for the one that is shipped.
-        runs: How often.
+        excitation: ``excitation.yaml`` of the motion; None for the shipped one.
+        runs: Number of runs.
         seed: Seed of the first run.
         realistic: Whether disturbances are coloured and friction differs from run to run.
         tool: Whether the shipped robot carries its tool.
         quiet: Whether to show no progress.
 
     Raises:
-        InputError: If there is no such robot, or no motion of it.
+        InputError: If there is no such robot, or no excitation for it.
     """
     subject, folder = _begin(robot, out, tool)
     trajectory = load_excitation(subject, _path(excitation))
@@ -140,24 +140,24 @@ def estimate(
     """Estimate base parameters from measured motions, and write ``identification.h5`` and a page.
 
     Args:
-        robot: As of :func:`simulate`.
+        robot: As in :func:`simulate`.
         records: Runs of one excitation: CSV, HDF5 or MAT files.
         out: Folder for the results.
         validation: Record of another motion, to choose friction and to predict.
-        period: Period of the motion [s], if files do not state it.
+        period: Period of the motion [s], if the files do not state it.
         skip: Periods at the start to leave out.
-        bandwidth: Bandwidth of the motion [Hz]; None for what torques tell.
+        bandwidth: Bandwidth of the motion [Hz]; None to choose it from the torques.
         plain: Whether there is Coulomb and viscous friction only.
-        names: Signals by what a file calls them.
-        units: Units that a file does not state, by signal.
+        names: Signals by their names in the files.
+        units: Units that the files do not state, by signal.
         scales: SI units per unit of the file, by signal.
-        bounds: What is known of the links (YAML); None for what is shipped, if anything.
-        simulated: Whether the robot's model is the truth, to compare with.
-        tool: As of :func:`simulate`.
+        bounds: Bounds of the links (YAML); None for those shipped with the robot, if any.
+        simulated: Whether the robot's model is the ground truth, to compare with.
+        tool: As in :func:`simulate`.
         quiet: Whether to show no progress.
 
     Raises:
-        InputError: If a file does not tell what is needed, or tells what no such robot can do.
+        InputError: If a file lacks required data, or contains data that no such robot can produce.
         WriteError: If results could not be written.
     """
     subject, folder = _begin(robot, out, tool)
@@ -174,7 +174,7 @@ def estimate(
             subject,
             files,
             folder,
-            Shown(_path(bounds)),
+            PageOptions(_path(bounds)),
             plain=plain,
             simulated=simulated,
             progress=progress,
@@ -193,30 +193,30 @@ def consistent_model(
     direct: bool = False,
     tool: bool = False,
 ) -> WrittenModel:
-    """Find the nearest parameters that bodies can have, and write them as SDF, URDF and YAML.
+    """Find the nearest physically consistent parameters, and write them as SDF, URDF and YAML.
 
     Args:
-        found: What was estimated, or its folder or ``identification.h5``.
-        robot: As of :func:`simulate`; by default that of what was estimated.
+        found: Identification, or its folder or ``identification.h5``.
+        robot: As in :func:`simulate`; by default the robot of the identification.
         out: Folder for the files.
-        bounds: What is known of the links (YAML); None for what is shipped.
+        bounds: Bounds of the links (YAML); None for those shipped with the robot.
         direct: Whether in one step from the first run's torques.
-        tool: As of :func:`simulate`.
+        tool: As in :func:`simulate`.
 
     Raises:
-        InputError: If nothing is known of the links, or what was estimated is far from any robot.
+        InputError: If there are no bounds of the links, or no robot is near the estimate.
     """
-    place, robot = (
+    source, robot = (
         (found.folder, robot or found.robot)
         if isinstance(found, Identification)
         else (Path(found), robot)
     )
     subject, folder = _begin(robot, out, tool)
-    return find_model(subject, place, Known(_path(bounds)), direct, folder)[1]
+    return find_model(subject, source, BoundsOptions(_path(bounds)), direct, folder)[1]
 
 
 def _begin(robot: str, out: str | Path, tool: bool) -> tuple[Subject, Path]:
-    """Return the robot, and the folder for results, which can take them."""
+    """Return the robot, and the checked folder for results."""
     logging.getLogger("drake").setLevel(logging.CRITICAL)
     folder = Path(out).expanduser()
     subject = load_subject(robot, tool=tool)

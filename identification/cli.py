@@ -1,8 +1,8 @@
 """The command line: ``excite`` a robot, ``simulate`` the experiment, ``estimate`` from files.
 
-``consistent`` writes a model, ``report`` draws the page anew, ``elastic`` tells about elastic
-joints, ``information`` about motions. Exit status: 0 done; 2 the input is wrong, one line on
-stderr; 4 results could not be written; 130 interrupted.
+``consistent`` writes a model, ``report`` writes the page again, ``elastic`` identifies elastic
+joints, ``information`` evaluates motions. Exit status: 0 done; 2 wrong input, one line on stderr; 4
+results could not be written; 130 interrupted.
 """
 
 import logging
@@ -15,22 +15,22 @@ from rich.console import Console
 
 from identification.elastic.command import elastic_command
 from identification.options import (
-    Evaluation,
-    Known,
-    Measured,
-    Model,
-    Motion,
+    BoundsOptions,
+    EvaluationOptions,
+    ExcitationOptions,
+    ModelOptions,
+    PageOptions,
+    ReadingOptions,
+    RecordOptions,
     Robot,
-    Shown,
     Tool,
     Validation,
-    Wording,
     read_number,
     read_pairs,
 )
 from identification.output import check_folder
 from reporting.progress import fraction_display
-from reporting.terminal import grouped, interruptible, run_app, show_page
+from reporting.terminal import flatten_options, interruptible, run_app, show_page
 
 if TYPE_CHECKING:
     from identification.model.subject import Subject
@@ -46,12 +46,12 @@ app = typer.Typer(
 
 
 @app.command("excite")
-@grouped
+@flatten_options
 def excite_command(
     robot: Robot,
     *,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_excitation")] = None,
-    motion: Motion,
+    motion: ExcitationOptions,
     limits: Annotated[
         list[str] | None,
         typer.Option(
@@ -61,10 +61,10 @@ def excite_command(
             "acceleration=30 or velocity=1,1,2. Default: those of the model",
         ),
     ] = None,
-    cell: Annotated[Path | None, typer.Option(help="What stands around the robot (YAML).")] = None,
+    cell: Annotated[Path | None, typer.Option(help="Obstacles around the robot (YAML).")] = None,
     tool: Tool = False,
 ) -> None:
-    """Find a motion that shows all parameters within all limits."""
+    """Find a motion that excites all parameters within all limits."""
     from identification.excitation.limits import chosen_limits
     from identification.excitation.search import search
     from identification.steps import RECORDING, save_excitation
@@ -103,10 +103,10 @@ def simulate_command(
     robot: Robot,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_runs")] = None,
     excitation: Annotated[
-        Path | None, typer.Option(help="excitation.yaml. Default: the one that is shipped")
+        Path | None, typer.Option(help="excitation.yaml. Default: the shipped one")
     ] = None,
     runs: Annotated[int, typer.Option(min=1, max=MOST_RUNS, help="How often.")] = 7,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first run.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 1,
     realistic: Annotated[
         bool,
         typer.Option(help="Coloured disturbance, and friction that differs from run to run."),
@@ -130,16 +130,16 @@ def simulate_command(
 
 
 @app.command("estimate")
-@grouped
+@flatten_options
 def estimate_command(
     robot: Robot,
-    measured: Measured,
+    measured: RecordOptions,
     *,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_identification")] = None,
-    evaluation: Evaluation,
-    shown: Shown,
-    wording: Wording,
-    model: Model,
+    evaluation: EvaluationOptions,
+    shown: PageOptions,
+    wording: ReadingOptions,
+    model: ModelOptions,
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
     from identification.pages import identify
@@ -175,15 +175,13 @@ def estimate_command(
 
 
 @app.command("consistent")
-@grouped
+@flatten_options
 def consistent_command(
     robot: Robot,
-    identification: Annotated[
-        Path, typer.Argument(help="identification.h5, or the folder that it is in.")
-    ],
+    identification: Annotated[Path, typer.Argument(help="identification.h5, or its folder.")],
     *,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_model")] = None,
-    known: Known,
+    known: BoundsOptions,
     direct: Annotated[
         bool, typer.Option("--direct", help="In one step from the first run's torques.")
     ] = False,
@@ -204,17 +202,17 @@ def consistent_command(
 
 
 @app.command("report")
-@grouped
+@flatten_options
 def report_command(
     robot: Robot,
     folder: Annotated[Path, typer.Argument(help="Folder with identification.h5.")],
     *,
     validation: Validation = None,
-    shown: Shown,
-    model: Model,
+    shown: PageOptions,
+    model: ModelOptions,
     out: Annotated[Path | None, typer.Option(help="Default: FOLDER_report")] = None,
 ) -> None:
-    """Write the page of an identification anew, with what else there is to see on it."""
+    """Write the page of an identification again, with optional further content."""
     from identification.pages import write_stored
 
     with interruptible():
@@ -224,7 +222,7 @@ def report_command(
         raise typer.Exit(show_page("report", report))
 
 
-app.command("elastic")(grouped(elastic_command))
+app.command("elastic")(flatten_options(elastic_command))
 
 
 @app.command("information")
@@ -238,7 +236,7 @@ def information_command(
     ] = None,
     tool: Tool = False,
 ) -> None:
-    """Tell log det(X'X) and condition number of motions, of 1,000 samples of a period."""
+    """Print log det(X'X) and condition number of motions, for 1,000 samples of a period."""
     from identification.excitation.criterion import information
     from identification.excitation.fourier import FourierTrajectory
     from identification.model.base import base_parameters
@@ -275,7 +273,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _begin(
     robot: str, tool: bool, out: Path | None, results: str
 ) -> tuple[Console, "Subject", Path]:
-    """Return a console, the robot, and the folder for results, which can take them."""
+    """Return a console, the robot, and the checked folder for results."""
     subject = _load(robot, tool)
     folder = out or Path("out") / f"{subject.name}_{results}"
     check_folder(folder)
@@ -283,7 +281,7 @@ def _begin(
 
 
 def _load(robot: str, tool: bool) -> "Subject":
-    """Return the robot, and say what of its model is taken otherwise than its file says."""
+    """Return the robot, and print a note if its model was corrected."""
     from identification.model.subject import load_subject
 
     logging.getLogger("drake").setLevel(logging.CRITICAL)

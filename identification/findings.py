@@ -1,4 +1,4 @@
-"""From measured motions to a robot's model, in one go."""
+"""Identification of a robot's model from measured motions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,14 +35,15 @@ from pfsc_drake.geometry.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What repeated runs of an excitation tell about a robot.
+    """Results from repeated runs of an excitation.
 
     Attributes:
         runs: Estimates, one for each run.
-        choice: How friction was chosen; None if it was not.
+        choice: Choice of friction terms; None without one.
         prediction: Prediction of a motion that was not used; None without one.
-        truth: True base parameters, shape (n_b,); None for a real robot.
-        notes: What torques cannot tell about their units or make doubtful, one sentence each.
+        truth: Ground truth of the base parameters, shape (n_b,); None for a real robot.
+        notes: Properties of the signals that torques cannot verify, or doubtful ones, one sentence
+            each.
     """
 
     runs: Repetitions
@@ -53,14 +54,14 @@ class Findings:
 
     @property
     def estimate(self) -> Estimate:
-        """That of the first run."""
+        """Estimate of the first run."""
         return self.runs.estimates[0]
 
     @property
     def truth_test(self) -> TruthTest | None:
-        """Errors of the first run beside their covariance; None without truth.
+        """Errors of the first run beside their covariance; None without ground truth.
 
-        Friction does not count, which is another one each day.
+        Friction does not count, because it changes from day to day.
         """
         if self.truth is None:
             return None
@@ -85,11 +86,11 @@ def find_parameters(
         motions: Periods of one excitation, averaged; at least one.
         validation: Another motion, on which friction is chosen and which is predicted.
         choose: Whether to choose friction beyond Coulomb's and viscous.
-        truth: True parameters of the robot, shape (n,), if it is simulated.
-        progress: Told the fraction done and what is done.
+        truth: Simulated parameters of the robot, shape (n,), if it is simulated.
+        progress: Receives the completed fraction and the current step.
 
     Raises:
-        InputError: If there is no motion, one does not fit the robot, or does not excite it.
+        InputError: If there is no motion, or one does not fit or does not excite the robot.
     """
     if not motions:
         raise InputError("estimate: no record; at least one is required")
@@ -111,11 +112,11 @@ def find_parameters(
 
 
 def true_base(found: Estimate, parameters: np.ndarray) -> np.ndarray:
-    """Return what an estimate would be without errors, shape (n_b,).
+    """Return the error-free value of an estimate, shape (n_b,).
 
     Args:
-        found: The estimate; the robot has no terms of friction beyond Coulomb's and viscous.
-        parameters: True parameters of the robot, shape (n,).
+        found: The estimate; the robot has only Coulomb and viscous friction.
+        parameters: Simulated parameters of the robot, shape (n,).
     """
     return np.concatenate(
         [found.robot_base.values(parameters), np.zeros(len(found.friction.terms))]
@@ -125,16 +126,16 @@ def true_base(found: Estimate, parameters: np.ndarray) -> np.ndarray:
 def stored_findings(
     subject: Subject, path: Path, other: AveragedMotion | None, simulated: bool
 ) -> Findings:
-    """Return the findings that ``identification.h5`` holds.
+    """Return the findings stored in ``identification.h5``.
 
     Args:
         subject: The robot.
-        path: The file, or the folder that it is in.
+        path: The file, or its folder.
         other: A motion to predict, if any.
-        simulated: Whether the robot's model is the truth.
+        simulated: Whether the robot's model is the ground truth.
 
     Raises:
-        InputError: If the file cannot be read, or is of another robot.
+        InputError: If the file cannot be read, or belongs to another robot.
     """
     file = path / FILE_NAME if path.is_dir() else path
     runs = load_estimate(file)
@@ -149,12 +150,12 @@ def stored_findings(
 def consistent_set(
     findings: Findings, bounds: PhysicalBounds, direct: bool
 ) -> ConsistentParameters:
-    """Return the consistent set of what was found.
+    """Return the consistent set of an identification.
 
     Args:
         findings: Base parameters.
-        bounds: What is known of the bodies.
-        direct: Whether in one step from the first motion, in place of the mean of the runs.
+        bounds: Bounds of the bodies.
+        direct: Whether in one step from the first motion, instead of from the mean of the runs.
 
     Raises:
         InputError: If no bodies within the bounds have the estimated parameters.

@@ -1,4 +1,4 @@
-"""Options of the commands by groups, and how their text is read."""
+"""Options of the commands by groups, and parsers of their text."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 
 if TYPE_CHECKING:
     from identification.consistency.bounds import PhysicalBounds
@@ -24,15 +24,15 @@ Validation = Annotated[
     Path | None, typer.Option(help="Record of another motion, to choose friction and to predict.")
 ]
 Bounds = Annotated[
-    Path | None, typer.Option(help="What is known of the links (YAML). Default: what is shipped")
+    Path | None, typer.Option(help="Bounds of the links (YAML). Default: those shipped")
 ]
 MOST_STARTS = 1000  # of an excitation's search
 LONGEST_RUN = 3600.0  # s, of an excitation with all its periods
 
 
 @dataclass
-class Wording:
-    """What files say in other words or not at all."""
+class ReadingOptions:
+    """Names and units that the files lack or spell otherwise."""
 
     units: Annotated[
         list[str] | None,
@@ -40,7 +40,7 @@ class Wording:
     ] = None
     names: Annotated[
         list[str] | None,
-        typer.Option("--name", metavar="FILE_NAME=SIGNAL", help="What a file calls otherwise."),
+        typer.Option("--name", metavar="FILE_NAME=SIGNAL", help="Other name in the file."),
     ] = None
     scales: Annotated[
         list[str] | None,
@@ -48,7 +48,7 @@ class Wording:
     ] = None
 
     def reading(self) -> "Reading":
-        """Return what the options say of files; raises InputError if one is not of its form."""
+        """Return the options for reading files; raises InputError if one has another form."""
         from identification.measurement.columns import Reading
 
         pairs = read_pairs(self.scales, "--scale")
@@ -59,7 +59,7 @@ class Wording:
 
 
 @dataclass
-class Measured:
+class RecordOptions:
     """Files with measured motions."""
 
     records: Annotated[list[Path], typer.Argument(help="Runs of one excitation: CSV, HDF5 or MAT.")]
@@ -67,15 +67,15 @@ class Measured:
 
 
 @dataclass
-class Evaluation:
-    """How a measured motion is evaluated."""
+class EvaluationOptions:
+    """Evaluation of a measured motion."""
 
     period: Annotated[
-        float | None, typer.Option(help="Of the motion [s], if the files do not state it.")
+        float | None, typer.Option(help="Period of the motion [s], if the files do not state it.")
     ] = None
     skip: Annotated[int, typer.Option(min=0, help="Periods at the start to leave out.")] = 1
     bandwidth: Annotated[
-        float | None, typer.Option(help="Of the motion [Hz]. Default: what torques tell")
+        float | None, typer.Option(help="Bandwidth [Hz]. Default: chosen from the torques")
     ] = None
     plain: Annotated[bool, typer.Option("--plain", help="Coulomb and viscous friction only.")] = (
         False
@@ -83,44 +83,44 @@ class Evaluation:
 
 
 @dataclass
-class Shown:
-    """What a page shows beside the estimate."""
+class PageOptions:
+    """Further content of a page."""
 
     bounds: Bounds = None
     excitation: Annotated[
-        Path | None, typer.Option(help="excitation.yaml, to see the robot move on the page.")
+        Path | None, typer.Option(help="excitation.yaml, to show the robot's motion on the page.")
     ] = None
 
 
 @dataclass
-class Model:
-    """What the robot's model is."""
+class ModelOptions:
+    """Ground truth of the robot's model."""
 
     simulated: Annotated[
         bool,
-        typer.Option("--simulated", help="The robot's model is the truth: compare with it."),
+        typer.Option("--simulated", help="The robot's model is the ground truth: compare with it."),
     ] = False
     tool: Tool = False
 
 
 @dataclass
-class Known:
-    """What is known of a robot's links."""
+class BoundsOptions:
+    """Bounds of a robot's links."""
 
     bounds: Bounds = None
     total_mass: Annotated[
         str | None,
         typer.Option(
             metavar="LOW:HIGH",
-            help="Mass of all links [kg], of a robot of which nothing else is known.",
+            help="Mass of all links [kg], for a robot without other bounds.",
         ),
     ] = None
     margin: Annotated[
-        float, typer.Option(help="With it: how far bodies reach beyond their joints [m].")
+        float, typer.Option(help="With it: how far bodies extend beyond their joints [m].")
     ] = 0.1
 
     def read(self, subject: "Subject") -> "PhysicalBounds":
-        """Return the bounds; raises InputError if they cannot be read or nothing is known."""
+        """Return the bounds; raises InputError if they cannot be read or there are none."""
         from identification.consistency.bounds import bounds_from_geometry, bounds_of
 
         if self.total_mass is None:
@@ -131,22 +131,22 @@ class Known:
 
 
 @dataclass
-class Motion:
-    """The excitation that is searched for."""
+class ExcitationOptions:
+    """Excitation to search for."""
 
     criterion: Annotated[
         str, typer.Option(help="D: largest determinant; condition: smallest condition number.")
     ] = "D"
-    harmonics: Annotated[str, typer.Option(help="Of the fundamental frequency.")] = "1,3,5"
-    period: Annotated[float, typer.Option(help="Of the motion [s].")] = 10.0
-    periods: Annotated[int, typer.Option(min=1, help="How often it is to be run.")] = 5
+    harmonics: Annotated[str, typer.Option(help="Harmonics in use.")] = "1,3,5"
+    period: Annotated[float, typer.Option(help="Period of the motion [s].")] = 10.0
+    periods: Annotated[int, typer.Option(min=1, help="Number of periods in a run.")] = 5
     starts: Annotated[
         int, typer.Option(min=1, max=MOST_STARTS, help="Random motions to start from.")
     ] = 16
-    seed: Annotated[int, typer.Option(min=0, help="Of the first one.")] = 0
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first motion.")] = 0
 
     def check_duration(self) -> None:
-        """Refuse a run that is longer than anybody lets a robot move; raises InputError."""
+        """Refuse a run that is too long for a robot; raises InputError."""
         if not self.period * self.periods <= LONGEST_RUN:
             raise InputError(
                 f"--periods {self.periods} of {self.period:g} s: {self.period * self.periods:.4g} "
@@ -154,7 +154,7 @@ class Motion:
             )
 
     def search_options(self) -> "SearchOptions":
-        """Return how to search; raises InputError if a harmonic is no integer."""
+        """Return the options of the search; raises InputError if a harmonic is no integer."""
         from identification.excitation.search import SearchOptions
 
         harmonics = [read_integer(number, "--harmonics") for number in self.harmonics.split(",")]
@@ -171,7 +171,7 @@ def read_pairs(options: list[str] | None, option: str) -> list[tuple[str, str]]:
     for text in options or []:
         name, equals, value = text.partition("=")
         if not (name and equals and value):
-            raise InputError(f"{option} {shortened(text)}: allowed: NAME=VALUE")
+            raise InputError(f"{option} {shorten(text)}: allowed: NAME=VALUE")
         pairs.append((name, value))
     return pairs
 
@@ -180,12 +180,12 @@ def read_number(text: str, option: str) -> float:
     """Return the number of an option.
 
     Raises:
-        InputError: If it is none.
+        InputError: If it is not a number.
     """
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"{option} {shortened(text)}: allowed: a number") from None
+        raise InputError(f"{option} {shorten(text)}: allowed: a number") from None
 
 
 def read_range(text: str, option: str) -> tuple[float, float]:
@@ -196,7 +196,7 @@ def read_range(text: str, option: str) -> tuple[float, float]:
     """
     low, colon, high = text.partition(":")
     if not colon:
-        raise InputError(f"{option} {shortened(text)}: allowed: LOW:HIGH")
+        raise InputError(f"{option} {shorten(text)}: allowed: LOW:HIGH")
     return read_number(low, option), read_number(high, option)
 
 
@@ -204,9 +204,9 @@ def read_integer(text: str, option: str) -> int:
     """Return the integer of an option.
 
     Raises:
-        InputError: If it is none.
+        InputError: If it is not an integer.
     """
     try:
         return int(text)
     except ValueError:
-        raise InputError(f"{option} {shortened(text)}: allowed: integers, e.g. 1,3,5") from None
+        raise InputError(f"{option} {shorten(text)}: allowed: integers, e.g. 1,3,5") from None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pfsc_drake.errors import InputError, WriteError
 
-# what a system says of a disk that takes no more, whoever asks
+# errors of a full disk, for any user
 _NO_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -18,11 +18,11 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file; where the disk takes no more, into a temporary folder.
+    """Write a file; on a full disk, write into a temporary folder.
 
     Raises:
-        WriteError: If the disk takes no more; says where the file is instead.
-        InputError: If there can be no such file.
+        WriteError: If the disk is full; names the temporary file.
+        InputError: If the path is not possible.
     """
     try:
         path.write_bytes(content)
@@ -36,23 +36,23 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def _keep(path: Path, content: bytes) -> str:
-    """Write a file elsewhere, and return where in words."""
+    """Write a file elsewhere, and return the place in words."""
     try:
-        kept = Path(tempfile.mkdtemp(prefix="pfsc_drake_identification_")) / path.name
-        kept.write_bytes(content)
+        saved = Path(tempfile.mkdtemp(prefix="pfsc_drake_identification_")) / path.name
+        saved.write_bytes(content)
     except OSError:
         return "lost"
-    return f"kept in {kept}"
+    return f"saved in {saved}"
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder that nothing can be written into, before there is anything to write.
+    """Refuse a folder that cannot be written, before there is anything to write.
 
     Args:
-        folder: May be missing; is not made.
+        folder: Folder, which may be missing and is not created.
 
     Raises:
-        InputError: If it is no folder, or one that cannot be made or written into.
+        InputError: If it is not a folder, or cannot be created or written.
     """
     try:
         nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
@@ -65,7 +65,7 @@ def check_folder(folder: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder with its parents.
+    """Create a folder with its parents.
 
     Raises:
         InputError: If that is not possible.

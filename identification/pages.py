@@ -16,7 +16,7 @@ from identification.measurement.files import read_record
 from identification.measurement.periods import AveragedMotion, friction_trend
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
-from identification.options import Shown
+from identification.options import PageOptions
 from identification.report.identification_page import PageContent, write_page
 from identification.steps import RECORDING, MeasuredFiles, estimate_files
 from pfsc_drake.errors import InputError
@@ -29,7 +29,7 @@ def identify(
     subject: Subject,
     files: MeasuredFiles,
     folder: Path,
-    shown: Shown,
+    shown: PageOptions,
     *,
     plain: bool,
     simulated: bool,
@@ -40,11 +40,11 @@ def identify(
     Args:
         subject: The robot.
         files: Files with measured motions.
-        folder: Where.
-        shown: What the page shows beside the estimate.
+        folder: Folder of the results.
+        shown: Further content of the page.
         plain: Whether there is Coulomb and viscous friction only.
-        simulated: Whether the robot's model is the truth.
-        progress: Receives the fraction done and what is done.
+        simulated: Whether the robot's model is the ground truth.
+        progress: Receives the completed fraction and the current step.
     """
     findings, other = estimate_files(
         subject, files, choose=not plain, simulated=simulated, progress=progress
@@ -59,7 +59,7 @@ def write_stored(
     subject: Subject,
     source: Path,
     validation: Path | None,
-    shown: Shown,
+    shown: PageOptions,
     simulated: bool,
     folder: Path,
 ) -> Report:
@@ -69,9 +69,9 @@ def write_stored(
         subject: The robot.
         source: Folder with ``identification.h5``, or the file.
         validation: Record of a motion that was not used.
-        shown: What the page shows beside the estimate.
-        simulated: Whether the robot's model is the truth.
-        folder: Where to write.
+        shown: Further content of the page.
+        simulated: Whether the robot's model is the ground truth.
+        folder: Folder of the page.
     """
     other = None
     if validation is not None:
@@ -86,7 +86,7 @@ def _write(
     subject: Subject,
     findings: Findings,
     other: AveragedMotion | None,
-    shown: Shown,
+    shown: PageOptions,
     warnings: list[str],
 ) -> Report:
     content = PageContent(
@@ -111,7 +111,7 @@ def _recording(subject: Subject, file: Path | None, results: ResultsFolder) -> s
 def _consistent(
     subject: Subject, findings: Findings, file: Path | None
 ) -> ConsistentParameters | None:
-    """Return the consistent set, or None if nothing is known of the links."""
+    """Return the consistent set, or None if there are no bounds of the links."""
     found: PhysicalBounds | None = None
     try:
         found = bounds_of(subject, file)
@@ -122,19 +122,19 @@ def _consistent(
 
 
 def _warnings(findings: Findings) -> list[str]:
-    """Return what may not be as it should, one sentence each."""
-    said = list(findings.notes)
+    """Return the warnings, one sentence each."""
+    warnings = list(findings.notes)
     for run, estimate in enumerate(findings.runs.estimates, start=1):
         if not isinstance(estimate.motion, AveragedMotion):
             continue
         trend = friction_trend(estimate.motion)
         for j in np.flatnonzero(trend.changes):
-            said.append(
+            warnings.append(
                 f"run {run}: friction of {estimate.joint_names[j]} changed by "
                 f"{trend.coulomb[j]:.3g} and {trend.viscous[j]:.3g} times the velocity from the "
                 "first to the last period"
             )
         if run == 1 and estimate.coloured.any():
             names = ", ".join(np.array(estimate.joint_names)[estimate.coloured])
-            said.append(f"the noise of {names} has a colour, which the covariance knows")
-    return said
+            warnings.append(f"the noise of {names} is coloured, which the covariance includes")
+    return warnings

@@ -1,4 +1,4 @@
-"""The steps of an identification on files, as the command line has them."""
+"""Steps of an identification with files, for the command line."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,7 +8,7 @@ from identification.consistency.nearest import ConsistentParameters, refuse_far
 from identification.consistency.writing import WrittenModel, write_model
 from identification.estimation.residuals import choose_bandwidth
 from identification.estimation.validation import refuse_implausible
-from identification.estimation.wiring import unchecked
+from identification.estimation.wiring import doubtful_signals
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import JointLimits
 from identification.excitation.recording import record_excitation
@@ -30,7 +30,7 @@ from identification.model.base import BaseParameters, base_parameters
 from identification.model.dynamic_parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
-from identification.options import Known
+from identification.options import BoundsOptions
 from identification.output import make_folder
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
@@ -48,13 +48,13 @@ def save_excitation(
 
     Args:
         subject: The robot.
-        found: What was found.
-        folder: Where; made if it is not there.
-        periods: How often the motion is run.
-        limits: For the way from rest to the motion and back.
+        found: Result of the search.
+        folder: Folder of the files; created if it is missing.
+        periods: Number of periods in a run.
+        limits: Limits for run-in and run-out.
 
     Returns:
-        The page.
+        Path of the page.
     """
     make_folder(folder)
     trajectory, joints = found.trajectory, subject.joint_names
@@ -69,7 +69,7 @@ def save_excitation(
 
 
 def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
-    """Return the excitation of a file, or the best one that is shipped with the robot.
+    """Return the excitation of a file, or the best shipped one of the robot.
 
     Raises:
         InputError: If there is none, or the file cannot be read.
@@ -80,7 +80,7 @@ def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
 
 
 def shipped_excitations(subject: Subject) -> list[Path]:
-    """Return the files of motions that are shipped with a robot, the best one last.
+    """Return the shipped excitation files of a robot, the best one last.
 
     Raises:
         InputError: If there is none.
@@ -89,7 +89,7 @@ def shipped_excitations(subject: Subject) -> list[Path]:
     if not files or files[-1].name != "excitation_optimal.yaml":
         raise InputError(
             f"--excitation: none is shipped for {subject.name}; make one with: "
-            f"python -m identification excite {subject.name}"
+            f"pfsc identify excite {subject.name}"
         )
     return files
 
@@ -103,18 +103,18 @@ def simulate_runs(
     seeds: range,
     progress: Progress,
 ) -> list[Path]:
-    """Simulate an experiment several times, and return the files with what was measured.
+    """Simulate an experiment several times, and return the files with the measurements.
 
-    One run is simulated here, several on all cores.
+    A single run is simulated in this process, several on all cores.
 
     Args:
         subject: The robot.
-        robot: What it was loaded by.
+        robot: Argument that it was loaded from.
         trajectory: The excitation.
         imperfections: Imperfections of all runs; None for those shipped with the robot.
-        folder: Where to write; made if it is not there.
+        folder: Folder of the files; created if it is missing.
         seeds: Seed of each run.
-        progress: Receives the fraction done and what is done.
+        progress: Receives the completed fraction and the current step.
     """
     make_folder(folder)
     experiment = (robot, subject.tool, trajectory, imperfections, folder)
@@ -136,7 +136,7 @@ def _run(
     subject: Subject | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Simulate a run, in a process of its own with the robot loaded anew."""
+    """Simulate a run, in a process of its own with the robot loaded again."""
     robot, tool, trajectory, imperfections, folder = experiment
     subject = subject or load_subject(robot, tool=tool)
     measured = run_experiment(subject, trajectory, imperfections, seed=seed, progress=progress)
@@ -147,15 +147,15 @@ def _run(
 
 @dataclass(frozen=True)
 class MeasuredFiles:
-    """Files with measured motions, and how they are read.
+    """Files with measured motions, and options for reading them.
 
     Attributes:
         records: Runs of one excitation.
         validation: Measurement of another motion, which is not used to estimate.
-        reading: What files say in other words or not at all.
+        reading: Names and units that the files lack or spell otherwise.
         period: Period of the excitation [s], if files do not state it.
-        skip: Periods at the start that are left out.
-        bandwidth_hz: Bandwidth of the motion [Hz]; by default the least with which the model
+        skip: Periods at the start to leave out.
+        bandwidth_hz: Bandwidth of the motion [Hz]; by default the least one with which the model
             explains the torques of the first record as well as with any.
     """
 
@@ -168,21 +168,21 @@ class MeasuredFiles:
 
     @property
     def paths(self) -> list[Path]:
-        """All files, that of the other motion last."""
+        """All files, the one for validation last."""
         return [*self.records, *([self.validation] if self.validation else [])]
 
     def motions(
         self, regressor: Regressor, base: BaseParameters, progress: Progress
     ) -> tuple[list[AveragedMotion], AveragedMotion | None]:
-        """Return the motions that are used, and the one that is not.
+        """Return the motions for the estimate, and the one for validation.
 
         Args:
-            regressor: Of the robot.
+            regressor: Regressor of the robot.
             base: Its base parameters.
-            progress: Told the fraction done and what is done.
+            progress: Receives the completed fraction and the current step.
 
         Raises:
-            InputError: If there is no record, or a file does not tell what is needed.
+            InputError: If there is no record, or a file lacks required data.
         """
         if not self.records:
             raise InputError("estimate: no record; at least one is required")
@@ -214,14 +214,14 @@ def estimate_files(
     simulated: bool = False,
     progress: Progress,
 ) -> tuple[Findings, AveragedMotion | None]:
-    """Return what files with measured motions tell, and the motion that was not used.
+    """Return the findings from files with measured motions, and the motion for validation.
 
     Args:
         subject: The robot.
-        files: The files, and how they are read.
+        files: The files, and options for reading them.
         choose: Whether to choose friction beyond Coulomb's and viscous.
-        simulated: Whether the robot's model is the truth.
-        progress: Told the fraction done and what is done.
+        simulated: Whether the robot's model is the ground truth.
+        progress: Receives the completed fraction and the current step.
     """
     regressor = Regressor(subject)
     base = base_parameters(regressor)
@@ -239,24 +239,24 @@ def estimate_files(
     )
     for result in findings.runs.estimates:
         refuse_implausible(result)
-    notes = unchecked(regressor, base, motions[0], true_parameters(subject))
+    notes = doubtful_signals(regressor, base, motions[0], true_parameters(subject))
     return replace(findings, notes=tuple(notes)), other
 
 
 def find_model(
-    subject: Subject, source: Path, known: Known, direct: bool, folder: Path
+    subject: Subject, source: Path, known: BoundsOptions, direct: bool, folder: Path
 ) -> tuple[ConsistentParameters, WrittenModel]:
     """Find the consistent set of a stored identification, and write its model.
 
     Args:
         subject: The robot.
-        source: ``identification.h5``, or the folder that it is in.
-        known: What is known of the links.
+        source: ``identification.h5``, or its folder.
+        known: Bounds of the links.
         direct: Whether in one step from the first run's torques.
-        folder: Where to write.
+        folder: Folder of the files.
 
     Raises:
-        InputError: If nothing is known of the links, or what was estimated is far from any robot.
+        InputError: If there are no bounds of the links, or no robot is near the estimate.
     """
     findings = stored_findings(subject, source, None, simulated=False)
     refuse_implausible(findings.estimate)
@@ -266,5 +266,5 @@ def find_model(
 
 
 def write_consistent(subject: Subject, found: ConsistentParameters, folder: Path) -> WrittenModel:
-    """Write the model of a consistent set, without friction that models do not have."""
+    """Write the model of a consistent set, without friction terms that models do not have."""
     return write_model(subject, found.parameters[: len(true_parameters(subject))], folder)

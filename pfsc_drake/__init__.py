@@ -9,12 +9,12 @@ options) have names here, too. Packages import downwards only:
 
 * :mod:`pfsc_drake.controller`: whole controllers, from the joint state to the drives.
 * :mod:`pfsc_drake.codegen`: controllers as C99.
-* :mod:`pfsc_drake.systems`: blocks as Drake systems, one by one or fused; plants, drawing.
-* :mod:`pfsc_drake.physics`: what a controller meets and does not know.
-* :mod:`pfsc_drake.control`: what a controller knows: laws, manifolds, observers, fixtures.
+* :mod:`pfsc_drake.systems`: blocks as Drake systems, single or fused; plants, drawing.
+* :mod:`pfsc_drake.physics`: simulated effects outside the controller's model.
+* :mod:`pfsc_drake.control`: laws, manifolds, observers, fixtures.
 * :mod:`pfsc_drake.robot`: kinematics and dynamics.
 * :mod:`pfsc_drake.geometry`: curves, surfaces, regions, projection, moving frames.
-* :mod:`pfsc_drake.blocks`: components as expressions, and networks of them.
+* :mod:`pfsc_drake.blocks`: blocks as expressions, and networks of them.
 * :mod:`pfsc_drake.compiled`: expressions as machine code.
 * :mod:`pfsc_drake.jets`: truncated Taylor arithmetic.
 """

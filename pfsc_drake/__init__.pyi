@@ -38,7 +38,7 @@ from pfsc_drake.control.law.reference import (
 )
 from pfsc_drake.control.law.swing import Swing as Swing
 from pfsc_drake.control.law.timed_reference import StreamLimits as StreamLimits
-from pfsc_drake.control.obstacles.elbow_room import ElbowParameters as ElbowParameters
+from pfsc_drake.control.obstacles.elbow_clearance import ElbowParameters as ElbowParameters
 from pfsc_drake.control.obstacles.shapes import (
     Capsule as Capsule,
 )
@@ -202,6 +202,9 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.geometry.regions.moving import (
     CurveCourse as CurveCourse,
+)
+from pfsc_drake.geometry.regions.moving import (
+    CurveMotion as CurveMotion,
 )
 from pfsc_drake.geometry.regions.moving import (
     MovingRegion as MovingRegion,

@@ -1,4 +1,4 @@
-"""Checks of values that people write."""
+"""Checks of values from users."""
 
 import math
 import re
@@ -12,9 +12,9 @@ from pfsc_drake.errors import require_one_of as require_one_of
 from pfsc_drake.errors import require_positive as require_positive
 
 LARGEST_ANGLE = 3600.0  # deg; ten turns
-# m: shorter ones are no motion of a robot, and coordinates beyond leave no digits for it.
+# m; shorter lengths are no motion of a robot, and larger coordinates leave no digits for it
 SHORTEST, FARTHEST = 1e-4, 1e4
-# Text that is a number. Python's float() would take more: underscores, the digits of all scripts.
+# Text that is a number. Python's float() accepts more: underscores, the digits of all scripts.
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _INFINITY = re.compile(r"[-+]?inf(inity)?", re.IGNORECASE)
 _ROUNDING = 1e-6
@@ -31,7 +31,7 @@ def is_number(value: float | str) -> bool:
         number = float(value)
     except OverflowError:
         return False
-    # text beyond the largest float is read as infinite, which is not what it says
+    # text beyond the largest float would be read as infinite
     return not math.isnan(number) and not (isinstance(value, str) and math.isinf(number))
 
 
@@ -41,7 +41,7 @@ def require_not_negative(key: str, value: float) -> None:
 
 
 def require_between(key: str, value: float, least: float, most: float, unit: str) -> None:
-    """Refuse a value outside a range, both ends being allowed."""
+    """Refuse a value outside a range; both ends are allowed."""
     require(least <= value <= most, key, value, f"{least:g} to {most:g} {unit}")
 
 
@@ -52,25 +52,25 @@ def require_numbers(key: str, values: Sequence[float] | np.ndarray, count: int) 
 
 
 def require_length(key: str, value: float) -> None:
-    """Refuse what is no length of anything that a robot meets [m]."""
+    """Refuse a length outside the range for robots [m]."""
     require(SHORTEST <= value <= FARTHEST, key, value, f"{SHORTEST:g} m to {FARTHEST:g} m")
 
 
-def require_place(key: str, values: Sequence[float]) -> None:
-    """Refuse what is no point [m] within reach of numbers."""
+def require_point(key: str, values: Sequence[float]) -> None:
+    """Refuse a point outside the range for robots [m]."""
     require_numbers(key, values, 3)
-    near = max(map(abs, values)) <= FARTHEST
-    require(near, key, values, f"3 numbers of at most {FARTHEST:g} m")
+    valid = max(map(abs, values)) <= FARTHEST
+    require(valid, key, values, f"3 numbers of at most {FARTHEST:g} m")
 
 
 def require_direction(key: str, values: Sequence[float]) -> None:
-    """Refuse what is no direction, of whatever length."""
+    """Refuse a direction of zero length; any other length is allowed."""
     require_numbers(key, values, 3)
     require(any(values), key, values, "3 numbers, not all zero")
 
 
 def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:
-    """Refuse a step that does not fit into the controller's sampling time a whole number of times.
+    """Refuse a step that is not a whole fraction of the controller's sampling time.
 
     Args:
         key: Key of the step.
@@ -78,7 +78,7 @@ def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:
         sampling_time: Sampling time of the controller [s].
 
     Returns:
-        How many times it fits.
+        Number of steps in a sampling time.
 
     Raises:
         InputError: If it does not fit.
@@ -93,19 +93,19 @@ def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:
 
 
 def require_whole_ticks(key: str, delay: float, sampling_time: float, most: int) -> int:
-    """Refuse a delay that is no multiple of the controller's sampling time.
+    """Refuse a delay that is not a multiple of the controller's sampling time.
 
     Args:
         key: Key of the delay.
         delay: The delay [s].
         sampling_time: Sampling time of the controller [s].
-        most: Most ticks that are allowed.
+        most: Largest number of ticks.
 
     Returns:
         The delay in ticks.
 
     Raises:
-        InputError: If it is no multiple, or longer than allowed.
+        InputError: If it is not a multiple, or too long.
     """
     ticks = round(delay / sampling_time)
     whole = abs(ticks * sampling_time - delay) < _ROUNDING * sampling_time
@@ -117,13 +117,13 @@ def require_whole_ticks(key: str, delay: float, sampling_time: float, most: int)
 def checked_vector(
     subject: str, name: str, value: np.ndarray, size: int, *, positive: bool
 ) -> np.ndarray:
-    """Return a copy that cannot be written, one finite number per joint.
+    """Return a read-only copy with one finite number per joint.
 
     Args:
-        subject: What the parameter belongs to, for the message.
+        subject: Owner of the parameter, for the message.
         name: Name of the parameter.
         value: The parameter.
-        size: How many numbers it needs.
+        size: Required length.
         positive: Whether zero is refused too.
 
     Raises:

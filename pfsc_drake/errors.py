@@ -1,4 +1,4 @@
-"""The one error raised for input that cannot be used."""
+"""The error for input that cannot be used."""
 
 import difflib
 import math
@@ -11,26 +11,25 @@ from pathlib import Path
 
 MAX_MESSAGE = 1000  # characters
 _SHORTEST_SHARE = 150  # characters of one problem among others
-_MOST_FILES = 10_000  # of a folder that is looked through for a name
+_MOST_FILES = 10_000  # of a folder that is searched for a name
 
 
 class InputError(ValueError):
-    """Input from outside is wrong; raised where it enters, before anything moves.
+    """Error for wrong input, raised where it enters, before anything moves.
 
-    The message is one line that names the thing (file, key, parameter), its
-    value and what is allowed. One of more than MAX_MESSAGE characters is
-    shortened in its middle, where the value stands.
+    The message is one line with the name (file, key, parameter), its value and the allowed ones. A
+    message of more than MAX_MESSAGE characters is shortened in its middle, where the value stands.
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(shortened(message, MAX_MESSAGE))
+        super().__init__(shorten(message, MAX_MESSAGE))
 
 
 class WriteError(InputError):
-    """What was asked for is done, but could not be written: a full disk, or a broken one."""
+    """Error for results that could not be written, because a disk is full or broken."""
 
 
-def shortened(text: str, length: int = 60) -> str:
+def shorten(text: str, length: int = 60) -> str:
     """Returns a text, without its middle if it is longer than ``length`` characters."""
     if len(text) <= length:
         return text
@@ -39,18 +38,18 @@ def shortened(text: str, length: int = 60) -> str:
 
 
 def did_you_mean(word: object, known: Iterable[str], cutoff: float = 0.6) -> str:
-    """Return ``did you mean 'elastic'? ``, or nothing if no word is near.
+    """Return ``did you mean 'elastic'? ``, or nothing if no word is similar.
 
     Args:
-        word: What was written.
-        known: Words that are known.
-        cutoff: How near a word must be, from 0 to 1.
+        word: The word that was written.
+        known: Known words.
+        cutoff: Required similarity, from 0 to 1.
     """
     text, words = str(word), list(known)
-    if len(text) > max(map(len, words), default=0) + 20:  # near to none, and long to compare
+    if len(text) > max(map(len, words), default=0) + 20:  # similar to none, and slow to compare
         return ""
     nearest = difflib.get_close_matches(text, words, n=1, cutoff=cutoff)
-    if not nearest:  # capitals are no other word
+    if not nearest:  # ignore the case
         small = {name.lower(): name for name in words}
         found = difflib.get_close_matches(text.lower(), small, n=1, cutoff=cutoff)
         nearest = [small[name] for name in found]
@@ -64,51 +63,51 @@ def suggestion(word: object, known: Iterable[str]) -> str:
 
 
 def nearest_file(path: Path) -> str:
-    """Return ``; did you mean 'points.csv'?`` for a file that is not there, or nothing.
+    """Return ``; did you mean 'points.csv'?`` for a missing file, or nothing.
 
     Args:
-        path: The file, of whose folder the other names are looked at.
+        path: The file; other names in its folder are searched.
     """
     try:
         names = [file.name for file in islice(path.parent.iterdir(), _MOST_FILES)]
-    except (OSError, ValueError):  # there is no such folder, or it is closed
+    except (OSError, ValueError):  # the folder is missing or not readable
         return ""
     return suggestion(path.name, (name for name in names if name.isprintable()))
 
 
 def in_one_line(problems: Sequence[str]) -> str:
-    """Return what is wrong, numbered if it is several things, within MAX_MESSAGE characters.
+    """Return one or more problems, numbered if there are several, within MAX_MESSAGE characters.
 
     Args:
-        problems: One or more.
+        problems: Problems, at least one.
     """
     if len(problems) == 1:
         return problems[0]
-    told: list[str] = []
-    room = MAX_MESSAGE - 150  # for the file's name in front, and for what is left out
+    parts: list[str] = []
+    budget = MAX_MESSAGE - 150  # for the file's name in front, and for problems left out
     for number, problem in enumerate(problems, start=1):
-        share = max(_SHORTEST_SHARE, room // (len(problems) - len(told)) - 7)
-        if room < share:
+        share = max(_SHORTEST_SHARE, budget // (len(problems) - len(parts)) - 7)
+        if budget < share:
             break
-        if len(problem) > share:  # the nearest word tells more than all of them
+        if len(problem) > share:  # the nearest word says more than all of them
             problem = re.sub(r"(did you mean .*\?) allowed: .*", r"\1", problem)
-        told.append(f"({number}) {shortened(problem, share)}")
-        room -= len(told[-1]) + 2
-    left = len(problems) - len(told)
+        parts.append(f"({number}) {shorten(problem, share)}")
+        budget -= len(parts[-1]) + 2
+    left = len(problems) - len(parts)
     more = f"; and {left} more" if left else ""
-    return f"{len(problems)} things are wrong: {'; '.join(told)}{more}"
+    return f"{len(problems)} things are wrong: {'; '.join(parts)}{more}"
 
 
-# by key what was refused, while somebody wants to know all of it
+# refused values by key, while refusals are collected
 _gathered: ContextVar[dict[str, InputError] | None] = ContextVar("gathered", default=None)
 
 
 @contextmanager
 def gathered_refusals() -> Iterator[list[str]]:
-    """Let :func:`require` go on, and give a list that holds all refusals afterwards.
+    """Collect refusals of :func:`require` instead of raising them, as a list that is filled later.
 
-    Of each key the first counts. What is calculated with refused values may fail in any way, so
-    that exceptions tell nothing once there is a refusal.
+    The first refusal of each key counts. Calculations with refused values may fail in any way;
+    therefore other exceptions are ignored once there is a refusal.
     """
     refusals: dict[str, InputError] = {}
     messages: list[str] = []
@@ -132,10 +131,10 @@ def require(condition: bool, key: str, value: object, allowed: str) -> None:
         condition: Whether the value is allowed.
         key: Its key.
         value: The value.
-        allowed: What is allowed, for people.
+        allowed: Allowed values in words.
 
     Raises:
-        InputError: If it is not; within :func:`gathered_refusals` not at once.
+        InputError: If it is not; within :func:`gathered_refusals` at the end.
     """
     if not condition:
         shown = value.tolist() if hasattr(value, "tolist") else value
@@ -143,12 +142,12 @@ def require(condition: bool, key: str, value: object, allowed: str) -> None:
 
 
 def require_one_of(key: str, value: object, allowed: Iterable[str]) -> None:
-    """Refuse a word that is none of those allowed, and name the nearest.
+    """Refuse a word that is not allowed, and suggest the nearest.
 
     Args:
         key: Its key.
         value: The word.
-        allowed: Words that are allowed.
+        allowed: Allowed words.
 
     Raises:
         InputError: As :func:`require`.

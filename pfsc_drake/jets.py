@@ -1,11 +1,9 @@
 """Truncated Taylor arithmetic.
 
-A :class:`Jet` is the list of Taylor coefficients ``c_k = x^(k) / k!``,
-``k = 0..order``, of a signal ``x(t)`` at the present instant. Coefficients are
-plain numbers, numpy arrays of shape ``(3,)`` or ``(3, 3)``, or CasADi ``SX``
-scalars, columns and matrices; the arithmetic is the same for all of them.
-Operations between jets of different order give the lower order, which is all
-that is known of the result.
+A :class:`Jet` is the list of Taylor coefficients ``c_k = x^(k) / k!``, ``k = 0..order``, of a
+signal ``x(t)`` at the present instant. Coefficients are numbers, numpy arrays of shape ``(3,)`` or
+``(3, 3)``, or CasADi ``SX`` scalars, columns and matrices; the arithmetic is the same for all of
+them. Operations between jets of different order give the lower order, the highest that is known.
 """
 
 import math
@@ -25,7 +23,7 @@ class Jet:
         coefficients: ``c_0 .. c_order``, all of one shape.
 
     Raises:
-        ValueError: If no coefficient is given.
+        ValueError: If there is no coefficient.
     """
 
     __slots__ = ("coefficients",)
@@ -39,7 +37,7 @@ class Jet:
 
     @classmethod
     def from_derivatives(cls, derivatives: Sequence[Coefficient]) -> "Jet":
-        """Make a jet from ``x, x', x'', ...``."""
+        """Return a jet from ``x, x', x'', ...``."""
         return cls([d / math.factorial(k) for k, d in enumerate(derivatives)])
 
     @property
@@ -60,7 +58,7 @@ class Jet:
         return Jet(self.coefficients[: order + 1])
 
     def append(self, coefficient: Coefficient) -> "Jet":
-        """Return the jet of the next order, whose last coefficient is given."""
+        """Return the jet of the next order with this last coefficient."""
         return Jet((*self.coefficients, coefficient))
 
     def differentiate(self) -> "Jet":
@@ -72,7 +70,7 @@ class Jet:
         return Jet([initial, *(c / (k + 1) for k, c in enumerate(self.coefficients))])
 
     def map(self, function: Callable[[Coefficient], Coefficient]) -> "Jet":
-        """Apply a *linear* function to the signal, that is to every coefficient."""
+        """Apply a *linear* function to the signal, i.e. to every coefficient."""
         return Jet([function(c) for c in self.coefficients])
 
     @property
@@ -168,7 +166,7 @@ def bilinear(product: Callable[[Coefficient, Coefficient], Coefficient], x: Jet,
 
 
 def _square(x: Jet) -> Jet:
-    """Return the square of a scalar signal; every mixed product stands once."""
+    """Return the square of a scalar signal; every mixed product is computed once."""
     a = x.coefficients
     result = []
     for k in range(len(a)):
@@ -296,7 +294,7 @@ def compose_pair(partials: Sequence[Coefficient], first: Jet, second: Jet) -> Je
     powers = [_scaled_powers(inner.truncate(order)) for inner in (first, second)]
     result = [partials[0]]
     for k in range(1, order + 1):
-        # the linear terms last: what they add to is the same whatever coefficients they have
+        # the linear terms last: the sum before them does not depend on their coefficients
         terms = [(n - j, j) for n in range(k, 0, -1) for j in range(n + 1)]
         products = [(powers[0][i] * powers[1][j]).coefficients[k] for i, j in terms]
         factors = [partials[(i + j) * (i + j + 1) // 2 + j] for i, j in terms]
@@ -314,7 +312,7 @@ def _scaled_powers(x: Jet) -> list[Jet]:
 
 
 def vector(components: Sequence[Jet]) -> Jet:
-    """Return the vector signal made of scalar signals."""
+    """Return the vector signal of scalar signals."""
     order = min(c.order for c in components)
     columns = []
     for k in range(order + 1):
@@ -327,9 +325,8 @@ def solve_ode(right_hand_side: Callable[[Jet], Jet], initial: Coefficient, order
     """Return the Taylor solution of ``x' = f(x)`` up to ``order``.
 
     Args:
-        right_hand_side: Maps the jet of ``x`` of some order to the jet of
-            ``x'`` of at least the same order; everything else that ``x'``
-            depends on is known to the function.
+        right_hand_side: Maps the jet of ``x`` of some order to the jet of ``x'`` of at least the
+            same order; it contains everything else that ``x'`` depends on.
         initial: Value of ``x`` at the present instant.
         order: Order of the result.
     """

@@ -13,9 +13,10 @@ from pfsc_drake.errors import suggestion
 def lazy_names(package: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
     """Return ``__all__``, ``__getattr__`` and ``__dir__`` of a package.
 
-    Public names are what the stub ``__init__.pyi`` beside the package imports, so that type
-    checkers, ``dir`` and the interpreter know the same ones. A module is imported with the first of
-    its names that is used: users of a small part do not wait for Drake.
+    The public names are those that the stub ``__init__.pyi`` beside the package imports, so that
+    type checkers, ``dir`` and the interpreter agree. A module is imported with the first use of one
+    of its
+    names: users of a small part do not wait for Drake.
 
     Args:
         package: Name of the package, which is being imported.

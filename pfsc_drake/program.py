@@ -1,8 +1,8 @@
-"""The program ``pfsc``: the commands of a clone, wherever one stands.
+"""The program ``pfsc``: the commands of a clone, callable from any folder.
 
-``make setup`` installs it into the clone's environment. It is the same as ``python -m experiments``
-and needs no folder to stand in; ``pfsc --install-completion`` lets the shell complete its words.
-The library that is installed without a clone has no commands, and says so in one line.
+``make setup`` installs it into the clone's environment. In any folder it is the same as
+``python -m experiments``; ``pfsc --install-completion`` enables completion in the shell. The
+library installed without a clone has no commands, and reports this in one line.
 """
 
 import importlib
@@ -15,7 +15,7 @@ _ROOT = Path(__file__).resolve().parents[1]
 
 
 def main(root: Path = _ROOT) -> int:
-    """Run the command line that the process was started with.
+    """Run the command line of the process.
 
     Args:
         root: Top folder of the clone.

@@ -10,7 +10,7 @@ from pfsc_drake.errors import (
     nearest_file,
     require,
     require_one_of,
-    shortened,
+    shorten,
     suggestion,
 )
 
@@ -23,8 +23,8 @@ def test_a_message_with_a_huge_value_keeps_what_stands_around_it():
 
 
 def test_short_texts_stay_as_they_are():
-    assert shortened("a" * 60) == "a" * 60
-    assert shortened("a" * 40 + "b" * 21) == "a" * 38 + "..." + "b" * 19
+    assert shorten("a" * 60) == "a" * 60
+    assert shorten("a" * 40 + "b" * 21) == "a" * 38 + "..." + "b" * 19
     assert str(InputError("x" * MAX_MESSAGE)) == "x" * MAX_MESSAGE
 
 

@@ -1,4 +1,4 @@
-"""What is packaged: an installed wheel and a clone find the same models."""
+"""Package content: an installed wheel and a clone find the same models."""
 
 import dataclasses
 import re
@@ -72,17 +72,17 @@ def classes_of(hint):
     return set().union(*map(classes_of, typing.get_args(hint)))
 
 
-def test_whatever_arguments_are_made_of_has_a_public_name():
+def test_all_argument_types_have_public_names():
     functions = [getattr(pfsc_drake, name) for name in pfsc_drake.__all__ if name[:4] == "add_"]
     assert len(functions) >= 5
-    waiting, seen = [typing.get_type_hints(function) for function in functions], set()
+    waiting, visited = [typing.get_type_hints(function) for function in functions], set()
     while waiting:
         for hint in waiting.pop().values():
-            for found in classes_of(hint) - seen:
-                seen.add(found)
+            for found in classes_of(hint) - visited:
+                visited.add(found)
                 if dataclasses.is_dataclass(found):
                     waiting.append(typing.get_type_hints(found))
-    assert {found.__name__ for found in seen} - {*pfsc_drake.__all__} == set()
+    assert {found.__name__ for found in visited} - {*pfsc_drake.__all__} == set()
 
 
 def concrete_regions(base):
@@ -160,10 +160,10 @@ def test_constraints_pin_every_dependency_without_an_address():
     pinned = {
         line.split("==")[0].lower().replace("_", "-") for line in text.split() if "==" in line
     }
-    wanted = list(PROJECT["project"]["dependencies"])
+    requirements = list(PROJECT["project"]["dependencies"])
     for group in PROJECT["project"]["optional-dependencies"].values():
-        wanted += group
-    missing = {re.split(r"[<>=~! \[]", item)[0] for item in wanted} - pinned
+        requirements += group
+    missing = {re.split(r"[<>=~! \[]", item)[0] for item in requirements} - pinned
     assert not missing
 
 

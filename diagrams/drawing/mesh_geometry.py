@@ -1,7 +1,7 @@
 """Meshes reduced to their geometry, so that a recording holds nothing else of a user's files.
 
-OBJ, glTF and Collada files name further files: materials, textures, buffers. None of them is read
-but the buffers of a glTF file, in its folder or below. What is left has no address of anything.
+OBJ, glTF and Collada files name further files: materials, textures, buffers. Only the buffers of a
+glTF file are read, in its folder or below. The reduced files refer to no other file.
 """
 
 import base64
@@ -23,7 +23,7 @@ _GLTF_KEYS = (
     *("asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "buffers"),
     "materials",
 )
-# of objects in a glTF file, wherever they stand
+# keys of objects in a glTF file that are dropped everywhere
 _GLTF_LEFT_OUT = ("extensions", "extras", "camera", "skin", "targets")
 _GLTF_FACTORS = ("baseColorFactor", "metallicFactor", "roughnessFactor")
 _COLLADA_LEFT_OUT = ("library_images", "newparam", "texture", "extra")
@@ -31,11 +31,11 @@ _DATA = "data:"
 
 
 class NoMesh(Exception):
-    """A file does not hold the mesh that its name says."""
+    """Error of a file that holds no mesh of the kind that its suffix names."""
 
 
 def geometry_of(file: Path) -> bytes:
-    """Return a mesh file without all that is not geometry or a colour.
+    """Return a mesh file reduced to geometry and colours.
 
     Args:
         file: An OBJ, glTF or Collada file.
@@ -64,10 +64,10 @@ def in_memory(file: Path, mesh: Mesh) -> Mesh:
 
 def _obj(file: Path) -> bytes:
     lines = [line.lstrip() for line in file.read_bytes().splitlines()]
-    kept = [line for line in lines if line.split(None, 1)[:1] and line.split()[0] in _OBJ_WORDS]
-    if not all(any(line.startswith(key) for line in kept) for key in (b"v ", b"f ")):
+    reduced = [line for line in lines if line.split(None, 1)[:1] and line.split()[0] in _OBJ_WORDS]
+    if not all(any(line.startswith(key) for line in reduced) for key in (b"v ", b"f ")):
         raise NoMesh
-    return b"\n".join(kept)
+    return b"\n".join(reduced)
 
 
 def _gltf(file: Path) -> bytes:
@@ -85,7 +85,7 @@ def _gltf(file: Path) -> bytes:
         for buffer in reduced.get("buffers", []):
             buffer["uri"] = _buffer(file, buffer["uri"])
         text = json.dumps(reduced).encode()
-        # no other kind of file makes Meshcat raise
+        # Meshcat raises for broken files of this kind only
         mesh = Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".gltf", file.name)))
         hidden_meshcat().SetObject("mesh", mesh)
     except (AttributeError, KeyError, TypeError, RuntimeError):  # of another structure
@@ -94,7 +94,7 @@ def _gltf(file: Path) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """Return a part of a glTF file without what is left out of it."""
+    """Return a part of a glTF file without the keys that are dropped."""
     if isinstance(value, list):
         return [_plain(item) for item in value]
     if isinstance(value, dict):
@@ -109,7 +109,7 @@ def _colour(material: dict[str, Any]) -> dict[str, Any]:
 
 
 def _buffer(file: Path, address: str) -> str:
-    """Return a buffer of a glTF file as an address that holds it.
+    """Return a buffer of a glTF file as a data URI.
 
     Raises:
         InputError: If it is not in the file's folder.

@@ -1,4 +1,4 @@
-"""How a robot's model is drawn: which meshes can be, and sticks where none are."""
+"""Drawing of a robot's model: meshes that can be drawn, and a stick figure where there is none."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -37,7 +37,7 @@ _DRAWN = "obj, gltf, dae and stl"
 
 
 def drawn_mesh(mesh: Mesh) -> Mesh | Triangles:
-    """Return what to draw for a mesh of a model: its geometry, or the triangles of an STL file.
+    """Return the drawing of a model's mesh: its geometry, or the triangles of an STL file.
 
     Args:
         mesh: The mesh as read by Drake, from a file.
@@ -54,25 +54,25 @@ def drawn_mesh(mesh: Mesh) -> Mesh | Triangles:
 
 
 def check_mesh_file(file: FilePath) -> None:
-    """Refuse a file that would not be drawn, or not in the browser.
+    """Refuse a file that cannot be drawn, or not in the browser.
 
     Args:
         file: The file.
 
     Raises:
-        InputError: If it is missing, of another kind or not what its name says.
+        InputError: If it is missing, of another kind or not of the kind that its suffix names.
     """
     with _explained(file):
-        if file.suffix.lower() != ".stl":  # whose reader says best what is wrong with one
+        if file.suffix.lower() != ".stl":  # its reader reports errors itself
             geometry_of(file)
 
 
 @contextmanager
 def _explained(file: FilePath) -> Iterator[None]:
-    """Say what is wrong with the file of a mesh while it is read.
+    """Name the file of a mesh in errors while it is read.
 
     Raises:
-        InputError: If it is missing, of another kind or not what its name says.
+        InputError: If it is missing, of another kind or not of the kind that its suffix names.
     """
     if not file.is_file():
         raise InputError(f"{file}: no such file{nearest_file(file)}")
@@ -95,7 +95,7 @@ class NotDrawn:
 
     Attributes:
         link: Its name.
-        reason: Why, naming the file.
+        reason: The reason, with the file's name.
     """
 
     link: str
@@ -103,18 +103,18 @@ class NotDrawn:
 
 
 def drawable_text(file: FilePath, resolve: Resolve) -> tuple[str, list[NotDrawn]]:
-    """Return the text of a URDF or SDF file without all that hinders drawing.
+    """Return the text of a URDF or SDF file that Drake can draw.
 
-    Collision geometry goes, for it is not drawn and may be of kinds that only other parsers
-    take. Visual meshes that cannot be drawn go. Mesh addresses become absolute. A material that
-    is defined again with another content gets a name of its own; textures go.
+    Collision geometry is removed, since it is not drawn and may be of kinds that only other parsers
+    read. Visual meshes that cannot be drawn are removed, and so are textures. Mesh addresses become
+    absolute. A material that is defined again with another content gets a name of its own.
 
     Args:
         file: The model.
         resolve: From the address of a mesh to its file; may raise InputError.
 
     Returns:
-        The text, and what cannot be drawn.
+        The text, and the links that cannot be drawn.
 
     Raises:
         InputError: If the file cannot be read as a model.
@@ -138,7 +138,7 @@ def _located(mesh: Element, resolve: Resolve) -> Edit:
     """Return the edit that replaces a mesh's address by its file.
 
     Raises:
-        InputError: If that cannot be drawn.
+        InputError: If the file cannot be drawn.
     """
     uri = mesh.first("uri")  # SDF; URDF has an attribute
     written = mesh.attributes.get("filename", "") if uri is None else uri.text
@@ -161,10 +161,10 @@ _SMALLEST = 1e-6  # of the robot's length, below which two points are one
 def stick_figure(plant: MultibodyPlant, tool: Frame) -> list[BodyPart]:
     """Return the parts of a stick figure.
 
-    Every body is drawn by sticks from the joint that carries it to the joints that it carries,
-    and to the tool frame if that is its own; revolute joints as cylinders along their axes,
-    prismatic ones as boxes, others as spheres; the tool frame as three axes (red x, green y,
-    blue z). Thicknesses are in proportion to the robot's length.
+    Every body is drawn by sticks from its inboard joint to its outboard joints, and to the tool
+    frame if that is fixed to it; revolute joints as cylinders along their axes, prismatic ones as
+    boxes, others as spheres; the tool frame as three axes (red x, green y, blue z). Thicknesses are
+    in proportion to the robot's length.
 
     Args:
         plant: Plant with the robot, finalized.
@@ -199,8 +199,8 @@ def _sticks(
     body: RigidBody, joints: list[Joint], tool: Frame
 ) -> list[tuple[RigidBody, np.ndarray, np.ndarray]]:
     """Begin and end of each stick of a body, axes of the body [m]."""
-    carried_by = [joint for joint in joints if joint.child_body() is body]
-    begin = _origin(carried_by[0].frame_on_child()) if carried_by else np.zeros(3)
+    inboard = [joint for joint in joints if joint.child_body() is body]
+    begin = _origin(inboard[0].frame_on_child()) if inboard else np.zeros(3)
     ends = [_origin(j.frame_on_parent()) for j in joints if j.parent_body() is body]
     if tool.body() is body:
         ends.append(_origin(tool))
@@ -223,7 +223,7 @@ def _stick(
 
 
 def _joint(joint: Joint, length: float) -> BodyPart:
-    """A joint, drawn with the body that it carries."""
+    """A joint, drawn with its outboard body."""
     X_BF = joint.frame_on_child().GetFixedPoseInBodyFrame()
     size = _JOINT * length
     form: Shape = Sphere(size)

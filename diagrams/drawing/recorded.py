@@ -1,4 +1,4 @@
-"""What a recording draws of a run."""
+"""Data of a run that its recording draws."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ from pfsc_drake.control.obstacles.shapes import ObstacleShape
 
 @dataclass(frozen=True)
 class RecordedPushes:
-    """What pushes K points of a robot, at the recording's frames.
+    """Forces on K points of a robot, at the recording's frames.
 
     Attributes:
-        points: Where [m], shape (frames, 3K).
-        forces: World axes [N], shape (frames, 3K).
+        points: Positions of the points [m], shape (frames, 3K).
+        forces: Forces, world axes [N], shape (frames, 3K).
     """
 
     points: np.ndarray
@@ -27,7 +27,7 @@ class RecordedDistance:
 
     Attributes:
         values: Signed [m], shape (frames,).
-        largest: Magnitude that has full colour [m], positive.
+        largest: Magnitude drawn in full colour [m], positive.
     """
 
     values: np.ndarray
@@ -47,7 +47,7 @@ class RecordedHolder:
     workpiece_pose: np.ndarray
 
     def first_points(self, points: np.ndarray) -> np.ndarray:
-        """Return points of the workpiece where it is at the first frame [m], shape (K, 3).
+        """Return the positions of workpiece points at the first frame [m], shape (K, 3).
 
         Args:
             points: Points in its frame [m], shape (K, 3).
@@ -61,9 +61,9 @@ class RecordedObstacles:
     """Obstacles, at the recording's frames.
 
     Attributes:
-        positions: Of K obstacles [m], shape (frames, 3K).
-        shapes: What they are.
-        margin: Distance that is kept from them [m].
+        positions: Positions of K obstacles [m], shape (frames, 3K).
+        shapes: Their shapes.
+        margin: Clearance from them [m].
     """
 
     positions: np.ndarray
@@ -73,23 +73,23 @@ class RecordedObstacles:
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """What a log holds of a motion, at the recording's frames.
+    """Logged motion, at the recording's frames.
 
     Attributes:
         times: Times of the frames [s], shape (frames,), increasing from 0.
         positions: The plant's positions, shape (frames, nq).
         tool_pose: ``[y_t, R_e]``, shape (frames, 12).
         manifold_point: The manifold next to the tool, shape (frames, layout.size).
-        elbow: A point of the arm whose way is drawn, too [m], shape (frames, 3).
-        pushes: What pushes its links, or a hand far away, where that has the tool.
-        distance: What the colour of the tool's way tells; of one colour without.
-        tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
-        trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
+        elbow: Position of a point of the arm, drawn as a second trail [m], shape (frames, 3).
+        pushes: Forces on its links, or the force of a leader device at the point that it commands.
+        distance: Distance that colours the tool's trail; a trail of one colour without it.
+        tool_force: Force on the tool point, world axes [N], shape (frames, 3).
+        trail: Positions of the tool's trail [m], shape (frames, 3), if not those of ``tool_pose``.
         region_clock: Region clock of regions that move [s], shape (frames,).
         plates: ``[p, R by rows]`` of K plates, shape (frames, 12 K).
-        held: What a robot does that holds the workpiece; ``tool_pose``, ``manifold_point`` and
-            ``trail`` are then seen from the workpiece's frame.
-        obstacles: What moves across the path.
+        holder: Motion of the workpiece and of the robot that holds it; ``tool_pose``,
+            ``manifold_point`` and ``trail`` are then relative to the workpiece's frame.
+        obstacles: Obstacles that cross the path.
     """
 
     times: np.ndarray
@@ -103,5 +103,5 @@ class RecordedMotion:
     trail: np.ndarray | None = None
     region_clock: np.ndarray | None = None
     plates: np.ndarray | None = None
-    held: RecordedHolder | None = None
+    holder: RecordedHolder | None = None
     obstacles: RecordedObstacles | None = None

@@ -13,11 +13,12 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from diagrams.drawing.held_look import HeldLook
-from diagrams.drawing.mounting_look import MountingLook
+from diagrams.drawing.legend import ELBOW_COLOR, TOOL_COLOR
+from diagrams.drawing.mounting_drawing import MountingDrawing
+from diagrams.drawing.moving_workpiece_drawing import MovingWorkpieceDrawing
 from diagrams.drawing.recorded import RecordedMotion, RecordedPushes
 from diagrams.drawing.robot_geometry import RobotDrawing
-from diagrams.robots.workpiece import WorkpieceLook
+from diagrams.robots.workpiece import WorkpieceDrawing
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
 from pfsc_drake.geometry.rotation import placed_points
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
@@ -30,10 +31,10 @@ from pfsc_drake.systems.drawing.robot_visualizer import (
 )
 from pfsc_drake.systems.drawing.tool_visualizer import ForceArrows, TrailVisualizer
 
-# towards the camera if the path is in front of the robot, and its distance beside what is seen
+# direction to the camera if the path is in front of the robot, and its distance per size of the
+# scene
 _VIEW = np.array([0.53, -0.79, 0.31])
 _DISTANCE = 0.95
-_TOOL, _ELBOW = Rgba(0.9, 0.25, 0.1, 1.0), Rgba(0.45, 0.2, 0.75, 1.0)
 # m, between the path's lowest point and the grid
 _CLEARANCE = 0.15
 
@@ -42,8 +43,8 @@ class Playback:
     """Diagram under construction that draws a recorded motion while its time advances.
 
     Args:
-        motion: What to draw.
-        meshcat: Where to draw.
+        motion: The recorded motion.
+        meshcat: Meshcat instance to draw in.
         period: Time between frames [s].
     """
 
@@ -55,26 +56,27 @@ class Playback:
         self,
         robot: RobotDrawing,
         manifold: ManifoldDrawing,
-        workpiece: WorkpieceLook | None = None,
-        mounting: MountingLook | None = None,
-        held: HeldLook | None = None,
+        workpiece: WorkpieceDrawing | None = None,
+        mounting: MountingDrawing | None = None,
+        moving: MovingWorkpieceDrawing | None = None,
     ) -> Diagram:
         """Return the diagram for a serial robot.
 
         Args:
-            robot: How the robot is drawn.
-            manifold: How the manifold is drawn.
-            workpiece: What its tool touches, if anything.
-            mounting: How the plates of the motion are drawn, if there are any.
-            held: How the workpiece and the robot that holds it are drawn, if one does.
+            robot: Drawing of the robot.
+            manifold: Drawing of the manifold.
+            workpiece: Drawing of the workpiece that its tool touches, if there is one.
+            mounting: Drawing of the plates of the motion, if there are any.
+            moving: Drawing of a workpiece that moves and of the robot that holds it, if there is
+                one.
         """
         motion, meshcat = self._motion, self._meshcat
         bodies = body_origins(robot.plant, motion.positions[0])
         points = np.concatenate(manifold.outline())
-        if held is not None and motion.held is not None:
-            points = motion.held.first_points(points)
-            if held.robot is not None and motion.held.positions is not None:
-                others = body_origins(held.robot.plant, motion.held.positions[0])
+        if moving is not None and motion.holder is not None:
+            points = motion.holder.first_points(points)
+            if moving.robot is not None and motion.holder.positions is not None:
+                others = body_origins(moving.robot.plant, motion.holder.positions[0])
                 bodies = np.vstack([bodies, others])
         meshcat.SetCameraPose(*camera_and_target(points, bodies))
         if workpiece is not None:
@@ -82,12 +84,12 @@ class Playback:
         positions = self._add_motion(manifold, workpiece)
         if mounting is not None:
             self._add_mounting(mounting)
-        if held is not None and motion.held is not None:
-            pose = self._add_source("workpiece_pose", motion.held.workpiece_pose)
-            joints, holder = motion.held.positions, None
+        if moving is not None and motion.holder is not None:
+            pose = self._add_source("workpiece_pose", motion.holder.workpiece_pose)
+            joints, holder = motion.holder.positions, None
             if joints is not None:
                 holder = self._add_source("holder_positions", joints)
-            held.add(self._builder, pose, holder, meshcat, self._period)
+            moving.add(self._builder, pose, holder, meshcat, self._period)
         visualizer = RobotVisualizer(robot.plant, robot.parts, meshcat, self._period)
         body = self._builder.AddNamedSystem("robot_visualizer", visualizer)
         self._builder.Connect(positions, body.GetInputPort("positions"))
@@ -97,14 +99,14 @@ class Playback:
         self,
         robot: DeltaRobot,
         manifold: ManifoldDrawing,
-        workpiece: WorkpieceLook | None = None,
+        workpiece: WorkpieceDrawing | None = None,
     ) -> Diagram:
-        """Return the diagram for a DELTA robot; the motion's positions are those of the slides.
+        """Return the diagram for a DELTA robot; the positions of the motion are slide positions.
 
         Args:
             robot: The robot.
-            manifold: How the manifold is drawn, axes of the inertial frame (z_0 down).
-            workpiece: What its tool touches, if anything.
+            manifold: Drawing of the manifold, axes of the inertial frame (z_0 down).
+            workpiece: Drawing of the workpiece that its tool touches, if there is one.
         """
         meshcat, builder = self._meshcat, self._builder
         arrange_scene(np.concatenate(manifold.outline())[:, 2], meshcat)
@@ -119,8 +121,8 @@ class Playback:
     def _add_source(self, name: str, samples: np.ndarray) -> OutputPort:
         return add_source(self._builder, name, self._motion.times, samples)
 
-    def _add_mounting(self, look: MountingLook) -> None:
-        """Add plates and gripper, and what the plates are taken from and mounted into."""
+    def _add_mounting(self, mounting: MountingDrawing) -> None:
+        """Add plates, gripper, magazine and frame."""
         motion = self._motion
         assert motion.plates is not None
         count = motion.plates.shape[1] // 12
@@ -128,10 +130,12 @@ class Playback:
         tool, *plates = (
             self._add_source(f"mounting_pose_{k}", pose) for k, pose in enumerate(poses)
         )
-        look.add(self._builder, tool, plates, self._meshcat, self._period)
+        mounting.add(self._builder, tool, plates, self._meshcat, self._period)
 
-    def _add_motion(self, manifold: ManifoldDrawing, workpiece: WorkpieceLook | None) -> OutputPort:
-        """Draw all of the motion but the robot, and return the robot's positions, shape (nq,)."""
+    def _add_motion(
+        self, manifold: ManifoldDrawing, workpiece: WorkpieceDrawing | None
+    ) -> OutputPort:
+        """Draw the motion without the robot, and return the robot's positions, shape (nq,)."""
         motion, builder = self._motion, self._builder
         meshcat, period = self._meshcat, self._period
         positions = self._add_source("positions", motion.positions)
@@ -145,15 +149,15 @@ class Playback:
             add_workpiece_drawing(builder, workpiece, tool_pose, meshcat, period)
         self._add_tool()
         if motion.elbow is not None:
-            self._add_trail("elbow", _ELBOW, motion.elbow)
+            self._add_trail("elbow", ELBOW_COLOR, motion.elbow)
         if motion.pushes is not None:
             self._add_arrows("push", motion.pushes)
         if motion.obstacles is not None:
             obstacles = motion.obstacles
             drawn = ObstacleVisualizer(obstacles.shapes, obstacles.margin, meshcat, period)
-            look = builder.AddNamedSystem("obstacle_visualizer", drawn)
+            visualizer = builder.AddNamedSystem("obstacle_visualizer", drawn)
             source = self._add_source("obstacles", obstacles.positions)
-            builder.Connect(source, look.GetInputPort("positions"))
+            builder.Connect(source, visualizer.GetInputPort("positions"))
         return positions
 
     def _add_trail(
@@ -167,7 +171,7 @@ class Playback:
         return trail
 
     def _add_arrows(self, name: str, pushes: RecordedPushes) -> None:
-        """Add arrows for forces, the longest for the largest of all frames."""
+        """Add arrows for forces, scaled by the largest force of all frames."""
         points, forces = pushes.points, pushes.forces
         size = np.linalg.norm(forces.reshape(len(forces), -1, 3), axis=2).max(initial=0.0)
         visualizer = ForceArrows(points.shape[1] // 3, size, self._meshcat, self._period, name)
@@ -180,24 +184,24 @@ class Playback:
         """Add the path of the tool, and the force on it, where it is recorded."""
         motion = self._motion
         points, distance = motion.tool_pose[:, :3], motion.distance
-        color = _TOOL if distance is None else partial(signed_color, largest=distance.largest)
+        color = TOOL_COLOR if distance is None else partial(signed_color, largest=distance.largest)
         path = points if motion.trail is None else motion.trail
         trail = self._add_trail("path_following", color, path)
         if distance is not None:
             source = self._add_source("distance", distance.values[:, np.newaxis])
             self._builder.Connect(source, trail.GetInputPort("value"))
         if motion.tool_force is not None:
-            if motion.held is not None:
-                points = placed_points(points, motion.held.workpiece_pose)
+            if motion.holder is not None:
+                points = placed_points(points, motion.holder.workpiece_pose)
             self._add_arrows("tool_force", RecordedPushes(points, motion.tool_force))
 
 
 def arrange_scene(depth: np.ndarray, meshcat: Meshcat) -> None:
-    """Hang the robot above the grid, and look at it from the side, level with the rods.
+    """Hang the robot above the grid, with the camera at its side, level with the rods.
 
     Args:
-        depth: Where something is to be seen, z_0 down [m], shape (K,).
-        meshcat: Where to draw.
+        depth: Depths of the visible points, z_0 down [m], shape (K,).
+        meshcat: Meshcat instance to draw in.
     """
     height = float(depth.max()) + _CLEARANCE
     turn_scene_over(meshcat, height)
@@ -206,7 +210,7 @@ def arrange_scene(depth: np.ndarray, meshcat: Meshcat) -> None:
 
 
 def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a camera stands and where it looks to see all [m], shape (3,) each.
+    """Return position and target of a camera that shows all points [m], shape (3,) each.
 
     It looks from the side of the path, which is then to the right of the robot.
 
@@ -214,8 +218,8 @@ def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarra
         points: Points of the path [m], shape (k, 3).
         bodies: Origins of the robot's bodies [m], shape (bodies, 3), the base first.
     """
-    seen = np.vstack([points, bodies])
-    low, high = seen.min(axis=0), seen.max(axis=0)
+    shown = np.vstack([points, bodies])
+    low, high = shown.min(axis=0), shown.max(axis=0)
     target, size = (low + high) / 2.0, float(np.linalg.norm(high - low))
     away = points.mean(axis=0) - bodies[0]
     azimuth = np.arctan2(away[1], away[0]) if np.linalg.norm(away[:2]) > 0.1 * size else 0.0
@@ -240,7 +244,7 @@ def add_source(
         builder: Builder of the diagram.
         name: Name of the source.
         times: Times of the samples [s], shape (frames,).
-        samples: Shape (frames, size).
+        samples: The samples, shape (frames, size).
     """
     trajectory = PiecewisePolynomial.FirstOrderHold(times, samples.T)
     return builder.AddNamedSystem(name, TrajectorySource(trajectory)).get_output_port()
@@ -250,8 +254,8 @@ def record(diagram: Diagram, meshcat: Meshcat, duration: float, period: float) -
     """Play a replay diagram and return the recording as one self-contained page.
 
     Args:
-        diagram: From :class:`Playback`.
-        meshcat: The same as there.
+        diagram: Diagram from :class:`Playback`.
+        meshcat: Its Meshcat instance.
         duration: Length of the motion [s].
         period: Time between frames [s].
     """

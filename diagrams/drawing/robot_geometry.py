@@ -1,4 +1,4 @@
-"""What a robot looks like: its model's visual geometry, or a stick figure."""
+"""Visual geometry of a robot: from its model, or a stick figure."""
 
 import os
 from dataclasses import dataclass, field
@@ -26,20 +26,20 @@ from pfsc_drake.robot.models.model_text import usable_text
 from pfsc_drake.robot.models.model_xml import read_model_xml
 from pfsc_drake.systems.drawing.robot_visualizer import BodyPart
 
-# where the parser reads text, by the model's suffix; other kinds are read as they are
+# kinds of text that the parser reads, by the model's suffix; files of other kinds are not edited
 _TEXTS = {".urdf": "urdf", ".sdf": "sdf"}
 _NO_COLOR = Rgba(0.9, 0.9, 0.9, 1.0)
 
 
 @dataclass(frozen=True)
 class RobotDrawing:
-    """What to draw of a robot.
+    """Drawing of a robot.
 
     Attributes:
-        plant: The plant whose bodies the parts move with.
-        parts: What to draw.
-        warnings: What cannot be drawn, one sentence each.
-        holder: The same of the robot that holds its workpiece, if one does.
+        plant: Plant with the bodies of the parts.
+        parts: Parts to draw.
+        warnings: Links that cannot be drawn, one sentence each.
+        holder: Drawing of the workpiece robot, if there is one.
     """
 
     plant: MultibodyPlant
@@ -51,16 +51,15 @@ class RobotDrawing:
 def draw_robot(
     plant: MultibodyPlant, tool: Frame, parameters: RobotParameters, folder: FilePath
 ) -> RobotDrawing:
-    """Return how to draw a robot, whatever can be drawn of its model.
+    """Return the drawing of a robot, with all parts of its model that can be drawn.
 
-    Where something cannot be drawn, and where there is nothing to draw, the robot is drawn as a
-    stick figure, too.
+    Where a link cannot be drawn, and where there is no geometry, a stick figure is added.
 
     Args:
-        plant: The robot as it is simulated, finalized, without geometry.
+        plant: Plant of the simulated robot, finalized, without geometry.
         tool: The tool's frame.
-        parameters: Which robot.
-        folder: Where relative file names start.
+        parameters: The robot.
+        folder: Base folder of relative file names.
     """
     try:
         parts, missing = _visual_parts(plant, parameters, folder)
@@ -74,7 +73,7 @@ def draw_robot(
 
 
 def _sentences(missing: list[NotDrawn]) -> list[str]:
-    """One line per reason, with all links that it concerns."""
+    """Return one line per reason, with all links that it concerns."""
     links: dict[str, list[str]] = {}
     for entry in missing:
         names = links.setdefault(entry.reason, [])
@@ -86,7 +85,7 @@ def _sentences(missing: list[NotDrawn]) -> list[str]:
 def _visual_parts(
     plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath
 ) -> tuple[list[BodyPart], list[NotDrawn]]:
-    """Read a model's geometry, and return it as parts of the bodies of another plant of it.
+    """Read a model's geometry, and return it as parts of the bodies of another plant.
 
     Raises:
         InputError: If the model cannot be read.
@@ -116,7 +115,7 @@ def _visual_parts(
         assert body is not None  # every frame of this source is one of the plant's bodies
         try:
             shape = inspector.GetShape(geometry)
-            # of kinds that are read as they are, too
+            # also of files that are not edited
             if isinstance(shape, Mesh) and not is_converted(FilePath(shape.source().path())):
                 _within(FilePath(shape.source().path()), file, packages)
             parts.append(_part(inspector, geometry, _same_body(plant, shown, body)))
@@ -149,7 +148,7 @@ def _part(inspector: SceneGraphInspector, geometry: GeometryId, body: RigidBody)
 
 
 def _resolve(address: str, file: FilePath, packages: PackageMap) -> FilePath:
-    """Return the file that a model's mesh address means.
+    """Return the file of a mesh address in a model.
 
     Raises:
         InputError: If its package is not known, or it is outside the model's packages.
@@ -173,7 +172,7 @@ def _within(mesh: FilePath, file: FilePath, packages: PackageMap) -> FilePath:
         InputError: If it is elsewhere.
     """
     path = FilePath(os.path.normpath(mesh.absolute()))
-    # those that Drake knows by itself may have to be downloaded first
+    # packages known to Drake may have to be downloaded first
     names = set(packages.GetPackageNames()) - set(PackageMap().GetPackageNames())
     folders = [packages.GetPath(name) for name in names]
     for folder in (file.absolute().parent.parent, *folders):

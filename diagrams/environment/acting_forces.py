@@ -1,4 +1,4 @@
-"""Everything that acts on the robot, at its tool and on its links."""
+"""Forces on the robot, at its tool and on its links."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.link_forces import LinkForces, LinkHand, LinkHandParameters
 from pfsc_drake.physics.scripted_force import DecoupledForce, ForceProfile, ScriptedForce
-from pfsc_drake.robot.serial.link_places import LinkPlace, place_on_link
+from pfsc_drake.robot.serial.link_points import LinkPoint, point_on_link
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 from pfsc_drake.systems.plants.applied_wrenches import LinkPushes
@@ -28,12 +28,12 @@ from pfsc_drake.systems.plants.applied_wrenches import LinkPushes
 
 @dataclass(frozen=True)
 class Outside:
-    """Forces on a robot from outside.
+    """External forces on a robot.
 
     Attributes:
-        forces: Written down beforehand, on the tool and on links.
+        forces: Scripted forces, on the tool and on links.
         hold_back: A wrench that only slows the tool down.
-        pushes: Hands that take hold of links.
+        pushes: Hands that hold and push links.
         hand: An operator's hand on the tool, if there is one.
         has_sensor: Whether forces are measured.
         period: Sampling time of the controller [s].
@@ -48,29 +48,29 @@ class Outside:
 
     @property
     def on_links(self) -> bool:
-        """Whether anything acts on links."""
+        """Whether there are forces on links."""
         return bool(self.pushes) or any(pulse.link for pulse in self.forces)
 
     @property
     def on_tool(self) -> bool:
-        """Whether anything acts on the tool."""
+        """Whether there are forces on the tool."""
         pulses = any(not pulse.link for pulse in self.forces)
         return pulses or self.hold_back.force != 0.0 or self.hand is not None
 
 
 @dataclass(frozen=True)
 class Environment:
-    """All that acts on a robot, at its tool and on its links.
+    """Environment of a robot: forces at its tool and on its links.
 
     Attributes:
         part: The robot.
         task: Its task.
         manifold: Manifold of ``manifold_point``.
-        outside: Forces from outside.
+        outside: External forces.
         start: Start of the tool.
         has_operator: Whether a person guides the tool.
         mounting: Plates that are mounted, if there are any.
-        spring: What the tool touches in place of contact in the plant, if it does.
+        spring: Spring that replaces contact in the plant, if there is one.
     """
 
     part: RobotPart
@@ -84,7 +84,7 @@ class Environment:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Names of the signals with forces that there are."""
+        """Names of the existing force signals."""
         acts = (self.mounting, self.spring, self.part.contact)
         on_tool = self.has_operator or self.outside.on_tool or any(acts)
         on_links = self.outside.on_links and isinstance(self.part, Arm)
@@ -103,12 +103,12 @@ class Environment:
             builder: Builder of the diagram.
             ports: ``true_state`` of the joints, and ``manifold_point`` for forces along its axes.
             operator: The person who guides the tool, if there is one.
-            reaction: Reaction on a robot that holds the workpiece; its inputs are connected.
+            reaction: Reaction on a workpiece robot; its inputs are connected.
 
         Returns:
-            ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there; if
-            something acts on K links ``push_wrench`` of shape (6K,), ``push_point`` of shape (3K,)
-            and ``push_torque`` of shape (N,); of plates those of :func:`add_gripper`,
+            ``wrench_ext`` on the tool point, world axes, shape (6,), if forces can act there; with
+            forces on K links ``push_wrench`` of shape (6K,), ``push_point`` of shape (3K,)
+            and ``push_torque`` of shape (N,); with plates the signals of :func:`add_gripper`,
             with an operator ``hand_wrench`` and ``phase``.
 
         Raises:
@@ -131,9 +131,9 @@ class Environment:
             sources += [mounted[name] for name in wrenches if name in mounted]
             signals |= mounted
         acting: list[OutputPort] = []
-        held: OutputPort | None = None
+        applied: OutputPort | None = None
         if part.contact is not None:
-            # the law's own pose is what encoders make of it, or that of the motors
+            # the law's pose is that of the encoders, or of the motors
             view = self._add_view(builder, joint_state)
             builder.Connect(view, part.contact.GetInputPort("tool_pose"))
             acting.append(part.contact.GetOutputPort("wrench"))
@@ -143,25 +143,25 @@ class Environment:
             # integrator
             hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
             builder.Connect(total, hold.GetInputPort("value"))
-            held = hold.GetOutputPort("held")
-            acting.append(held)
+            applied = hold.GetOutputPort("held")
+            acting.append(applied)
             if reaction is not None:
                 builder.Connect(total, reaction.GetInputPort("wrench"))
                 builder.Connect(
                     self._add_view(builder, joint_state), reaction.GetInputPort("tool_pose")
                 )
         if self.spring is not None:
-            # what is stiff follows the tool within a sample, too
+            # the force of a stiff spring varies within a sample
             builder.AddNamedSystem("surface_spring", self.spring)
             pose = self._add_view(builder, joint_state)
             builder.Connect(pose, self.spring.GetInputPort("tool_pose"))
             touching = self.spring.GetOutputPort("wrench")
-            held = touching if held is None else _sum_in_plant(builder, touching, held)
-            acting = [held]
+            applied = touching if applied is None else _sum_in_plant(builder, touching, applied)
+            acting = [applied]
         if pushes is not None and isinstance(part, Arm):
-            part.connect_pushes(builder, pushes, held, joint_state)
-        elif held is not None:
-            part.connect_wrench(builder, held, joint_state)
+            part.connect_pushes(builder, pushes, applied, joint_state)
+        elif applied is not None:
+            part.connect_wrench(builder, applied, joint_state)
         if acting:
             signals["wrench_ext"] = _sum(builder, "all_wrenches", acting, period)
         return signals
@@ -182,7 +182,7 @@ class Environment:
         if mounting.parameters.operator is None:
             return signals
         parameters = self.outside.hand
-        assert parameters is not None  # where an operator mounts, a hand is given
+        assert parameters is not None  # an operator who mounts has a hand
         hand = add_mounting_hand(
             builder, mounting, part.robot, self.task, parameters, period, joint_state
         )
@@ -195,7 +195,7 @@ class Environment:
         return signals | hand_signals
 
     def _scripted(self, builder: DiagramBuilder, ports: dict[str, OutputPort]) -> list[OutputPort]:
-        """Add the forces on the tool that are written down beforehand."""
+        """Add the scripted forces on the tool."""
         outside, period, sources = self.outside, self.outside.period, []
         pulses = [pulse for pulse in outside.forces if not pulse.link]
         if pulses:
@@ -203,7 +203,7 @@ class Environment:
             sources.append(operator.GetOutputPort("wrench"))
         pulse = outside.hold_back
         if pulse.force != 0.0:
-            manifold = self.task.place
+            manifold = self.task.projected_manifold
             allowed = "0 unless six axes follow a path with all of its orientation"
             square = len(manifold.coordinates) == self.part.robot.dimension == 6
             along_path = isinstance(manifold, PathManifold)
@@ -224,7 +224,7 @@ class Environment:
         pulses: list[ForcePulse],
         ports: dict[str, OutputPort],
     ) -> BlockSystem:
-        """Add forces at one point that are written down beforehand."""
+        """Add scripted forces at one point."""
         profile, period = ForceProfile(pulses), self.outside.period
         script = BlockSystem(ScriptedForce(profile, self.manifold, period), period)
         builder.AddNamedSystem(name, script)
@@ -235,25 +235,25 @@ class Environment:
     def _add_pushes(
         self, builder: DiagramBuilder, ports: dict[str, OutputPort]
     ) -> tuple[LinkPushes | None, dict[str, OutputPort]]:
-        """Add forces on links, and return what is applied to the plant, if any, and signals."""
+        """Add forces on links, and return the system that applies them, if any, and signals."""
         part, period, found = self.part, self.outside.period, _pushes(self.part, self.outside)
         if not found or not isinstance(part, Arm):
             return None, {}
-        system = LinkPushes(part.robot, [push.place for push in found])
+        system = LinkPushes(part.robot, [push.link_point for push in found])
         builder.AddNamedSystem("link_pushes", system)
         size = len(found)
-        told = LinkForces(part.robot, [(push.place.link, push.place.p_LQ) for push in found])
-        forces = builder.AddNamedSystem("link_forces", BlockSystem(told, period))
+        pushed = [(push.link_point.link, push.link_point.p_LQ) for push in found]
+        link_forces = LinkForces(part.robot, pushed)
+        forces = builder.AddNamedSystem("link_forces", BlockSystem(link_forces, period))
         points = forces.GetOutputPort("points")
         collect = Collect({f"wrench_{k + 1}": 6 for k in range(size)})
         wrenches = builder.AddNamedSystem("link_wrenches", BlockSystem(collect, period))
-        # held over a sample, so that bodies and joints bear the same, and the integrator sees no
-        # more
+        # held over a sample, so that bodies and joints receive the same, constant forces
         hold = builder.AddNamedSystem("push_hold", BlockSystem(Hold(6 * size), period))
         builder.Connect(wrenches.GetOutputPort("all"), hold.GetInputPort("value"))
-        for bearing in (system, forces):
-            builder.Connect(ports["true_state"], bearing.GetInputPort("joint_state"))
-            builder.Connect(hold.GetOutputPort("held"), bearing.GetInputPort("wrenches"))
+        for target in (system, forces):
+            builder.Connect(ports["true_state"], target.GetInputPort("joint_state"))
+            builder.Connect(hold.GetOutputPort("held"), target.GetInputPort("wrenches"))
         for k, push in enumerate(found):
             if push.hand is not None:
                 source = builder.AddNamedSystem(
@@ -295,7 +295,7 @@ def _sum(
 
 
 def _sum_in_plant(builder: DiagramBuilder, *wrenches: OutputPort) -> OutputPort:
-    """Return the sum of wrenches that a plant bears within a tick, without Python in between."""
+    """Return the sum of wrenches within a tick, by a system of Drake's."""
     total = builder.AddNamedSystem("tool_wrench", Adder(len(wrenches), 6))
     for i, wrench in enumerate(wrenches):
         builder.Connect(wrench, total.get_input_port(i))
@@ -304,49 +304,50 @@ def _sum_in_plant(builder: DiagramBuilder, *wrenches: OutputPort) -> OutputPort:
 
 @dataclass
 class _Push:
-    """What acts at one point of a link: pulses, or a hand."""
+    """Force at one point of a link, by pulses or by a hand."""
 
-    place: LinkPlace
+    link_point: LinkPoint
     pulses: list[ForcePulse]
     hand: LinkHandParameters | None = None
 
 
 def _pushes(part: RobotPart, outside: Outside) -> list[_Push]:
-    """Return what acts on links, pulses at one point together."""
+    """Return the forces on links, those of pulses at the same point combined."""
     scripted: list[_Push] = []
     for i, pulse in enumerate(outside.forces):
         if not pulse.link:
             continue
         for push in scripted:
-            if push.place.name == pulse.link and np.array_equal(push.pulses[0].point, pulse.point):
+            same = push.link_point.name == pulse.link
+            if same and np.array_equal(push.pulses[0].point, pulse.point):
                 push.pulses.append(pulse)
                 break
         else:
-            place = _place(part, outside, f"forces[{i}]", pulse.link, pulse.point)
-            scripted.append(_Push(place, [pulse]))
+            link_point = _link_point(part, outside, f"forces[{i}]", pulse.link, pulse.point)
+            scripted.append(_Push(link_point, [pulse]))
     hands = [
-        _Push(_place(part, outside, f"pushes[{i}]", hand.link, hand.point), [], hand)
+        _Push(_link_point(part, outside, f"pushes[{i}]", hand.link, hand.point), [], hand)
         for i, hand in enumerate(outside.pushes)
     ]
     return scripted + hands
 
 
-def _place(
+def _link_point(
     part: RobotPart, outside: Outside, where: str, link: str, point: np.ndarray
-) -> LinkPlace:
+) -> LinkPoint:
     if not isinstance(part, Arm):
         raise InputError(
             f"{where}.link = '{link}'; allowed: none, this robot is pushed at its tool"
         )
     try:
-        place = place_on_link(part.model, part.coordinates, link, point)
+        link_point = point_on_link(part.model, part.coordinates, link, point)
     except InputError as error:
         raise InputError(f"{where}.link = {error}") from None
-    # what a sensor behind the last joint bears is told for forces on the tool point alone
-    last = place.link == part.robot.dimension - 1
+    # the load on a sensor behind the last joint is computed for forces on the tool point only
+    last = link_point.link == part.robot.dimension - 1
     if last and outside.has_sensor and isinstance(part, CoupledArm):
         raise InputError(
             f"{where}.link = '{link}' with robot.rotor_coupling and a force sensor; allowed: links "
             "before the last, or no link, for the tool point"
         )
-    return place
+    return link_point

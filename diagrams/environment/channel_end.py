@@ -1,4 +1,4 @@
-"""A system that talks to the other side of a teleoperation in another process, in real time."""
+"""Connection to the other side of a teleoperation in another process, in real time."""
 
 import time
 from collections.abc import Callable
@@ -7,32 +7,32 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from pfsc_drake.control.teleoperation.message import MESSAGE
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEndpoint
 
-_LATE = 0.1  # s, that is caught up; later than that, time goes on from there
+_LATE = 0.1  # s, largest delay that is caught up; after a longer one the clock is shifted
 
 
 class ChannelEnd(LeafSystem):
-    """Sends what a side tells at each tick, and puts out the newest that has come.
+    """Exchange of messages with the other side at each tick.
 
-    It waits for the clock, so that a simulation is never ahead of it, unless it is driven by one.
+    It waits for the clock, so that a simulation is never ahead of it, unless ``paced`` is false.
 
     Ports:
         sent (input): Message of this side, shape (15,).
-        arrived (output): Newest message of the other one, shape (15,), that was there at the last
-            tick; zero before.
+        arrived (output): Newest message of the other side at the last tick, shape (15,); zero
+            before the first.
 
     Args:
         end: End of the link.
         period: Sampling time [s].
-        clock: Tells the time [s].
-        sleep: Waits [s].
+        clock: Function that returns the time [s].
+        sleep: Function that waits [s].
         paced: Whether it waits for the clock.
     """
 
     def __init__(
         self,
-        end: TeleoperationEnd,
+        end: TeleoperationEndpoint,
         period: float,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,

@@ -20,10 +20,10 @@ from pfsc_drake.controller.tasks.path_task import PathTask
 from pfsc_drake.controller.tasks.space_task import SpaceTask
 from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.controller.teleoperated import Teleoperated
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEndpoint
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.channel import Channel
-from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.physics.hand_path import CoordinateMap
 from pfsc_drake.physics.leader_clutch import Clutch, TurningClutch
 from pfsc_drake.physics.leader_device import LeaderDevice, LeaderWrist
 from pfsc_drake.physics.operator_hand import LiveHand, OperatorHand
@@ -39,9 +39,9 @@ class LeaderSide:
     Attributes:
         parameters: The teleoperation.
         hand: The simulated operator's hand.
-        operator: A person at the leader, in place of it.
-        task: What the tool is to do.
-        start: Where the tool starts.
+        operator: A person at the leader, instead of the simulated hand.
+        task: Task of the tool.
+        start: Start of the tool.
         period: Sampling time [s].
     """
 
@@ -54,7 +54,7 @@ class LeaderSide:
 
     def add(
         self, builder: DiagramBuilder, message: OutputPort, *, paced: bool = True
-    ) -> tuple[dict[str, OutputPort], TeleoperationEnd | None]:
+    ) -> tuple[dict[str, OutputPort], TeleoperationEndpoint | None]:
         """Add leader and channel, or a link to a leader in another process.
 
         Args:
@@ -63,14 +63,16 @@ class LeaderSide:
             paced: Whether a link to another process makes time wait for the clock.
 
         Returns:
-            ``message_arrived`` at the follower, and signals of the leader; the link, if it is one.
+            ``message_arrived`` at the follower, and signals of the leader; the link, if there is
+            one.
 
         Raises:
-            InputError: If nobody holds the leader, or its tank does not suit it.
+            InputError: If the leader has no operator, or its tank does not suit it.
         """
-        way, period = self.parameters, self.period
-        if way.lcm:
-            link = TeleoperationEnd(DrakeLcm(way.lcm), "follower", way.silence)
+        parameters, period = self.parameters, self.period
+        if parameters.lcm:
+            lcm = DrakeLcm(parameters.lcm)
+            link = TeleoperationEndpoint(lcm, "follower", parameters.silence)
             end = builder.AddNamedSystem("leader_link", ChannelEnd(link, period, paced=paced))
             builder.Connect(message, end.GetInputPort("sent"))
             return {"message_arrived": end.GetOutputPort("arrived")}, link
@@ -81,14 +83,14 @@ class LeaderSide:
             return system.GetOutputPort("arrived")
 
         port, signals = self.add_leader(builder)
-        there = Channel(way.channel, MESSAGE, period)
+        there = Channel(parameters.channel, MESSAGE, period)
         arrived = add_channel("channel_there", there, port.GetOutputPort("message"))
-        back = add_channel("channel_back", Channel(way.back, MESSAGE, period), message)
+        back = add_channel("channel_back", Channel(parameters.back, MESSAGE, period), message)
         builder.Connect(back, port.GetInputPort("message"))
         return {"message_arrived": arrived} | signals, None
 
     def add_leader(self, builder: DiagramBuilder) -> tuple[BlockSystem, dict[str, OutputPort]]:
-        """Add a device with a hand at it, and its port.
+        """Add the leader device with the hand that moves it, and its port.
 
         Args:
             builder: Builder of the diagram.
@@ -97,11 +99,11 @@ class LeaderSide:
             The port, its input ``message`` open, and signals for the log.
 
         Raises:
-            InputError: If nobody holds the leader, or the tank does not suit it.
+            InputError: If the leader has no operator, or the tank does not suit it.
         """
         parameters, period = self.parameters, self.period
-        given = self.hand is not None or self.operator is not None
-        require(given, "hand", "null", "given where there is a leader")
+        has_hand = self.hand is not None or self.operator is not None
+        require(has_hand, "hand", "null", "given where there is a leader")
         turns = 0.0 if self.hand is None else self.hand.rotational_stiffness
         allowed = "0 where the leader does not turn (teleoperation.rotation)"
         require(parameters.axes > 3 or turns == 0.0, "hand.rotational_stiffness", turns, allowed)
@@ -129,10 +131,10 @@ class LeaderSide:
         leader = add("leader_port", TeleoperationPort("leader", parameters, limits))
         motor = add("leader_motor", Linear(scales[:3, :axes]))
         felt = add("leader_sensor", Linear(np.linalg.inv(scales)[:axes]))
-        held = self._add_hand(builder)
-        connect(clutch, "pose", held, "tool_pose")
-        connect(held, "wrench", handle, "hand_wrench")
-        connect(held, "wrench", felt, "vector")
+        hand = self._add_hand(builder)
+        connect(clutch, "pose", hand, "tool_pose")
+        connect(hand, "wrench", handle, "hand_wrench")
+        connect(hand, "wrench", felt, "vector")
         connect(handle, "position", clutch, "handle")
         connect(clutch, "position", leader, "position")
         connect(clutch, "grip", leader, "grip")
@@ -144,7 +146,7 @@ class LeaderSide:
             "leader_state": handle.GetOutputPort("state"),
             "led_point": clutch.GetOutputPort("position"),
             "leader_motor": motor.GetOutputPort("product"),
-            "leader_hand": held.GetOutputPort("wrench"),
+            "leader_hand": hand.GetOutputPort("wrench"),
         }
         R_0 = self.start.target.R_e
         if rotation is not None:
@@ -156,7 +158,7 @@ class LeaderSide:
                 "turning_clutch", TurningClutch(rotation.scale, R_0, parameters.clutch, period)
             )
             wrist_motor = add("wrist_motor", Linear(scales[3:]))
-            connect(held, "wrench", turned, "hand_wrench")
+            connect(hand, "wrench", turned, "hand_wrench")
             connect(turned, "orientation", turning, "handle")
             connect(turning, "orientation", leader, "orientation")
             connect(turning, "seen", clutch, "orientation")
@@ -174,20 +176,20 @@ class LeaderSide:
         hand, operator, task, period = self.hand, self.operator, self.task, self.period
         if operator is not None:
             block: Block = LiveHand(operator.hand, period)
-            held = builder.AddNamedSystem("live_hand", BlockSystem(block, period))
-            builder.Connect(operator.pull, held.GetInputPort("asked"))
-            return held
+            live = builder.AddNamedSystem("live_hand", BlockSystem(block, period))
+            builder.Connect(operator.pull, live.GetInputPort("request"))
+            return live
         assert hand is not None
         target, is_open = task.target, isinstance(task, PathTask) and not task.path.closed
         if hand.frame == "manifold":
-            for i, (eta, *beside) in enumerate(hand.places()[1].tolist()):
-                # a hand that presses the tool on at an end of its path is beyond it
+            for i, (eta, *beside) in enumerate(hand.target_points()[1].tolist()):
+                # a hand that presses on at an end of the path is beyond it
                 past = max(-eta, eta - task.length, 0.0) if is_open else 0.0
                 key = f"hand.waypoints[{i}].position"
                 require(
                     past <= _BEYOND, key, [eta, *beside], f"at most {_BEYOND:g} m beyond an end"
                 )
-                task.check_place(np.array([eta if past == 0.0 else 0.0, *beside]), key)
+                task.check_coordinates(np.array([eta if past == 0.0 else 0.0, *beside]), key)
         if is_open:
             target = _BeyondEnds(target, task.length)
         try:
@@ -199,24 +201,24 @@ class LeaderSide:
 
 @dataclass(frozen=True)
 class _BeyondEnds:
-    """Where coordinates of an open path are in the world, along its tangents beyond its ends.
+    """Map from coordinates of an open path to the world, along its tangents beyond its ends.
 
     Attributes:
-        place: Where they are on it.
+        to_world: Map from coordinates of the path itself to the world.
         length: Length of the path [m].
     """
 
-    place: Place
+    to_world: CoordinateMap
     length: float
 
     def __call__(self, coordinates: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return position [m] and velocity [m/s] in the world, shape (3,) each."""
         eta = float(np.clip(coordinates[0], 0.0, self.length))
         if eta == coordinates[0]:
-            return self.place(coordinates, rates)
+            return self.to_world(coordinates, rates)
         end = np.array([eta, *coordinates[1:]])
-        at, along = self.place(end, np.array([1.0, 0.0, 0.0]))
-        _, beside = self.place(end, np.array([0.0, *rates[1:]]))
+        at, along = self.to_world(end, np.array([1.0, 0.0, 0.0]))
+        _, beside = self.to_world(end, np.array([0.0, *rates[1:]]))
         return at + (coordinates[0] - eta) * along, rates[0] * along + beside
 
 
@@ -254,13 +256,13 @@ def port_limits(
 
     Args:
         parameters: The teleoperation.
-        side: ``leader`` or ``follower``, whose robot is a sample late.
-        force: The largest, and the largest speed [N, m/s].
-        moment: The largest, and the largest angular velocity [Nm, rad/s].
+        side: ``leader`` or ``follower``; the follower's robot is a sample late.
+        force: Largest force and largest speed [N, m/s].
+        moment: Largest moment and largest angular velocity [Nm, rad/s].
         period: Sampling time [s].
 
     Raises:
-        InputError: If the tank could not pay the forces of a sample or two.
+        InputError: If the tank cannot supply the energy of the forces in a sample or two.
     """
     turns, late = parameters.rotation is not None, SIDES.index(side)
     limits = PortLimits(*force, late, period, *(moment if turns else (0.0, 0.0)))

@@ -1,4 +1,4 @@
-"""Obstacles that move by themselves, and what is measured of them."""
+"""Obstacles that move by themselves, and their sensor."""
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -11,26 +11,26 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 
 _MOST_TICKS = 1000
-# source of what is told of them where the robot stands elsewhere
-TOLD = "obstacles_told"
+# source of the reported obstacles of a robot in another process
+REPORTED = "reported_obstacles"
 
 
-def add_told_obstacles(
+def add_reported_obstacles(
     builder: DiagramBuilder, crossing: CrossingParameters, period: float
 ) -> dict[str, OutputPort]:
-    """Add what others tell of obstacles, of which nothing else is known.
+    """Add a source of obstacle states that another process reports.
 
     Args:
         builder: Builder of the diagram.
-        crossing: What they look like.
-        period: Sampling time [s], of no matter here.
+        crossing: The obstacles.
+        period: Sampling time [s]; not used.
 
     Returns:
-        As :func:`add_obstacles`, both the same.
+        The signals of :func:`add_obstacles`, which are equal here.
     """
     nothing = np.full(6 * len(crossing.moving), np.nan)
-    told = builder.AddNamedSystem(TOLD, ConstantVectorSource(nothing)).get_output_port()
-    return {"obstacles": told, "obstacles_measured": told}
+    state = builder.AddNamedSystem(REPORTED, ConstantVectorSource(nothing)).get_output_port()
+    return {"obstacles": state, "obstacles_measured": state}
 
 
 def add_obstacles(
@@ -40,11 +40,11 @@ def add_obstacles(
 
     Args:
         builder: Builder of the diagram.
-        crossing: What moves, and how it is measured.
+        crossing: The obstacles and their sensor.
         period: Sampling time [s].
 
     Returns:
-        ``obstacles`` as they are, and ``obstacles_measured``, each (6K,) [m, m/s].
+        ``obstacles``, the actual states, and ``obstacles_measured``, each (6K,) [m, m/s].
 
     Raises:
         InputError: If the sensor does not suit the sampling time.

@@ -1,4 +1,4 @@
-"""Mounting plates: where they come from, where they go, and all of that as bodies in a plant."""
+"""Mounting plates: poses of magazine and frame, and a plant of plates, bores and rests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -40,12 +40,12 @@ _ORIENTED = 6  # coordinates of a path with all of its orientation
 
 @dataclass(frozen=True)
 class Mounting:
-    """Where plates come from and where they go.
+    """Poses of the plates in magazine and frame.
 
     Attributes:
-        parameters: The plates and what belongs to them.
-        X_WM: Where a plate's frame is when it lies in the magazine.
-        X_WF: Where it is when it is mounted.
+        parameters: Plates, pins, magazine, frame and gripper.
+        X_WM: Pose of a plate in the magazine.
+        X_WF: Pose of a plate that is mounted.
     """
 
     parameters: PlateParameters
@@ -53,14 +53,14 @@ class Mounting:
     X_WF: RigidTransform
 
     def start(self, start: StartPoint, task: Task) -> StartPoint:
-        """Return where the tool starts, which is at the frame where it still holds a plate there.
+        """Return the start of the tool; with ``plate.start: frame`` that is the mounted pose.
 
         Args:
-            start: What the scenario says.
+            start: Start of the task.
             task: The task.
 
         Raises:
-            InputError: If cups or pins are in something at the start.
+            InputError: If cups or pins penetrate plate or frame at the start.
         """
         if self.parameters.start == "frame":
             shift = self.X_WF.translation() - start.target.y_t
@@ -72,10 +72,10 @@ class Mounting:
         return start
 
     def plates(self, start: StartPoint) -> list[RigidTransform]:
-        """Return where the plates are at the start, the one that is held first.
+        """Return the poses of the plates at the start, the gripped plate first.
 
         Args:
-            start: Where the tool starts.
+            start: Start of the tool.
         """
         return {
             "magazine": [self.X_WM],
@@ -99,11 +99,11 @@ class Mounting:
         """Refuse a start with a pin in the frame."""
         pins, frame = self.parameters.pins, self.parameters.frame
         below = self.parameters.size[2] + pins.length
-        places = np.array(pins.positions)
-        tips = np.column_stack([places, np.full(len(places), below)])
+        axes = np.array(pins.positions)
+        tips = np.column_stack([axes, np.full(len(axes), below)])
         tips_F = (self.X_WF.inverse() @ X_WT).multiply(tips.T).T
         depth = tips_F[:, 2] - self.parameters.size[2]
-        beside = np.linalg.norm(tips_F[:, :2] - places, axis=1)
+        beside = np.linalg.norm(tips_F[:, :2] - axes, axis=1)
         overlaps = (depth > 0.0) & (beside > frame.clearance / 2.0)
         if overlaps.any():
             i = int(np.argmax(overlaps))
@@ -115,11 +115,11 @@ class Mounting:
 
 
 def make_mounting(plate: PlateParameters, task: Task, *, has_hand: bool, period: float) -> Mounting:
-    """Return where plates come from and go.
+    """Return the poses of the plates in magazine and frame.
 
     Args:
         plate: The plates.
-        task: What the tool is to do.
+        task: Task of the tool.
         has_hand: Whether there is an operator's hand.
         period: Sampling time [s].
 
@@ -127,7 +127,7 @@ def make_mounting(plate: PlateParameters, task: Task, *, has_hand: bool, period:
         InputError: If the plates do not suit the task.
     """
     require_whole_fraction("plate.contact.time_step", plate.contact.time_step, period)
-    if not isinstance(task, PathTask) or len(task.place.coordinates) != _ORIENTED:
+    if not isinstance(task, PathTask) or len(task.projected_manifold.coordinates) != _ORIENTED:
         raise InputError("plate = given: allowed: null unless a path with orientation is followed")
     operated = plate.operator is not None
     require(not operated or has_hand, "hand", "null", "given for plate.operator")
@@ -166,7 +166,7 @@ def tool_transform(start: StartPoint) -> RigidTransform:
 
 
 REST_RADIUS = 2e-3  # m, of the bosses on which a plate lies
-PAD = 0.02, 0.01  # m, side and height of what they lie on
+PAD = 0.02, 0.01  # m, side and height of the pads under the bosses
 
 
 def add_plate_plant(
@@ -177,18 +177,18 @@ def add_plate_plant(
     X_WPs: Sequence[RigidTransform],
     gravity: np.ndarray,
 ) -> tuple[MultibodyPlant, list[BodyIndex], PartnerForces]:
-    """Add a plant of its own for the plates, K free bodies; what they touch is fixed to its world.
+    """Add a plant of its own for the plates, K free bodies, with magazine and frame fixed in it.
 
     Args:
         builder: Builder of the diagram.
         parameters: The plates, the magazine and the frame.
-        X_WM: Where a plate's frame is when it lies in the magazine.
-        X_WF: Where it is when it is mounted.
-        X_WPs: Where the K plates are at the start.
-        gravity: World axes [m/s^2], shape (3,).
+        X_WM: Pose of a plate in the magazine.
+        X_WF: Pose of a plate that is mounted.
+        X_WPs: Poses of the K plates at the start.
+        gravity: Gravitational acceleration, world axes [m/s^2], shape (3,).
 
     Returns:
-        The plant, the plates in it, and the forces by frame and magazine on all plates, shape
+        The plant, its plates, and the forces of frame and magazine on all plates, shape
         (6,) [N].
     """
     plant = builder.AddNamedSystem("plates", MultibodyPlant(parameters.contact.time_step))
@@ -218,10 +218,9 @@ def add_plate_plant(
 
 
 def pin_shape(parameters: PlateParameters) -> tuple[Capsule, float]:
-    """Return a pin as a capsule, and where its middle is along z of the plate [m].
+    """Return a pin as a capsule, and the position of its middle along z of the plate [m].
 
-    It is rooted within the plate by its radius, so that what protrudes is a cylinder with one
-    round tip.
+    It begins within the plate by its radius, so that a cylinder with one round tip protrudes.
     """
     pins, thickness = parameters.pins, parameters.size[2]
     middle = thickness + (pins.length - pins.radius) / 2.0

@@ -1,4 +1,4 @@
-"""What takes part in mounting plates beside the robot; hands on the tool."""
+"""Gripper, plates and operator of mounting; hands on the tool."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ from pfsc_drake.controller.sensed_force import Payload
 from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
-from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.physics.hand_path import CoordinateMap
 from pfsc_drake.physics.mounting_hand import MountingHand
 from pfsc_drake.physics.operator_hand import OperatorHand, ToolMotion
 from pfsc_drake.physics.suction import SuctionGripper, holding_cups
@@ -32,23 +32,23 @@ def add_hand(
     period: float,
     joint_state: OutputPort,
 ) -> OutputPort:
-    """Add a hand on the tool, which sees where that really is.
+    """Add a hand on the tool, which reacts to the actual pose of the tool.
 
-    Its wrench is held together with all other forces, one sampling time more of delay.
+    Its wrench is held together with all other forces, a further delay of one sampling time.
 
     Args:
         builder: Builder of the diagram.
         robot: The robot.
-        task: What it is to do, for targets in coordinates of its manifold.
+        task: Its task, for targets in coordinates of its manifold.
         parameters: The hand.
         period: Sampling time [s].
-        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+        joint_state: Actual ``[q_J, v_J, q_M, v_M]``.
 
     Returns:
         The wrench on the tool point, world axes, shape (6,) [N, Nm].
 
     Raises:
-        InputError: If a target is off the path, or the reaction delay no multiple of the
+        InputError: If a target is off the path, or the reaction delay is no multiple of the
             sampling time.
     """
     hand = connect_hand(builder, robot, task, parameters, period, joint_state, OperatorHand)
@@ -62,27 +62,27 @@ def connect_hand(
     parameters: HandParameters,
     period: float,
     joint_state: OutputPort,
-    make: Callable[[HandParameters, float, Place], OperatorHand],
+    make: Callable[[HandParameters, float, CoordinateMap], OperatorHand],
 ) -> BlockSystem:
-    """Add a hand of some kind that sees where the tool really is.
+    """Add a hand of any kind, which reacts to the actual pose of the tool.
 
     Args:
         builder: Builder of the diagram.
         robot: The robot.
-        task: Task whose coordinates the hand may be told in.
+        task: Task, for targets of the hand in coordinates of its manifold.
         parameters: The hand.
         period: Sampling time [s].
-        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
-        make: Makes it of its properties, the sampling time [s] and what tells where coordinates
-            of the manifold are.
+        joint_state: Actual ``[q_J, v_J, q_M, v_M]``.
+        make: Function that creates it from its parameters, the sampling time [s] and the map from
+            coordinates of the manifold to the world.
 
     Raises:
-        InputError: If a target is off the path, or the reaction delay no multiple of the
+        InputError: If a target is off the path, or the reaction delay is no multiple of the
             sampling time.
     """
     if parameters.frame == "manifold":
-        for i, place in enumerate(parameters.places()[1]):
-            task.check_place(place, f"hand.waypoints[{i}].position")
+        for i, target in enumerate(parameters.target_points()[1]):
+            task.check_coordinates(target, f"hand.waypoints[{i}].position")
     try:
         block = make(parameters, period, task.target)
     except InputError as error:
@@ -106,32 +106,32 @@ def add_gripper(
 
     Args:
         builder: Builder of the diagram.
-        mounting: Where the plates come from and go.
+        mounting: Poses of the plates in magazine and frame.
         part: The robot.
-        start: Where its tool starts.
+        start: Start of its tool.
         period: Sampling time [s].
-        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+        joint_state: Actual ``[q_J, v_J, q_M, v_M]``.
 
     Returns:
         The gripper, its input ``vacuum`` open where an operator mounts; and signals for the log:
         ``plate_state``, ``plate_contact``, ``held``, ``gripper_wrench``.
     """
     plate = mounting.parameters
-    places, gravity = mounting.plates(start), part.gravity
+    poses, gravity = mounting.plates(start), part.gravity
     plates, bodies, contact = add_plate_plant(
-        builder, plate, mounting.X_WM, mounting.X_WF, places, gravity
+        builder, plate, mounting.X_WM, mounting.X_WF, poses, gravity
     )
     motion = builder.AddNamedSystem("tool_motion", BlockSystem(ToolMotion(part.robot), period))
     builder.Connect(joint_state, motion.GetInputPort("joint_state"))
-    held = None
+    grip = None
     if plate.start != "magazine":
-        X_PT = places[0].inverse() @ tool_transform(start)
-        # one that lies in the frame bears its weight itself
+        X_PT = poses[0].inverse() @ tool_transform(start)
+        # the frame supports the weight of a plate that lies in it
         weight = plate.mass * gravity * (plate.start == "held")
-        load = places[0].rotation().matrix().T @ weight
-        held = holding_cups(plate.suction, 0, X_PT.rotation().matrix(), X_PT.translation(), load)
+        load = poses[0].rotation().matrix().T @ weight
+        grip = holding_cups(plate.suction, 0, X_PT.rotation().matrix(), X_PT.translation(), load)
     half_size = np.array(plate.size[:2]) / 2.0
-    cups = SuctionGripper(plate.suction, half_size, len(bodies), held)
+    cups = SuctionGripper(plate.suction, half_size, len(bodies), grip)
     gripper = builder.AddNamedSystem("gripper", BlockSystem(cups, period))
     state = plates.get_state_output_port()
     builder.Connect(motion.GetOutputPort("tool_motion"), gripper.GetInputPort("tool_motion"))
@@ -172,16 +172,16 @@ def add_mounting_hand(
 
     Args:
         builder: Builder of the diagram.
-        mounting: Where the plates come from and go.
+        mounting: Poses of the plates in magazine and frame.
         robot: The robot.
-        task: Task whose coordinates the hand may be told in.
+        task: Task, for targets of the hand in coordinates of its manifold.
         parameters: The hand.
         period: Sampling time [s].
-        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+        joint_state: Actual ``[q_J, v_J, q_M, v_M]``.
 
     Returns:
-        The hand, its input ``held`` open; it puts out ``vacuum``, ``wrench`` on the tool point,
-        world axes, shape (6,) [N, Nm], and ``phase``.
+        The hand, its input ``held`` open; its outputs are ``vacuum``, ``wrench`` on the tool
+        point, world axes, shape (6,) [N, Nm], and ``phase``.
 
     Raises:
         InputError: If the hand does not suit the task.
@@ -189,9 +189,9 @@ def add_mounting_hand(
     operator, pin_length = mounting.parameters.operator, mounting.parameters.pins.length
     goal = mounting.X_WF.translation(), mounting.X_WF.rotation().matrix()
 
-    def make(hand: HandParameters, period: float, place: Place) -> MountingHand:
+    def make(hand: HandParameters, period: float, to_world: CoordinateMap) -> MountingHand:
         assert operator is not None
-        return MountingHand(hand, operator, goal, pin_length, period, place)
+        return MountingHand(hand, operator, goal, pin_length, period, to_world)
 
     return connect_hand(builder, robot, task, parameters, period, joint_state, make)
 
@@ -201,7 +201,7 @@ def payload_of(mounting: Mounting, gravity: np.ndarray) -> Payload:
 
     Args:
         mounting: The plates.
-        gravity: [m/s^2], world axes, shape (3,).
+        gravity: Gravitational acceleration, world axes [m/s^2], shape (3,).
     """
     plate = mounting.parameters
     return Payload(plate.believed_mass, np.array([0.0, 0.0, plate.size[2] / 2.0]), gravity)

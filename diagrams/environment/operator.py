@@ -13,7 +13,7 @@ from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, REQUE
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
-from pfsc_drake.physics.operator_hand import ASKED, LiveHand, LiveHandParameters
+from pfsc_drake.physics.operator_hand import REQUEST_SIZE, LiveHand, LiveHandParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
@@ -26,7 +26,7 @@ def columns(regions: Sequence[str]) -> list[str]:
     """Return the names of a person's controls, in their order.
 
     Args:
-        regions: Names of what can be switched on and off.
+        regions: Names of the regions and guides that can be switched.
     """
     kinds = [kind.name.lower() for kind in KINDS]
     tuned = [f"{kind}_{name}" for kind in kinds for name in ("stiffness", "damping")]
@@ -36,24 +36,24 @@ def columns(regions: Sequence[str]) -> list[str]:
 def read_controls(
     name: str, regions: Sequence[str], period: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Read a file.
+    """Read recorded controls.
 
     Args:
         name: The file.
-        regions: Names of what can be switched on and off.
+        regions: Names of the regions and guides that can be switched.
         period: Sampling time [s].
 
     Returns:
-        The sampling instants, shape (rows,), and the controls from each on, shape (rows, size).
+        The sampling instants, shape (rows,), and the controls from then on, shape (rows, size).
 
     Raises:
         InputError: If the file cannot be read, a column is missing, or the times do not
             increase from 0.
     """
 
-    def check_header(place: str, header: list[str]) -> None:
+    def check_header(location: str, header: list[str]) -> None:
         known = [time_column(header), *columns(regions)]
-        check_columns(place, header, known=known, required=known)
+        check_columns(location, header, known=known, required=known)
 
     table = read_numbers(name, "lines of controls", check_header)
     when = time_column(table.header)
@@ -67,12 +67,12 @@ def read_controls(
 def controls_text(
     ticks: Sequence[int], rows: Sequence[np.ndarray], regions: Sequence[str], period: float
 ) -> str:
-    """Return what :func:`read_controls` reads back, to the last bit.
+    """Return the text of a file that :func:`read_controls` reads back exactly.
 
     Args:
-        ticks: Shape (rows,).
-        rows: Each (size,).
-        regions: Names of what can be switched on and off.
+        ticks: Sampling instants, shape (rows,).
+        rows: Controls, each (size,).
+        regions: Names of the regions and guides that can be switched.
         period: Sampling time [s].
     """
     lines = [",".join([TIME, *columns(regions)])]
@@ -86,19 +86,19 @@ def _number(value: float) -> str:
 
 
 PULL, REQUEST, REGIONS = (
-    slice(0, ASKED),
-    slice(ASKED, ASKED + REQUESTS),
-    slice(ASKED + REQUESTS, None),
+    slice(0, REQUEST_SIZE),
+    slice(REQUEST_SIZE, REQUEST_SIZE + REQUESTS),
+    slice(REQUEST_SIZE + REQUESTS, None),
 )
 
 
 @dataclass(frozen=True)
 class Operator:
-    """Where a person's controls enter a station.
+    """A person in a station, with a panel for the controls.
 
     Attributes:
-        panel: What looks at them.
-        regions: Names of what can be switched on and off.
+        panel: System that reads the controls.
+        regions: Names of the regions and guides that can be switched.
         hand: Hand of the person.
     """
 
@@ -117,23 +117,23 @@ class Operator:
         return idle_controls(self.regions)
 
     def fix(self, root: Context, controls: np.ndarray) -> None:
-        """Set what the panel sees from the next tick on, in a station without recorded controls.
+        """Set the controls from the next tick on, in a station without recorded ones.
 
         Args:
             root: Context of the diagram.
-            controls: Shape (size,).
+            controls: The controls, shape (size,).
         """
         context = self.panel.GetMyMutableContextFromRoot(root)
         self.panel.GetInputPort("controls").FixValue(context, controls)
 
     @property
     def pull(self) -> OutputPort:
-        """What is asked of the hand, shape (7,), see :class:`LiveHand`."""
+        """Request to the hand, shape (7,), see :class:`LiveHand`."""
         return self.panel.GetOutputPort("pull")
 
     @property
     def requests(self) -> dict[str, OutputPort]:
-        """What is asked of the law: ``impedance_request``, and ``regions_on`` if there are any."""
+        """Requests to the law: ``impedance_request``, and ``regions_on`` if there are regions."""
         ports = {"impedance_request": self.panel.GetOutputPort("request")}
         if self.regions:
             ports["regions_on"] = self.panel.GetOutputPort("regions")
@@ -144,9 +144,11 @@ def idle_controls(regions: Sequence[str]) -> np.ndarray:
     """Return the controls of a person who does nothing.
 
     Args:
-        regions: Names of what can be switched on and off; they are on.
+        regions: Names of the regions and guides that can be switched; they are on.
     """
-    return np.concatenate([np.zeros(ASKED), np.full(REQUESTS, AS_GIVEN), np.ones(len(regions))])
+    return np.concatenate(
+        [np.zeros(REQUEST_SIZE), np.full(REQUESTS, AS_GIVEN), np.ones(len(regions))]
+    )
 
 
 def add_operator(
@@ -156,18 +158,18 @@ def add_operator(
     period: float,
     folder: FilePath,
 ) -> Operator:
-    """Add the panel at which a person stands, and what was recorded of it, if anything.
+    """Add the panel of a person, and recorded controls, if there are any.
 
-    The law of a tool that is led within regions finds their switches as ``regions_on``, shape
-    (len(regions),), among the ports that it is built with: 1 is on. The page gets a switch for
-    each, and recorded takes a column ``region_NAME``.
+    A law of guidance with regions has an input ``regions_on`` with their switches, shape
+    (len(regions),): 1 is on. The page gets a switch for each, and a file of recorded controls has a
+    column ``region_NAME`` for each.
 
     Args:
         builder: Builder of the diagram.
         parameters: The person.
-        regions: Names of what can be switched on and off one by one.
+        regions: Names of the regions and guides that can be switched one by one.
         period: Sampling time [s].
-        folder: Where relative file names start.
+        folder: Base folder of relative file names.
 
     Raises:
         InputError: If the recorded controls cannot be read.
@@ -193,13 +195,13 @@ def add_live_hand(
     operator: Operator,
     joint_state: OutputPort,
 ) -> OutputPort:
-    """Add the hand of the person at the panel, which is where the tool really is.
+    """Add the hand of the person at the panel, which reacts to the actual pose of the tool.
 
     Args:
         builder: Builder of the diagram.
         robot: The robot.
-        operator: Who stands at the panel.
-        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+        operator: The person.
+        joint_state: Actual ``[q_J, v_J, q_M, v_M]``.
 
     Returns:
         The wrench on the tool point, world axes, shape (6,) [N, Nm].
@@ -209,5 +211,5 @@ def add_live_hand(
     view = builder.AddNamedSystem("live_hand_view", BlockSystem(ToolKinematics(robot), period))
     builder.Connect(joint_state, view.GetInputPort("joint_state"))
     builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
-    builder.Connect(operator.pull, hand.GetInputPort("asked"))
+    builder.Connect(operator.pull, hand.GetInputPort("request"))
     return hand.GetOutputPort("wrench")

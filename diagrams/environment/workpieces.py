@@ -1,4 +1,4 @@
-"""Workpieces that a tool touches: a notch that a ball runs in, a surface that one is pressed on."""
+"""Workpieces that a tool touches: a notch in which a ball runs, a surface under pressure."""
 
 import numpy as np
 from pydrake.common import MemoryFile
@@ -17,7 +17,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Frame
 
-from diagrams.robots.workpiece import FurtherLength, Workpiece, WorkpieceLook, upwards
+from diagrams.robots.workpiece import FurtherLength, Workpiece, WorkpieceDrawing, upwards
 from diagrams.scenario.workpiece import NotchParameters, SoftBall, WorkpieceParameters
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
@@ -39,7 +39,7 @@ class NotchedWorkpiece(Workpiece):
     """A rigid workpiece with a notch along a path, and a ball with a soft shell on the tool.
 
     Args:
-        path: The path that was taught.
+        path: The taught path.
         parameters: Workpiece and ball.
     """
 
@@ -53,7 +53,7 @@ class NotchedWorkpiece(Workpiece):
 
     @property
     def reach(self) -> float:
-        """Distance of what touches from the tool point [m]."""
+        """Distance of the touching part from the tool point [m]."""
         return self.parameters.ball.distance
 
     @property
@@ -62,7 +62,7 @@ class NotchedWorkpiece(Workpiece):
         return self.parameters.ball.radius
 
     def add(self, plant: MultibodyPlant, tool: Frame) -> list[GeometryId]:
-        """Fix the workpiece to the world, and what touches it to the tool.
+        """Fix the workpiece to the world, and the part that touches it to the tool.
 
         A tool with a ball below it has the axes of the world.
         """
@@ -73,24 +73,24 @@ class NotchedWorkpiece(Workpiece):
         return [add_soft_ball(plant, tool, ball, -ball.distance * up)]
 
     def start_shift(self, gravity: np.ndarray) -> np.ndarray:
-        """Return the way to the middle of the notch, where the ball touches nothing."""
+        """Return the displacement to the middle of the notch, where the ball touches nothing."""
         up = upwards(gravity, "notch")
         return np.array(self.parameters.displacement) + self.parameters.clearance * up
 
     def check_start(self, y_t: np.ndarray) -> None:
-        """Refuse a start inside of the workpiece; :meth:`start_shift` leads out of it."""
+        """Accept every start; :meth:`start_shift` moves the ball out of the workpiece."""
 
     def lengths(
-        self, y_t: np.ndarray, initial_place: np.ndarray, gravity: np.ndarray
+        self, y_t: np.ndarray, initial_projection: np.ndarray, gravity: np.ndarray
     ) -> dict[str, FurtherLength]:
-        """Return ``notch_position`` of the ball, see :func:`place_in_notch`."""
+        """Return ``notch_position`` of the ball, see :func:`position_in_notch`."""
         up = upwards(gravity, "notch")
-        place = place_in_notch(self._path, self.parameters, y_t, initial_place[0], up)
+        position = position_in_notch(self._path, self.parameters, y_t, initial_projection[0], up)
         limit = self.parameters.clearance
-        return {"notch_position": FurtherLength(place, ["left", "above"], limit)}
+        return {"notch_position": FurtherLength(position, ["left", "above"], limit)}
 
-    def look(self, gravity: np.ndarray) -> WorkpieceLook:
-        """Return workpiece and ball, and the ball's holder if it is away from the tool point."""
+    def drawing(self, gravity: np.ndarray) -> WorkpieceDrawing:
+        """Return workpiece and ball, and the rod of a ball that is away from the tool point."""
         ball, up = self.parameters.ball, upwards(gravity, "notch")
         parts = [ToolPart("ball", Sphere(ball.radius), ACCENT, RigidTransform(-ball.distance * up))]
         length = ball.distance - ball.radius
@@ -98,31 +98,32 @@ class NotchedWorkpiece(Workpiece):
             along = RotationMatrix.MakeFromOneVector(up, 2)
             X_TH = RigidTransform(along, -0.5 * length * up)
             parts.append(ToolPart("holder", Cylinder(_HOLDER_RADIUS, length), METAL, X_TH))
-        return WorkpieceLook(Triangles(*notch_surface(self._path, self.parameters, up)), parts)
+        return WorkpieceDrawing(Triangles(*notch_surface(self._path, self.parameters, up)), parts)
 
 
-def place_in_notch(
+def position_in_notch(
     path: Path, notch: NotchParameters, y_t: np.ndarray, initial_theta: float, up: np.ndarray
 ) -> np.ndarray:
-    """Return where the ball's centre is in the cross-section of its notch.
+    """Return the position of the ball's centre in the cross-section of its notch.
 
     It touches the round bottom at a distance ``notch.clearance`` from the notch's axis.
 
     Args:
-        path: The path that was taught.
+        path: The taught path.
         notch: Ball and workpiece.
         y_t: Motion of the tool point [m], shape (samples, 3).
         initial_theta: Path parameter near the first sample.
         up: Unit vector in the world, shape (3,).
 
     Returns:
-        To the left of the notch's axis, seen along the path, and above it [m], shape (samples, 2).
+        Distances to the left of the notch's axis, looking along the path, and above it [m], shape
+        (samples, 2).
     """
     evaluator = path.evaluator(2)
     layout = PathPointLayout(2, path.orientation is not None)
-    # back to where the workpiece stood, and from the bottom up to the axis
+    # relative to the taught pose of the workpiece, and from the bottom up to the axis
     moved = y_t - np.array(notch.displacement) - notch.clearance * up
-    place, theta = np.full((len(y_t), 2), np.nan), initial_theta
+    position, theta = np.full((len(y_t), 2), np.nan), initial_theta
     for k, y in enumerate(moved):
         if not np.isfinite(y).all():
             continue
@@ -132,8 +133,8 @@ def place_in_notch(
         left = np.cross(up, slope)
         left /= np.linalg.norm(left)
         above = np.cross(slope / np.linalg.norm(slope), left)
-        place[k] = left @ (y - sigma), above @ (y - sigma)
-    return place
+        position[k] = left @ (y - sigma), above @ (y - sigma)
+    return position
 
 
 def notch_surface(
@@ -142,14 +143,14 @@ def notch_surface(
     """Return vertices [m], shape (k, 3), and triangles of the workpiece's surface.
 
     Args:
-        path: The path that was taught.
+        path: The taught path.
         notch: Workpiece and ball.
         up: Unit vector in the world, shape (3,).
     """
     begin, end = path.position.domain
     theta = np.linspace(begin, end, 2 + int(path.length / _SPACING))
     vertices, triangles = swept_surface(path.position, theta, _profile(notch), up)
-    # the path is that of E; the profile's origin is the notch's axis
+    # the path is the path of E; the profile's origin is the notch's axis
     axis = np.array(notch.displacement) + (notch.clearance - notch.ball.distance) * up
     return vertices + axis, triangles
 
@@ -167,11 +168,11 @@ def _profile(notch: NotchParameters) -> np.ndarray:
 
 
 class PressedWorkpiece(Workpiece):
-    """A rigid workpiece under a surface that it has moved away from since that was taught.
+    """A rigid workpiece that has moved since its surface was taught.
 
     Args:
-        surface: The surface as it was taught; its normal points out of the material.
-        manifold: The surface's, with the orientation of the tool normal to it.
+        surface: The taught surface; its normal points out of the material.
+        manifold: Manifold of the surface, with the orientation of the tool normal to it.
         parameters: Workpiece and ball.
 
     Raises:
@@ -199,7 +200,7 @@ class PressedWorkpiece(Workpiece):
 
     @property
     def reach(self) -> float:
-        """Distance of what touches from the tool point [m]."""
+        """Distance of the touching part from the tool point [m]."""
         return 0.0
 
     @property
@@ -208,13 +209,13 @@ class PressedWorkpiece(Workpiece):
         return self.parameters.ball.radius
 
     def add(self, plant: MultibodyPlant, tool: Frame) -> list[GeometryId]:
-        """Fix the workpiece to the world, and what touches it to the tool."""
+        """Fix the workpiece to the world, and the part that touches it to the tool."""
         ball = self.parameters.ball
         add_rigid_surface(plant, *self.mesh(), "workpiece", ball.friction)
         return [add_soft_ball(plant, tool, ball, self._p_TC)]
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return vertices [m] and triangles of the workpiece where it stands, world axes."""
+        """Return vertices [m] and triangles of the workpiece in its actual pose, world axes."""
         vertices, triangles = surface_mesh(self._surface, self.parameters.spacing)
         moved = (vertices - self._middle) @ self._R.T + self._middle + self.parameters.shift
         return moved, triangles
@@ -222,11 +223,12 @@ class PressedWorkpiece(Workpiece):
     def touch(
         self, y_t: np.ndarray, near: np.ndarray | None = None
     ) -> tuple[float, np.ndarray, np.ndarray]:
-        """Return height over the workpiece [m], its normal, and the parameters of the foot.
+        """Return height over the workpiece [m], its normal, and the closest point's parameters.
 
         Args:
             y_t: Tool point [m], shape (3,).
-            near: Parameters near which the foot is, shape (2,); sought everywhere if omitted.
+            near: Parameters near the closest point, shape (2,); by default the whole surface is
+                searched.
         """
         taught = (y_t - self.parameters.shift - self._middle) @ self._R + self._middle
         if near is None:
@@ -241,13 +243,13 @@ class PressedWorkpiece(Workpiece):
         return float(normal @ (taught - sigma)), self._R @ normal, theta
 
     def stiffness(self, force: float) -> float:
-        """Return the stiffness of the contact along the normal where it bears a force [N/m].
+        """Return the stiffness of the contact along the normal under a force [N/m].
 
         See :meth:`SoftBall.stiffness <diagrams.scenario.workpiece.SoftBall.stiffness>`; the
-        workpiece is rigid, and flat where it is touched.
+        workpiece is rigid, and flat at the contact.
 
         Args:
-            force: [N].
+            force: Normal force [N].
         """
         return self.parameters.ball.stiffness(force)
 
@@ -261,27 +263,27 @@ class PressedWorkpiece(Workpiece):
             )
 
     def start_shift(self, gravity: np.ndarray) -> np.ndarray:
-        """Return zero: how far from the surface it starts is the scenario's to say."""
+        """Return zero: the scenario specifies the distance from the surface at the start."""
         del gravity
         return np.zeros(3)
 
     def lengths(
-        self, y_t: np.ndarray, initial_place: np.ndarray, gravity: np.ndarray
+        self, y_t: np.ndarray, initial_projection: np.ndarray, gravity: np.ndarray
     ) -> dict[str, FurtherLength]:
         """Return none: distances from the surface are coordinates of the task."""
-        del y_t, initial_place, gravity
+        del y_t, initial_projection, gravity
         return {}
 
-    def look(self, gravity: np.ndarray) -> WorkpieceLook:
-        """Return how it is drawn."""
+    def drawing(self, gravity: np.ndarray) -> WorkpieceDrawing:
+        """Return the drawing of workpiece and ball."""
         del gravity
         ball = ToolPart(
             "ball", Sphere(self.parameters.ball.radius), ACCENT, RigidTransform(self._p_TC)
         )
-        return WorkpieceLook(Triangles(*self.mesh()), [ball])
+        return WorkpieceDrawing(Triangles(*self.mesh()), [ball])
 
     def normal(self, axes: np.ndarray) -> np.ndarray:
-        """Return the surface's normal, turned as the workpiece is, shape (3,)."""
+        """Return the surface's normal, turned with the workpiece, shape (3,)."""
         return np.asarray(self._R @ axes[:, 2])
 
 
@@ -325,7 +327,7 @@ def add_rigid_surface(
     Args:
         plant: Plant to add it to, not finalized.
         vertices: Vertices in world axes [m], shape (k, 3).
-        triangles: Counter-clockwise seen from outside of the material, shape (n, 3).
+        triangles: Vertex indices, counter-clockwise from outside of the material, shape (n, 3).
         name: Name of the geometry.
         friction: Coulomb coefficient.
     """

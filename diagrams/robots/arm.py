@@ -1,4 +1,4 @@
-"""A serial arm in a diagram, whichever model moves it."""
+"""A serial arm in a diagram, with any plant."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
-from diagrams.robots.arm_model import ArmModel, believe_arm, read_arm
-from diagrams.robots.belief import Belief, BeliefSource
+from diagrams.robots.arm_model import ArmModel, nominal_arm, read_arm
 from diagrams.robots.model import tool_frame
+from diagrams.robots.nominal_model import NominalModel, NominalModelSource
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
@@ -43,7 +43,7 @@ from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
 from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index
 
 _ROUNDING = 1e-6  # m
-# times the reach: as far away as a number in mm, read in m
+# times the reach: a distance at which a number is probably in mm
 _IN_MM = 50.0
 
 
@@ -52,34 +52,34 @@ class Arm(RobotPart):
     """A serial arm in a diagram.
 
     Attributes:
-        true: The arm as it is.
-        belief: The arm as whatever controls it believes it to be.
-        believed: The model that the belief starts from, ``true`` unless it is another one.
+        actual: The simulated arm.
+        nominal_model: Nominal model of the arm, by which it is controlled.
+        source_model: Model that the nominal model is derived from, by default ``actual``.
     """
 
-    true: ArmModel
-    belief: Belief
-    believed: ArmModel
+    actual: ArmModel
+    nominal_model: NominalModel
+    source_model: ArmModel
 
     @property
     def model(self) -> MultibodyPlant:
-        """The arm as Drake knows it, finalized."""
-        return self.true.plant
+        """Drake's model of the arm, finalized."""
+        return self.actual.plant
 
     @property
     def robot(self) -> SerialChain:  # type: ignore[override]
-        """The arm as it is, N joints."""
-        return self.true.chain
+        """The simulated arm, N joints."""
+        return self.actual.chain
 
     @property
     def coordinates(self) -> PlantCoordinates:  # type: ignore[override]
-        """Where its coordinates stand in the state of ``model``."""
-        return self.true.coordinates
+        """Indices of its coordinates in the state of ``model``."""
+        return self.actual.coordinates
 
     @property
     def tool(self) -> Frame:
         """Frame whose origin follows the manifold."""
-        return self.true.tool
+        return self.actual.tool
 
     @property
     def gravity(self) -> np.ndarray:
@@ -88,18 +88,18 @@ class Arm(RobotPart):
 
     @property
     def drives(self) -> Drives:
-        """What friction acts on."""
+        """Drives that friction acts on."""
         return Drives(self.robot.D_M, step=self.model.time_step() or None)
 
     def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
-        """Return joint coordinates that put the tool where it starts, shape (N,)."""
+        """Return the joint coordinates at the start pose of the tool, shape (N,)."""
         self.check_reach(target.y_t, "start")
         return start_posture(start.posture_deg, self.robot, target)
 
     def check_reach(self, position: np.ndarray, where: str) -> None:
-        """Refuse a position on the way that the robot is known not to reach.
+        """Refuse a position of the tool that the robot is known not to reach.
 
-        What is out of reach for other reasons has to be tried.
+        Only the distance is checked, not the limits of the joints.
         """
         base, reach = self.robot.links[0].p_PF, self.robot.reach
         distance = float(np.linalg.norm(position - base))
@@ -114,18 +114,18 @@ class Arm(RobotPart):
     def start_warnings(
         self, start: StartParameters, q_J: np.ndarray, target: ToolTarget
     ) -> list[str]:
-        """Return what there is to say about the robot and its start, one sentence each."""
+        """Return warnings about the robot and its start, one sentence each."""
         found = posture_warnings(start.posture_deg, self.robot, q_J, target)
-        return self.true.warnings + found + tilt_warnings(self.robot, q_J, target)
+        return self.actual.warnings + found + tilt_warnings(self.robot, q_J, target)
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
-        """Return the state of the model at rest, elastic joints carrying the links' weight."""
+        """Return the state of the model at rest, elastic joints deflected by the links' weight."""
         return state_at_rest(self.robot, self.coordinates, q_J)
 
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
     ) -> None:
-        """Let a wrench act at the tool point, world axes, shape (6,)."""
+        """Apply a wrench at the tool point, world axes, shape (6,)."""
         self._apply(
             builder, [add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)]
         )
@@ -137,13 +137,13 @@ class Arm(RobotPart):
         wrench: OutputPort | None,
         joint_state: OutputPort,
     ) -> None:
-        """Let forces act on links, and a wrench at the tool point if there is one.
+        """Apply forces on links, and a wrench at the tool point if there is one.
 
         Args:
             builder: Builder of the diagram.
-            pushes: What acts on links.
-            wrench: At the tool point, world axes, shape (6,) [N, Nm].
-            joint_state: The true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+            pushes: Forces on links.
+            wrench: Wrench at the tool point, world axes, shape (6,) [N, Nm].
+            joint_state: Actual ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         """
         forces: list[LeafSystem] = [pushes]
         if wrench is not None:
@@ -152,22 +152,22 @@ class Arm(RobotPart):
 
     @abstractmethod
     def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
-        """Let everything from outside act.
+        """Apply all external forces.
 
         Args:
             builder: Builder of the diagram.
             forces: One system or more with the ports ``applied_spatial_force`` and ``tau_ext``.
         """
 
-    def check_belief(self, source: BeliefSource, sensor_joint: str | None) -> None:
-        """Refuse what no controller could believe of this robot; nothing is built."""
-        belief, model = believe_arm(self.true, source)
+    def check_nominal_model(self, source: NominalModelSource, sensor_joint: str | None) -> None:
+        """Refuse a nominal model that no controller of this robot could have; nothing is built."""
+        nominal_model, model = nominal_arm(self.actual, source)
         if sensor_joint is not None:
-            belief.tool_load(model.tool_load(sensor_joint))
+            nominal_model.tool_load(model.tool_load(sensor_joint))
 
-    def believed_load(self, joint: str) -> ToolLoad:
-        """Return what is believed to be behind a sensor."""
-        return self.belief.tool_load(self.believed.tool_load(joint))
+    def nominal_load(self, joint: str) -> ToolLoad:
+        """Return the nominal load behind a sensor."""
+        return self.nominal_model.tool_load(self.source_model.tool_load(joint))
 
 
 @dataclass(frozen=True)
@@ -175,40 +175,40 @@ class MultibodyArm(Arm):
     """An arm that Drake's MultibodyPlant moves: (2.42) rigid, (2.65) elastic.
 
     Attributes:
-        contact: What the environment does to its tool, if it can touch them.
+        contact: Contact wrench on its tool, if the environment can touch it.
     """
 
     contact: ContactWrench | None = None
 
     @property
     def plant(self) -> MultibodyPlant:
-        """The system in the diagram that moves."""
+        """The plant."""
         return self.model
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
+        """Return the actual ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
         return joint_state_of(builder, self.model.get_state_output_port(), self.coordinates)
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """Let drive torques ``tau_d`` act, shape (N,)."""
+        """Apply drive torques ``tau_d``, shape (N,)."""
         connect_actuation(builder, self.model, self.coordinates, torque)
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
+        """Apply the friction torques ``-tau_fM`` to the motors, shape (N,)."""
         rows = self.coordinates.motor_rows[self.robot.dimension :]
         connect_resistance(builder, self.model, rows, resistance)
 
     def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
-        """Let everything from outside act."""
+        """Apply all external forces."""
         connect_push(builder, self.model, forces)
 
-    def place(self, context: Context, state: np.ndarray) -> None:
-        """Put the plant into a state of its model, ``[q, v]``."""
+    def set_state(self, context: Context, state: np.ndarray) -> None:
+        """Set the state ``[q, v]`` of the model in the plant."""
         self.model.SetPositionsAndVelocities(context, state)
 
     def hang(self, context: Context, joint: str, mass: float) -> None:
-        """Let more hang below a force sensor than is believed, where the load's centre is."""
-        mount, load = self.true.sensor_joint(joint), self.true.tool_load(joint)
+        """Add an unmodelled mass below a force sensor, at the centre of the load."""
+        mount, load = self.actual.sensor_joint(joint), self.actual.tool_load(joint)
         body = mount.child_body()
         p_BC = mount.frame_on_child().GetFixedPoseInBodyFrame() @ load.p_SC
         M_B = body.CalcSpatialInertiaInBodyFrame(context)
@@ -216,12 +216,12 @@ class MultibodyArm(Arm):
         body.SetSpatialInertiaInBodyFrame(context, M_B)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
-        """Return where a force/torque sensor sits."""
+        """Return the mount of a force/torque sensor."""
         return SensorMount(
-            self.true.tool_load(joint),
-            self.believed_load(joint),
+            self.actual.tool_load(joint),
+            self.nominal_load(joint),
             self.model.get_reaction_forces_output_port(),
-            reaction_index(self.model, self.true.sensor_joint(joint)),
+            reaction_index(self.model, self.actual.sensor_joint(joint)),
         )
 
 
@@ -237,50 +237,50 @@ class CoupledArm(Arm):
 
     @property
     def plant(self) -> FullElasticPlant:
-        """The system in the diagram that moves."""
+        """The plant."""
         return self.full
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
+        """Return the actual ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
         return self.full.GetOutputPort("joint_state")
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """Let drive torques ``tau_d`` act, shape (N,)."""
+        """Apply drive torques ``tau_d``, shape (N,)."""
         builder.Connect(torque, self.full.GetInputPort("drive_torque"))
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
+        """Apply the friction torques ``-tau_fM`` to the motors, shape (N,)."""
         builder.Connect(resistance, self.full.GetInputPort("resistance"))
 
     def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
-        """Let everything from outside act."""
+        """Apply all external forces."""
         connect_torques(builder, self.full.GetInputPort("external_torque"), forces)
 
-    def place(self, context: Context, state: np.ndarray) -> None:
-        """Put the plant into a state of its model, ``[q, v]``."""
+    def set_state(self, context: Context, state: np.ndarray) -> None:
+        """Set the state ``[q, v]`` of the model in the plant."""
         self.full.set_joint_state(context, self.coordinates.rows @ state)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
-        """Return where a force/torque sensor sits."""
-        load = self.true.tool_load(joint)
+        """Return the mount of a force/torque sensor."""
+        load = self.actual.tool_load(joint)
         acceleration = self.full.GetOutputPort("link_acceleration")
         reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
-        return SensorMount(load, self.believed_load(joint), reaction)
+        return SensorMount(load, self.nominal_load(joint), reaction)
 
 
 def add_arm(
-    builder: DiagramBuilder, source: BeliefSource, workpiece: Workpiece | None = None
+    builder: DiagramBuilder, source: NominalModelSource, workpiece: Workpiece | None = None
 ) -> Arm:
     """Add the plant of a serial arm, continuous unless its tool may touch something.
 
     Args:
         builder: Builder of the diagram.
-        source: Which arm, and where what is believed of it comes from.
-        workpiece: What its tool may touch, if anything.
+        source: The arm, and the source of its nominal model.
+        workpiece: Workpiece that its tool may touch, if there is one.
 
     Raises:
         InputError: If the model cannot be read, is no chain of joints, its rotors are not known,
-            or what is to be believed of it makes no arm.
+            or the nominal model is invalid.
     """
     plant, allowed = source.robot.plant, f"{MULTIBODY}; only a DELTA robot has another"
     require(plant == MULTIBODY, "robot.plant", plant, allowed)
@@ -288,36 +288,36 @@ def add_arm(
         return _add_coupled_arm(builder, source, workpiece)
     if workpiece is not None:
         return _add_touching_arm(builder, source, workpiece)
-    true = read_arm(
+    actual = read_arm(
         source.robot,
         source.folder,
-        before_finalizing=source.carried,
+        before_finalizing=source.add_payload,
         by_velocity=source.by_velocity,
     )
-    builder.AddNamedSystem("plant", true.plant)
-    return MultibodyArm(true, *believe_arm(true, source))
+    builder.AddNamedSystem("plant", actual.plant)
+    return MultibodyArm(actual, *nominal_arm(actual, source))
 
 
 def _add_coupled_arm(
-    builder: DiagramBuilder, source: BeliefSource, workpiece: Workpiece | None
+    builder: DiagramBuilder, source: NominalModelSource, workpiece: Workpiece | None
 ) -> CoupledArm:
     coupled, folder = source.robot.rotor_coupling, source.folder
     allowed = "empty where the robot touches a workpiece; the full model has no contact"
     require(workpiece is None, "robot.rotor_coupling", coupled, allowed)
-    true = read_arm(source.robot, folder, before_finalizing=source.carried)
+    actual = read_arm(source.robot, folder, before_finalizing=source.add_payload)
     try:
         robot = load_parameters(folder / coupled if FilePath(coupled).suffix else coupled)
-        plant = FullElasticPlant(true.chain, mounts_from_parameters(true.chain, robot))
+        plant = FullElasticPlant(actual.chain, mounts_from_parameters(actual.chain, robot))
     except InputError as error:
         raise InputError(f"robot.rotor_coupling: {error}") from None
     builder.AddNamedSystem("plant", plant)
-    return CoupledArm(true, *believe_arm(true, source), plant)
+    return CoupledArm(actual, *nominal_arm(actual, source), plant)
 
 
 def _add_touching_arm(
-    builder: DiagramBuilder, source: BeliefSource, workpiece: Workpiece
+    builder: DiagramBuilder, source: NominalModelSource, workpiece: Workpiece
 ) -> MultibodyArm:
-    """Add a discrete plant; of the robot only what touches the workpiece has geometry in it."""
+    """Add a discrete plant; of the robot only the part that touches the workpiece has geometry."""
     allowed = "0 on a robot that turns its tool: the ball sits at the tool point"
     require(workpiece.reach == 0.0, "notch.ball.distance", workpiece.reach, allowed)
     scene_graph: list[SceneGraph] = []
@@ -327,7 +327,7 @@ def _add_touching_arm(
         scene_graph.append(add_scene(builder, plant))
         geometries.extend(workpiece.add(plant, tool_frame(plant, source.robot)))
 
-    true = read_arm(source.robot, source.folder, workpiece.time_step, add_workpiece)
-    builder.AddNamedSystem("plant", true.plant)
-    contact = connect_scene(builder, true.plant, scene_graph[0], geometries)
-    return MultibodyArm(true, *believe_arm(true, source), contact)
+    actual = read_arm(source.robot, source.folder, workpiece.time_step, add_workpiece)
+    builder.AddNamedSystem("plant", actual.plant)
+    contact = connect_scene(builder, actual.plant, scene_graph[0], geometries)
+    return MultibodyArm(actual, *nominal_arm(actual, source), contact)

@@ -1,4 +1,4 @@
-"""A serial arm as read from a model, true or believed."""
+"""A serial arm as read from a model, actual or nominal."""
 
 import tempfile
 from collections.abc import Callable
@@ -9,16 +9,16 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint
 
-from diagrams.robots.belief import Belief, BeliefSource, naming_model_error
 from diagrams.robots.model import read_robot, tool_frame
+from diagrams.robots.nominal_model import NominalModel, NominalModelSource, naming_model_error
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import inboard_joints
 from pfsc_drake.robot.models.robot_parameters import VariantParameters, load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
-from pfsc_drake.robot.serial.chain import SerialChain, believed_chain
+from pfsc_drake.robot.serial.chain import SerialChain, nominal_chain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
-from pfsc_drake.robot.serial.link_places import link_frames
+from pfsc_drake.robot.serial.link_points import link_frames
 from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.reactions import tool_load_from_plant
 
@@ -28,11 +28,11 @@ class ArmModel:
     """A serial arm as read from a model.
 
     Attributes:
-        plant: The arm as Drake knows it, finalized; bodies, frames and joints by name.
-        chain: The same as data, N joints.
-        coordinates: Where its coordinates stand in the state of ``plant``.
+        plant: Drake's model of the arm, finalized; bodies, frames and joints by name.
+        chain: Parameters of the arm, N joints.
+        coordinates: Indices of its coordinates in the state of ``plant``.
         tool: Frame whose origin follows the manifold.
-        warnings: What there is to say about the model, one sentence each.
+        warnings: Warnings about the model, one sentence each.
     """
 
     plant: MultibodyPlant
@@ -50,7 +50,7 @@ class ArmModel:
                 has mass there, the nearest to the link.
 
         Raises:
-            InputError: If there is none of that name, or none at all.
+            InputError: If there is no such joint.
         """
         if not name:
             return self._flange()
@@ -62,7 +62,7 @@ class ArmModel:
         return self.plant.GetJointByName(name)
 
     def _flange(self) -> Joint:
-        """Return the joint that fixes the tool to what is not the tool's own."""
+        """Return the joint that fixes the tool to the last link."""
         link = link_frames(self.plant, self.coordinates)[-1].body()
         inboard = inboard_joints(self.plant)
         body, flange, mass = self.tool.body(), None, 0.0
@@ -90,9 +90,9 @@ class ArmModel:
         return tool_load_from_plant(self.plant, self.sensor_joint(joint), self.tool)
 
     def tool_mass(self) -> tuple[float, np.ndarray, str]:
-        """Return what the tool frame's body weighs, where its centre of mass is, and its name.
+        """Return mass, centre of mass and name of the body with the tool frame.
 
-        It weighs nothing where it is the last link's own. The centre is in the frame of that link.
+        The mass is zero if that body is the last link. The centre is in the frame of that link.
         """
         body, link = self.tool.body(), link_frames(self.plant, self.coordinates)[-1]
         context = self.plant.CreateDefaultContext()
@@ -114,10 +114,10 @@ def read_arm(
     """Read a serial arm.
 
     Args:
-        parameters: Which robot.
-        folder: Where relative file names start.
+        parameters: The robot.
+        folder: Base folder of relative file names.
         time_step: Time step of the plant [s]; 0 for a continuous one.
-        before_finalizing: What else is to be added to the plant.
+        before_finalizing: Function that adds further bodies to the plant.
         by_velocity: Whether velocity servos move the joints, for which kinematics suffice.
 
     Raises:
@@ -130,48 +130,48 @@ def read_arm(
     return ArmModel(plant, *chain_from_plant(plant, tool), tool, warnings)
 
 
-def believe_arm(true: ArmModel, source: BeliefSource) -> tuple[Belief, ArmModel]:
-    """Return what the controller believes of an arm, and the model that this starts from.
+def nominal_arm(actual: ArmModel, source: NominalModelSource) -> tuple[NominalModel, ArmModel]:
+    """Return the nominal model of an arm, and the model that it is derived from.
 
     Args:
-        true: The arm of the plant.
-        source: Where the belief comes from.
+        actual: The arm of the plant.
+        source: Source of the nominal model.
 
     Raises:
-        InputError: If what is to be believed cannot be read or suits no such arm.
+        InputError: If the nominal model cannot be read or does not suit the arm.
     """
-    model = _model(true, source)
-    error, believed = source.error.error(true.chain.gather("is_revolute")), model.chain
+    model = _model(actual, source)
+    error, chain = source.error.error(actual.chain.gather("is_revolute")), model.chain
     if source.error.is_given:
         with naming_model_error():
-            believed = believed_chain(model.chain, error, *model.tool_mass())
-    sees_truth = model is true and not error.moves_tool
-    return Belief(believed, error, sees_truth), model
+            chain = nominal_chain(model.chain, error, *model.tool_mass())
+    has_actual_kinematics = model is actual and not error.moves_tool
+    return NominalModel(chain, error, has_actual_kinematics), model
 
 
-def _model(true: ArmModel, source: BeliefSource) -> ArmModel:
-    """Return the model that a belief starts from."""
+def _model(actual: ArmModel, source: NominalModelSource) -> ArmModel:
+    """Return the model that the nominal model is derived from."""
     model, key = source.model, "controller.model"
     if not model:
-        return true
+        return actual
     try:
         if FilePath(model).suffix in (".yaml", ".yml"):
-            found = _from_parameters(source.folder / model, true, source)
+            found = _from_parameters(source.folder / model, actual, source)
         else:
             robot = replace(source.robot, model=model)
             found = read_arm(
                 robot,
                 source.folder,
-                before_finalizing=source.carried,
+                before_finalizing=source.add_payload,
                 by_velocity=source.by_velocity,
             )
     except InputError as error:
         message = str(error).removeprefix("robot.model: ")
         raise InputError(f"{key}: {message}") from None
-    if found.chain.is_massless != true.chain.is_massless:
+    if found.chain.is_massless != actual.chain.is_massless:
         has = "no masses" if found.chain.is_massless else "masses"
         raise InputError(f"{key} = {model}: has {has}, unlike the robot; allowed: a model like it")
-    kinds, own = found.chain.gather("kind").tolist(), true.chain.gather("kind").tolist()
+    kinds, own = found.chain.gather("kind").tolist(), actual.chain.gather("kind").tolist()
     if kinds != own:
         raise InputError(
             f"{key} = {model}: has the joints {', '.join(kinds)}; allowed: the robot's, "
@@ -180,20 +180,20 @@ def _model(true: ArmModel, source: BeliefSource) -> ArmModel:
     return found
 
 
-def _from_parameters(file: FilePath, true: ArmModel, source: BeliefSource) -> ArmModel:
+def _from_parameters(file: FilePath, actual: ArmModel, source: NominalModelSource) -> ArmModel:
     """Read the variant of a parameter file that has joints like the plant's."""
-    robot, elastic = load_parameters(file), not true.chain.is_rigid
+    robot, elastic = load_parameters(file), not actual.chain.is_rigid
     axes = len(robot.links)
     for variant in robot.variants:
         if (axes - variant.fixed_deg.size, bool(variant.elasticity)) == (
-            true.chain.dimension,
+            actual.chain.dimension,
             elastic,
         ):
             break
     else:
-        if true.chain.dimension != axes or elastic:
+        if actual.chain.dimension != axes or elastic:
             raise InputError(
-                f"{file}: none of its variants has {true.chain.dimension} "
+                f"{file}: none of its variants has {actual.chain.dimension} "
                 f"{'elastic' if elastic else 'rigid'} joints; allowed: parameters with one"
             )
         variant = VariantParameters(name=robot.name)
@@ -201,4 +201,4 @@ def _from_parameters(file: FilePath, true: ArmModel, source: BeliefSource) -> Ar
         model = FilePath(scratch) / f"{variant.name}.sdf"
         model.write_text(write_sdf(robot, variant), encoding="utf-8")
         written = replace(source.robot, model=str(model))
-        return read_arm(written, source.folder, before_finalizing=source.carried)
+        return read_arm(written, source.folder, before_finalizing=source.add_payload)

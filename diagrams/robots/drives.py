@@ -1,11 +1,11 @@
-"""What is between the law's output and the plant's joints: hold, servo, bus."""
+"""Hold, velocity servos and bus between the law's output and the plant's joints."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.robots.belief import believed_robot
+from diagrams.robots.nominal_model import nominal_robot
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import (
     DriverParameters,
@@ -26,13 +26,13 @@ from pfsc_drake.systems.physics.velocity_servo import ServoAccess, VelocityServo
 
 @dataclass(frozen=True)
 class ServoOptions:
-    """Velocity servos of the joints, and how they are watched.
+    """Velocity servos of the joints, with their supervision.
 
     Attributes:
         servo: Their gains and the bus to them.
         controller: The controller that commands them.
-        faults: What is a fault, and how it ends.
-        encoders: What measures the joints.
+        faults: Fault detection and stops.
+        encoders: Encoders of the joints.
     """
 
     servo: ServoParameters
@@ -56,10 +56,10 @@ def add_drives(
         builder: Builder of the diagram.
         part: The robot.
         servos: Servos of a law that commands velocities; None where it commands torques.
-        driver: How late torques act, and through which low pass.
+        driver: Delay and low pass of the torques.
         period: Sampling time of the controller [s].
         ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
-        initial_state: State of the plant at the start, for which servos are designed.
+        initial_state: State of the plant at the start, for the design of the servos.
 
     Returns:
         Further signals for the log, with servos ``drive_torque``, within its limits [Nm or N],
@@ -69,10 +69,10 @@ def add_drives(
     Raises:
         InputError: If the servos or the driver do not suit the robot or the controller.
     """
-    torque, chain, signals, access = ports["drive"], part.belief.robot, {}, None
+    torque, chain, signals, access = ports["drive"], part.nominal_model.robot, {}, None
     ticks = driver.ticks(period)
     if servos is not None:
-        plain = "none with the law 'velocity_servo', whose way to the drives is servo.bus_delay"
+        plain = "none with the law 'velocity_servo', whose delay is servo.bus_delay"
         require(driver == DriverParameters(), "driver", driver, plain)
         q_J = (part.coordinates.link_rows @ initial_state)[: chain.dimension]
         servo = _add_servo(builder, chain, servos, ports, q_J)
@@ -86,7 +86,7 @@ def add_drives(
     if driver.low_pass > 0.0:
         filtering = DriveLowPass(chain.dimension, driver.low_pass, period)
         low_pass = builder.AddNamedSystem("drive_low_pass", BlockSystem(filtering, period))
-        builder.Connect(torque, low_pass.GetInputPort("told"))
+        builder.Connect(torque, low_pass.GetInputPort("command"))
         torque = low_pass.GetOutputPort("passed")
     hold = builder.AddNamedSystem("hold", BlockSystem(Hold(chain.dimension, 1 + ticks), period))
     builder.Connect(torque, hold.GetInputPort("value"))
@@ -109,8 +109,8 @@ def _add_servo(
     rate = None if servo.integral_rate < 0.0 else servo.integral_rate
     gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
     effort = chain.gather("effort_limit") * controller.effort_scale
-    seen = believed_robot(chain, options.encoders, tick)
-    watched = replace(supervision(controller.law, faults, seen), joint_limits=False)
+    nominal = nominal_robot(chain, options.encoders, tick)
+    watched = replace(supervision(controller.law, faults, nominal), joint_limits=False)
     system = builder.AddNamedSystem(
         "velocity_servo",
         VelocityServo(
@@ -131,9 +131,9 @@ def _add_servo(
         velocity = bus.GetOutputPort("delivered")
     elif ratio > 1:
         # the law must not be evaluated between its own ticks
-        keep = builder.AddNamedSystem("velocity_hold", BlockSystem(Hold(chain.dimension), tick))
-        builder.Connect(velocity, keep.GetInputPort("value"))
-        velocity = keep.GetOutputPort("held")
+        hold = builder.AddNamedSystem("velocity_hold", BlockSystem(Hold(chain.dimension), tick))
+        builder.Connect(velocity, hold.GetInputPort("value"))
+        velocity = hold.GetOutputPort("held")
     builder.Connect(velocity, system.GetInputPort("velocity_reference"))
     builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
     return system

@@ -1,4 +1,4 @@
-"""What a controller measures of forces at the flange."""
+"""Force/torque sensor at the flange, with its noise, failure and delay."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
@@ -16,7 +16,7 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 from pfsc_drake.systems.plants.reactions import JointReaction
 
-_MOST_TICKS = 10_000  # by which a force is late
+_MOST_TICKS = 10_000  # of the delay
 
 
 def add_force_sensor(
@@ -27,15 +27,15 @@ def add_force_sensor(
     period: float,
     ports: dict[str, OutputPort],
 ) -> OutputPort:
-    """Add a force/torque sensor alone, and return what it measures, shape (6,) [N, Nm].
+    """Add a force/torque sensor, and return its measured wrench, shape (6,) [N, Nm].
 
     Args:
         builder: Builder of the diagram.
         part: The robot.
         parameters: The sensor.
-        failure: How it fails, if it does.
+        failure: Its failure, if there is one.
         period: Sampling time [s].
-        ports: ``true_joint_state``, and ``wrench_ext`` if anything acts on the tool.
+        ports: ``true_joint_state``, and ``wrench_ext`` if forces act on the tool.
 
     Raises:
         InputError: If the sensor does not suit the robot or the sampling time.
@@ -51,7 +51,7 @@ def _reading(
     failure: SensorFailureParameters,
     period: float,
 ) -> OutputPort:
-    """Return what a sensor tells, when it is told."""
+    """Return the reading of a sensor, with failure and delay."""
     if mount.reading is not None:
         return mount.reading
     sensor = _add_transducer(builder, mount, parameters, period)
@@ -65,7 +65,7 @@ def _add_transducer(
     parameters: ForceTorqueParameters,
     period: float,
 ) -> BlockSystem:
-    """Add what the sensor itself makes of the load on it."""
+    """Add the sensor itself, from the load on it to its reading."""
     block = ForceTorqueSensor(parameters, period)
     sensor = builder.AddNamedSystem("force_torque_sensor", BlockSystem(block, period))
     reaction = mount.reaction
@@ -89,7 +89,7 @@ def _fail(
     failure: SensorFailureParameters,
     period: float,
 ) -> OutputPort:
-    """Return what is left of the sensor's reading if it is to fail on the way."""
+    """Return the sensor's reading, with its failure if there is one."""
     if failure.time < 0.0:
         return reading
     size = reading.size()
@@ -109,7 +109,7 @@ def _fail(
 
 
 def _delay(builder: DiagramBuilder, reading: OutputPort, delay: float, period: float) -> OutputPort:
-    """Return a sensor's reading when the controller has it."""
+    """Return a sensor's reading with its delay."""
     ticks = require_whole_ticks("sensor.delay", delay, period, _MOST_TICKS)
     if ticks == 0:
         return reading
@@ -121,16 +121,16 @@ def _delay(builder: DiagramBuilder, reading: OutputPort, delay: float, period: f
 
 
 def taring_warnings(taring_time: float, dwell: float) -> list[str]:
-    """Return what is said where a reference does not wait until the sensor is tared.
+    """Return a warning if the reference does not wait until the sensor is tared.
 
     Args:
-        taring_time: How long the tool must rest for that [s].
-        dwell: How long the reference waits at first [s].
+        taring_time: Time that the tool must rest for taring [s].
+        dwell: Time that the reference waits at first [s].
     """
     if dwell < taring_time:
         return [
             f"the reference sets off after reference.dwell = {dwell:g} s, before the sensor can "
-            f"be tared (sensor.taring_time = {taring_time:g} s); what yields waits for "
+            f"be tared (sensor.taring_time = {taring_time:g} s); compliant motion waits for "
             "that, and then catches up"
         ]
     return []

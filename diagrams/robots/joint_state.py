@@ -1,4 +1,4 @@
-"""What a controller knows of joints: by encoders, and the links' side of elastic ones."""
+"""Measured joint state: encoders, and torque sensors in elastic joints."""
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -17,7 +17,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 
-# which sides must be measured where the controller has its state from
+# sides that must be measured, by the source of the controller's state
 _NEEDED = {
     "measured": ("both",),
     "from_torque": ("motor_and_torque",),
@@ -34,20 +34,19 @@ def add_joint_state(
     period: float,
     encoder_period: float,
 ) -> OutputPort:
-    """Add what encoders make of the joint state, and return ``[q_J, v_J, q_M, v_M]`` as measured.
+    """Add encoders, and return the measured ``[q_J, v_J, q_M, v_M]``.
 
     Args:
         builder: Builder of the diagram.
-        joint_state: The true one.
+        joint_state: Actual joint state.
         robot: The robot.
         encoders: The encoders.
-        failure: How one of them fails, if any does.
+        failure: Failure of one of them, if there is one.
         period: Sampling time of the controller [s].
-        encoder_period: That of the encoders, which servos may read more often [s].
+        encoder_period: Sampling time of the encoders, which servos may read more often [s].
 
     Raises:
-        InputError: If the encoders do not suit the robot, or a sensor is to fail that does
-            not exist.
+        InputError: If the encoders do not suit the robot, or a sensor fails that does not exist.
     """
     measured = joint_state
     if encoders != EncoderOptions():
@@ -81,14 +80,14 @@ def add_torque_sensor(
     period: float,
     true_state: OutputPort,
 ) -> OutputPort:
-    """Add torque sensors in elastic joints, and return what they measure, shape (N,) [Nm or N].
+    """Add torque sensors in elastic joints, and return the measured torques, shape (N,) [Nm or N].
 
     Args:
         builder: Builder of the diagram.
-        robot: The robot as it is.
-        encoders: What the sensors do.
+        robot: The simulated robot.
+        encoders: Encoders and torque sensors.
         period: Sampling time [s].
-        true_state: The true ``[q_J, v_J, q_M, v_M]``.
+        true_state: Actual ``[q_J, v_J, q_M, v_M]``.
     """
     block = JointTorqueSensor(robot, encoders.torque)
     sensor = builder.AddNamedSystem("joint_torque_sensor", BlockSystem(block, period))
@@ -103,23 +102,23 @@ def add_torque_sensor(
 
 
 def check_sides(
-    believed: RobotModel, controller: ControllerParameters, encoders: EncoderOptions
+    nominal: RobotModel, controller: ControllerParameters, encoders: EncoderOptions
 ) -> None:
-    """Refuse encoders that do not measure what a controller takes.
+    """Refuse encoders that do not measure the sides that a controller needs.
 
     Args:
-        believed: Nominal model of the robot.
+        nominal: Nominal model of the robot.
         controller: The controller.
         encoders: The encoders.
 
     Raises:
-        InputError: If so.
+        InputError: If a side is missing.
     """
     source, sides = controller.state, encoders.sides
-    if believed.is_rigid or (source == "measured" and not controller.law_record.knows_links):
+    if nominal.is_rigid or (source == "measured" and not controller.law_record.knows_links):
         return
-    require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
+    require(sides in _NEEDED[source], "encoders.sides", sides, _needed(source))
 
 
-def _wanted(source: str) -> str:
+def _needed(source: str) -> str:
     return f"{' or '.join(_NEEDED[source])} where controller.state is {source}"

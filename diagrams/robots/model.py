@@ -24,7 +24,7 @@ from pfsc_drake.robot.models.model_xml import read_model_xml
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.yaml.reading import read_yaml
 
-# of a model that are worth naming; the last are those at the tool
+# names of a model's frames in a message; the last are those at the tool
 _MOST_NAMES = 12
 
 
@@ -39,14 +39,14 @@ def read_robot(
     """Return a plant with a robot, without the robot's geometry and in no diagram.
 
     Args:
-        parameters: Which robot.
-        folder: Where relative file names start.
+        parameters: The robot.
+        folder: Base folder of relative file names.
         time_step: Time step of the plant [s]; 0 for a continuous one.
-        before_finalizing: What else is to be added to the plant.
+        before_finalizing: Function that adds further bodies to the plant.
         by_velocity: Whether velocity servos move the joints, for which kinematics suffice.
 
     Returns:
-        The plant, and what there is to say about the model, one sentence each.
+        The plant, and warnings about the model, one sentence each.
 
     Raises:
         InputError: If the model cannot be read.
@@ -55,12 +55,12 @@ def read_robot(
     options = replace(parameters.options(folder), by_velocity=by_velocity)
     try:
         if before_finalizing is None:
-            read, said = _read_once(time_step, file, _text_of(file, options), options)
-            return read.Clone(), [*said]
+            read, warnings = _read_once(time_step, file, _text_of(file, options), options)
+            return read.Clone(), [*warnings]
         plant = MultibodyPlant(time_step)
         return plant, read_model(plant, file, options, before_finalizing)
     except InputError as error:
-        # what starts with an option is about the key of that name, what with the file about that
+        # a message that starts with an option is about that key, one with the file about the file
         key = str(error).split(":")[0].split(".")[0]
         if key in ModelOptions.__dataclass_fields__:
             raise InputError(f"robot.{error}") from None
@@ -73,13 +73,13 @@ def read_robot(
 def _read_once(
     time_step: float, file: FilePath, _text: list[bytes], options: ModelOptions
 ) -> tuple[MultibodyPlant, tuple[str, ...]]:
-    """Return a plant to be copied, which takes a fiftieth of what it takes to read it."""
+    """Return a plant to be copied, which takes a fiftieth of the time of reading it."""
     plant = MultibodyPlant(time_step)
     return plant, tuple(read_model(plant, file, options))
 
 
 def _text_of(file: FilePath, options: ModelOptions) -> list[bytes]:
-    """Return what a model's file and all that it includes hold."""
+    """Return the contents of a model's file and of all files that it includes."""
     packages = packages_for(file, read_model_xml(file).content, options.packages)
     return [model.content for model in read_with_inclusions(file, packages)]
 
@@ -88,8 +88,8 @@ def locate_model(parameters: RobotParameters, folder: FilePath) -> FilePath:
     """Return the file of a robot's model.
 
     Args:
-        parameters: Which robot.
-        folder: Where relative file names start.
+        parameters: The robot.
+        folder: Base folder of relative file names.
 
     Raises:
         InputError: If there is no such file.
@@ -108,7 +108,7 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
 
     Args:
         plant: Plant with the robot.
-        parameters: Which robot.
+        parameters: The robot.
 
     Raises:
         InputError: If the model has no such frame.
@@ -121,8 +121,8 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
         frames = [plant.get_frame(FrameIndex(i)).name() for i in range(1, plant.num_frames())]
         joints = [plant.get_joint(JointIndex(i)).name() for i in plant.GetJointIndices()]
         # Drake's own frames at joints are not the user's
-        made = {f"{joint}_{end}" for joint in joints for end in ("parent", "child", "base")}
-        names = [name for name in frames if name and name not in made]
+        drakes = {f"{joint}_{end}" for joint in joints for end in ("parent", "child", "base")}
+        names = [name for name in frames if name and name not in drakes]
         raise InputError(
             f"robot.tool_frame: the model {parameters.model} has no frame "
             f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"
@@ -141,7 +141,7 @@ def load_delta_robot(model: str, folder: FilePath) -> DeltaRobot:
 
     Args:
         model: Name of a shipped one, or file of parameters.
-        folder: Where relative file names start.
+        folder: Base folder of relative file names.
 
     Raises:
         InputError: If its parameters cannot be read, or are Drake's model directives.

@@ -1,4 +1,4 @@
-"""What brakes the plant's joints: friction and holding brakes."""
+"""Friction and holding brakes of the plant's joints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from pfsc_drake.systems.physics.brake_torque import BrakeTorque
 from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.yaml.fields import spread
 
-# integration schemes of fixed step that the bristles of friction are made for
+# integration schemes of fixed step that the bristles of friction are designed for
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
 _BRISTLES_PER_STEP = 0.5
@@ -31,22 +31,22 @@ _BRISTLES_PER_STEP = 0.5
 _SHORTEST_STEP = 1e-3
 # share of that frequency of brakes, whose dampers act beside those of friction
 _OF_BRAKES = 0.3
-# of the links' inertia in the middle, what brakes of drives without a rotor count on
+# share of the links' inertia in the middle posture, for brakes of drives without a rotor
 _OF_LINKS = 0.25
 
 
 @dataclass(frozen=True)
 class FrictionOptions:
-    """What brakes the drives of a plant, and how it is integrated.
+    """Friction and holding brakes of a plant's drives, with the integration of the plant.
 
     Attributes:
-        friction: Coefficients of the joints, if any are given.
-        own: Whether the drives have the friction that the robot's own parameters tell; None if they
-            do where none is given.
+        friction: Coefficients of the joints, if there are any.
+        own: Whether the drives have the friction of the robot's own parameters; None for true if
+            ``friction`` has no coefficients.
         brakes: Holding brakes, if there are any.
-        simulation: How the plant is integrated.
+        simulation: Integration of the plant.
         period: Sampling time of the controller [s].
-        folder: Where relative file names start.
+        folder: Base folder of relative file names.
     """
 
     friction: JointFrictionParameters
@@ -69,8 +69,8 @@ def add_friction(
     Args:
         builder: Builder of the diagram.
         part: The robot.
-        joint_state: Its true ``[q_J, v_J, q_M, v_M]``.
-        options: What there is of both.
+        joint_state: Its actual ``[q_J, v_J, q_M, v_M]``.
+        options: Options of friction and brakes.
         stops: Stop categories that are requested, each (1,); without any there are no brakes.
 
     Returns:
@@ -113,12 +113,12 @@ def _add_brakes(
     stops: Sequence[OutputPort],
 ) -> OutputPort | None:
     """Add brakes, and return their resistance; None where there are none."""
-    held = _brake_torque(part.robot, options.brakes)
-    if options.brakes is None or held is None:
+    limit = _brake_torque(part.robot, options.brakes)
+    if options.brakes is None or limit is None:
         return None
     holding = replace(part.drives, inertia=_behind_brakes(part))
     step = _step(options, part.drives)
-    bristles = _bristles_of_step(step, held, np.zeros(held.size), holding, _OF_BRAKES)
+    bristles = _bristles_of_step(step, limit, np.zeros(limit.size), holding, _OF_BRAKES)
     block = HoldingBrakes(bristles.presliding, len(stops), options.brakes.delay, options.period)
     brakes = builder.AddNamedSystem("holding_brakes", BlockSystem(block, options.period))
     torque = builder.AddNamedSystem("brake_torque", BrakeTorque(bristles))
@@ -142,27 +142,29 @@ def _sum(builder: DiagramBuilder, ports: list[OutputPort]) -> OutputPort:
 
 
 def _brake_torque(robot: RobotModel, brakes: BrakeParameters | None) -> np.ndarray | None:
-    """Return what brakes hold, shape (N,) [Nm or N]; None without brakes.
+    """Return the holding torques of the brakes, shape (N,) [Nm or N]; None without brakes.
 
-    By default drives whose limits are not known have none.
+    By default drives with unknown limits have no brakes.
 
     Raises:
         InputError: If the torques fit another number of joints.
     """
     if brakes is None:
         return None
-    n, given = robot.dimension, np.array(brakes.torque, dtype=float)
-    if given.size not in (0, 1, n):
-        raise InputError(f"faults.brakes.torque: {given.size} values; the robot has {n} joints")
-    torque = np.array(np.broadcast_to(given, n)) if given.size else robot.gather("effort_limit")
+    n, values = robot.dimension, np.array(brakes.torque, dtype=float)
+    if values.size not in (0, 1, n):
+        raise InputError(
+            f"faults.brakes.torque = {values.tolist()}; allowed: {n} values, one per joint, or one"
+        )
+    torque = np.array(np.broadcast_to(values, n)) if values.size else robot.gather("effort_limit")
     return torque if np.isfinite(torque).all() else None
 
 
 def _behind_brakes(part: RobotPart) -> np.ndarray:
     """Return the least inertia that each brake holds, shape (N,) [kg m^2 or kg].
 
-    Where a drive has none of its own that of the links is taken, a quarter of what it is in the
-    middle of the joints' ranges.
+    A drive without inertia of its own gets a quarter of the links' inertia in the middle of the
+    joints' ranges.
     """
     own = part.drives.inertia
     if np.all(own > 0.0):
@@ -171,34 +173,34 @@ def _behind_brakes(part: RobotPart) -> np.ndarray:
     return np.where(own > 0.0, own, _OF_LINKS / np.diag(np.linalg.inv(M + np.diag(own))))
 
 
-def believed_friction(
-    part: RobotPart, given: JointFrictionParameters, options: FrictionOptions
+def nominal_friction(
+    part: RobotPart, nominal: JointFrictionParameters, options: FrictionOptions
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the coefficients f_c and f_v that the controller believes, each (N,), if any.
+    """Return the coefficients f_c and f_v of the controller's friction model, each (N,), if any.
 
     Args:
         part: The robot.
-        given: ``controller.friction.believed``; if it is empty, those of the plant are believed,
-            with the belief's error.
+        nominal: ``controller.friction.believed``; if it is empty, the plant's coefficients with the
+            error of the nominal model.
         options: Friction of the plant.
 
     Raises:
         InputError: If they do not suit the robot.
     """
-    if given.is_given:
+    if nominal.is_given:
         key = "controller.friction.believed"
-        return _given_coefficients(given, part.robot, options.folder, key)
-    true = _coefficients(options, part)
-    if true is None:
+        return _read_coefficients(nominal, part.robot, options.folder, key)
+    actual = _coefficients(options, part)
+    if actual is None:
         return None
-    factors = part.belief.friction
-    return factors[0] * true[0], factors[1] * true[1]
+    factors = part.nominal_model.friction
+    return factors[0] * actual[0], factors[1] * actual[1]
 
 
 def _bristles(
     options: FrictionOptions, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
-    """Return friction whose bristles suit how the plant is integrated, however it drifts."""
+    """Return friction with bristles that suit the plant's integration, during a drift too."""
     simulation = options.simulation
     allowed = (AUTO, *FRICTION_INTEGRATORS)
     if drives.step is None and simulation.accuracy == 0.0 and simulation.integrator not in allowed:
@@ -206,10 +208,10 @@ def _bristles(
             f"simulation.integrator = {simulation.integrator} with friction; allowed: "
             f"{', '.join(allowed)}, or error control"
         )
-    drift, given = options.friction.drift, options.friction.presliding
+    drift, displacements = options.friction.drift, options.friction.presliding
     stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
-    if given:
-        presliding = _per_joint("friction.presliding", given, f_c.size)
+    if displacements:
+        presliding = _per_joint("friction.presliding", displacements, f_c.size)
         return _of_presliding(options, f_c, f_v, drives, presliding, stiffest)
     step = drives.step or max(_step(options, drives), _SHORTEST_STEP)
     return replace(_bristles_of_step(step, stiffest, f_v, drives, 1.0), coulomb=f_c)
@@ -223,10 +225,10 @@ def _of_presliding(
     presliding: np.ndarray,
     stiffest: np.ndarray,
 ) -> BristleFriction:
-    """Return friction of given presliding displacements, critically damped while stuck.
+    """Return friction of certain presliding displacements, critically damped while stuck.
 
     Args:
-        options: What there is of it.
+        options: Options of the friction.
         f_c: Coulomb friction, shape (N,) [Nm or N].
         f_v: Viscous friction, shape (N,).
         drives: The drives.
@@ -262,23 +264,23 @@ def _bristles_of_step(
 
 
 def _step(options: FrictionOptions, drives: Drives) -> float:
-    """Return the step that integrates friction [s]: that of the hold if that is shorter."""
+    """Return the step that integrates friction [s], at most the sampling time of the hold."""
     return drives.step or min(options.simulation.max_step, options.period)
 
 
 def _coefficients(
     options: FrictionOptions, part: RobotPart
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the friction that is given, else that of the robot's parameters, else None."""
-    own, wanted = part.drives.own_friction, options.own
-    allowed = "null; the parameters of this robot tell no friction, 'friction' does"
-    require(own is not None or wanted is None, "drive_friction", wanted, allowed)
+    """Return the friction of the options, or else of the robot's parameters, or else None."""
+    own, has_own = part.drives.own_friction, options.own
+    allowed = "null; the parameters of this robot have no friction: write the block 'friction'"
+    require(own is not None or has_own is None, "drive_friction", has_own, allowed)
     if options.friction.is_given:
-        return _given_coefficients(options.friction, part.robot, options.folder, "friction")
-    return None if wanted is False else own
+        return _read_coefficients(options.friction, part.robot, options.folder, "friction")
+    return None if has_own is False else own
 
 
-def _given_coefficients(
+def _read_coefficients(
     parameters: JointFrictionParameters, chain: RobotModel, folder: FilePath, block: str
 ) -> tuple[np.ndarray, np.ndarray]:
     n = chain.dimension
@@ -294,9 +296,9 @@ def _given_coefficients(
     return values[0], values[1]
 
 
-def _per_joint(key: str, given: list[float], n: int) -> np.ndarray:
+def _per_joint(key: str, numbers: list[float], n: int) -> np.ndarray:
     """Return one number for each joint, shape (N,)."""
-    values = spread(given, n)
+    values = spread(numbers, n)
     if len(values) != n:
-        raise InputError(f"{key}: {len(values)} values; the robot has {n} joints")
+        raise InputError(f"{key} = {list(values)}; allowed: {n} values, one per joint")
     return np.array(values, dtype=float)

@@ -1,4 +1,4 @@
-"""What drives, friction and forces of a robot mean for the MultibodyPlant that moves it."""
+"""Connections of drives, friction, forces and contact with a robot's MultibodyPlant."""
 
 from collections.abc import Sequence
 
@@ -27,13 +27,13 @@ def connect_actuation(
     coordinates: PlantCoordinates,
     torque: OutputPort,
 ) -> None:
-    """Let drive torques or forces act.
+    """Connect drive torques or forces with the plant's actuation.
 
     Args:
         builder: Builder of the diagram.
         plant: The plant.
-        coordinates: Where the robot's drives stand in the plant's actuation.
-        torque: Shape (N,) [Nm or N].
+        coordinates: Indices of the robot's drives in the plant's actuation.
+        torque: Torques or forces, shape (N,) [Nm or N].
     """
     rows = coordinates.actuation_rows(plant.num_actuators())
     drives = builder.AddNamedSystem("drives", MatrixGain(rows))
@@ -44,7 +44,7 @@ def connect_actuation(
 def connect_resistance(
     builder: DiagramBuilder, plant: MultibodyPlant, rows: np.ndarray, resistance: OutputPort
 ) -> None:
-    """Let friction act, beside the drives and whatever their limits.
+    """Connect friction with the plant, independent of the drives and their limits.
 
     Args:
         builder: Builder of the diagram.
@@ -64,14 +64,14 @@ def add_external_wrench(
     wrench: OutputPort,
     joint_state: OutputPort,
 ) -> ExternalWrench:
-    """Return what a wrench on the tool is for bodies and for joints.
+    """Add the map of a wrench on the tool to bodies and to joints.
 
     Args:
         builder: Builder of the diagram.
         tool: Frame at the tool point.
         robot: The robot.
-        wrench: At the tool point, world axes, shape (6,) [N, Nm].
-        joint_state: The true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        wrench: Wrench at the tool point, world axes, shape (6,) [N, Nm].
+        joint_state: Actual ``[q_J, v_J, q_M, v_M]``, shape (4N,).
     """
     push = builder.AddNamedSystem("external_wrench", ExternalWrench(tool, robot))
     builder.Connect(wrench, push.GetInputPort("wrench"))
@@ -82,7 +82,7 @@ def add_external_wrench(
 def connect_push(
     builder: DiagramBuilder, plant: MultibodyPlant, pushes: Sequence[LeafSystem]
 ) -> None:
-    """Let wrenches act on the bodies of a plant.
+    """Apply wrenches to the bodies of a plant.
 
     Args:
         builder: Builder of the diagram.
@@ -101,7 +101,7 @@ def connect_push(
 
 
 def connect_torques(builder: DiagramBuilder, port: InputPort, pushes: Sequence[LeafSystem]) -> None:
-    """Let wrenches act as what they mean in the joints.
+    """Apply wrenches as the equivalent joint torques.
 
     Args:
         builder: Builder of the diagram.
@@ -124,15 +124,15 @@ def add_tool_reaction(
     acceleration: OutputPort,
     ports: dict[str, OutputPort],
 ) -> OutputPort:
-    """Return what a sensor in the flange bears, of a robot whose plant does not tell it.
+    """Return the load on a sensor in the flange, for a plant without reaction forces.
 
     Args:
         builder: Builder of the diagram.
         robot: The robot.
-        load: Everything behind the sensor.
+        load: Load behind the sensor.
         acceleration: Acceleration of the links, shape (N,).
         ports: ``true_joint_state`` ``[q_J, v_J, q_M, v_M]``, shape (4N,), and ``wrench_ext`` on
-            the tool point, world axes, shape (6,), if anything acts there.
+            the tool point, world axes, shape (6,), if forces act there.
     """
     reaction = builder.AddNamedSystem("tool_reaction", ToolReaction(robot, load))
     builder.Connect(ports["true_joint_state"], reaction.GetInputPort("joint_state"))
@@ -145,12 +145,12 @@ def add_tool_reaction(
 def joint_state_of(
     builder: DiagramBuilder, plant_state: OutputPort, coordinates: PlantCoordinates
 ) -> OutputPort:
-    """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+    """Return the actual ``[q_J, v_J, q_M, v_M]``, shape (4N,).
 
     Args:
         builder: Builder of the diagram.
         plant_state: State of the plant.
-        coordinates: Where the robot's coordinates stand in it.
+        coordinates: Indices of the robot's coordinates in it.
     """
     encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(coordinates.rows))
     builder.Connect(plant_state, encoders.get_input_port())
@@ -158,7 +158,7 @@ def joint_state_of(
 
 
 def add_scene(builder: DiagramBuilder, plant: MultibodyPlant) -> SceneGraph:
-    """Let what is added to a plant from now on have contact.
+    """Add a scene graph, for contact between the geometries added afterwards.
 
     Args:
         builder: Builder of the diagram.
@@ -177,12 +177,12 @@ def connect_scene(
     scene_graph: SceneGraph,
     tool: list[GeometryId],
 ) -> ContactWrench:
-    """Connect a finalized plant with its scene, and return what acts on its tool.
+    """Connect a finalized plant with its scene graph, and return the contact wrench on its tool.
 
     Args:
         builder: Builder of the diagram, with the plant in it.
         plant: The plant.
-        scene_graph: From :func:`add_scene`.
+        scene_graph: Scene graph from :func:`add_scene`.
         tool: Contact geometries of the tool.
     """
     builder.Connect(

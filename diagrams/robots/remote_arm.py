@@ -1,4 +1,4 @@
-"""An arm that stands elsewhere: what it measures comes from outside, what drives it goes there."""
+"""An arm in another process, with sources for its measured signals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,22 +8,22 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, Outpu
 from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.robots.arm import Arm
-from diagrams.robots.arm_model import believe_arm, read_arm
-from diagrams.robots.belief import BeliefSource
+from diagrams.robots.arm_model import nominal_arm, read_arm
+from diagrams.robots.nominal_model import NominalModelSource
 from diagrams.robots.part import Ports, SensorMount
 from pfsc_drake.errors import InputError
 
 
 @dataclass(frozen=True)
 class RemoteArm(Arm):
-    """An arm of which a diagram has nothing but what it measures.
+    """An arm in another process; the diagram has its measured signals only.
 
     Attributes:
-        measured: What it measures of its joints, ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        torque: What it measures of the torques in its joints, shape (N,) [Nm or N].
-        stop_request: Nonzero from when on the controller is to stop it, shape (1,).
-        override: Share of its planned pace at which the reference moves, shape (1,).
-        wrench: What its force sensor measures, the sensor's axes, shape (6,) [N, Nm].
+        measured: Measured joint state ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        torque: Measured torques in its joints, shape (N,) [Nm or N].
+        stop_request: Request of a stop, nonzero from then on, shape (1,).
+        override: Speed scaling of the reference, shape (1,).
+        wrench: Wrench at its force sensor, axes of the sensor, shape (6,) [N, Nm].
     """
 
     measured: ConstantVectorSource
@@ -34,11 +34,11 @@ class RemoteArm(Arm):
 
     @property
     def plant(self) -> ConstantVectorSource:
-        """The system in the diagram that stands for it."""
+        """The system in the diagram that replaces the plant."""
         return self.measured
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """Return ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,)."""
+        """Return the measured ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
         return self.measured.get_output_port()
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
@@ -48,36 +48,36 @@ class RemoteArm(Arm):
         """Leave friction to the robot."""
 
     def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
-        raise InputError("what acts on a robot that stands elsewhere acts there")
+        raise InputError("forces on a robot in another process cannot be simulated here")
 
-    def place(self, context: Context, state: np.ndarray) -> None:
-        """Let the robot have measured a state of its model, ``[q, v]``."""
+    def set_state(self, context: Context, state: np.ndarray) -> None:
+        """Set the measured joint state to a state of the model, ``[q, v]``."""
         self.measured.get_mutable_source_value(context).SetFromVector(self.coordinates.rows @ state)
 
-    def tell(self, root: Context, joint_state: np.ndarray, torque: np.ndarray) -> None:
-        """Let the robot have measured its joints.
+    def set_measurement(self, root: Context, joint_state: np.ndarray, torque: np.ndarray) -> None:
+        """Set the measured state and torques of the joints.
 
         Args:
             root: Context of the diagram.
             joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-            torque: Torques in the joints, the weight among them, shape (N,) [Nm or N].
+            torque: Torques in the joints, with those of the weight, shape (N,) [Nm or N].
         """
         for source, values in ((self.measured, joint_state), (self.torque, torque)):
             context = source.GetMyMutableContextFromRoot(root)
             source.get_mutable_source_value(context).SetFromVector(values)
 
     def set_override(self, root: Context, share: float) -> None:
-        """Let the reference move at another pace.
+        """Set the speed scaling of the reference.
 
         Args:
             root: Context of the diagram.
-            share: Of the planned pace, 0 to 1.5; 0 is a pause.
+            share: Share of the planned speed, 0 to 1.5; 0 is a pause.
         """
         context = self.override.GetMyMutableContextFromRoot(root)
         self.override.get_mutable_source_value(context).SetAtIndex(0, share)
 
     def request_stop(self, root: Context) -> None:
-        """Let the controller bring the robot to rest.
+        """Request that the controller stops the robot.
 
         Args:
             root: Context of the diagram.
@@ -86,33 +86,35 @@ class RemoteArm(Arm):
         self.stop_request.get_mutable_source_value(context).SetAtIndex(0, 1.0)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
-        """Return where its force/torque sensor sits, with what that measures as it came."""
+        """Return the mount of its force/torque sensor, with the received reading."""
         assert self.wrench is not None
-        load = self.true.tool_load(joint)
+        load = self.actual.tool_load(joint)
         return SensorMount(
-            load, self.believed_load(joint), None, reading=self.wrench.get_output_port()
+            load, self.nominal_load(joint), None, reading=self.wrench.get_output_port()
         )
 
 
-def add_remote_arm(builder: DiagramBuilder, source: BeliefSource, *, has_sensor: bool) -> RemoteArm:
-    """Add an arm that stands elsewhere.
+def add_remote_arm(
+    builder: DiagramBuilder, source: NominalModelSource, *, has_sensor: bool
+) -> RemoteArm:
+    """Add an arm in another process.
 
     Args:
         builder: Builder of the diagram.
-        source: Which arm, and where what is believed of it comes from.
+        source: The arm, and the source of its nominal model.
         has_sensor: Whether forces are measured at its flange.
 
     Raises:
-        InputError: If the model cannot be read, is no chain of joints, or what is to be believed
-            of it makes no arm.
+        InputError: If the model cannot be read, is no chain of joints, or the nominal model is
+            invalid.
     """
-    true = read_arm(source.robot, source.folder)
+    actual = read_arm(source.robot, source.folder)
 
     def constant(name: str, size: int) -> ConstantVectorSource:
         return builder.AddNamedSystem(name, ConstantVectorSource(np.zeros(size)))
 
-    measured = constant("robot", 4 * true.chain.dimension)
-    torque, stop = constant("joint_torques", true.chain.dimension), constant("stop_request", 1)
+    measured = constant("robot", 4 * actual.chain.dimension)
+    torque, stop = constant("joint_torques", actual.chain.dimension), constant("stop_request", 1)
     override = builder.AddNamedSystem("override", ConstantVectorSource(np.ones(1)))
     wrench = constant("force_torque_sensor", 6) if has_sensor else None
-    return RemoteArm(true, *believe_arm(true, source), measured, torque, stop, override, wrench)
+    return RemoteArm(actual, *nominal_arm(actual, source), measured, torque, stop, override, wrench)

@@ -1,4 +1,4 @@
-"""The posture in which an arm starts: given, looked for from there, and what is odd about it."""
+"""Start posture of an arm: inverse kinematics from a posture of the scenario, and warnings."""
 
 import numpy as np
 
@@ -9,24 +9,24 @@ from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.yaml.fields import spread
 
-# from where on a posture that was found is another one than the posture given
+# difference from which on the start posture is another one than that of the scenario
 _FAR_DEG = 60.0
 _FAR_SLIDE = 0.3  # m
-# of a tool against its orientation, where it is no task
+# of a tool whose tilt is no task
 _LARGEST_TILT_DEG, _SMALL_TILT_DEG = 90.0, 1.0
 
 
 def start_posture(posture_deg: list[float], chain: SerialChain, target: ToolTarget) -> np.ndarray:
-    """Return the posture in which the tool starts, shape (N,) [rad or m].
+    """Return the start posture, shape (N,) [rad or m].
 
     Args:
-        posture_deg: From where it is looked for, as the scenario gives it; empty for none.
+        posture_deg: Initial guess from the scenario; empty for none.
         chain: The robot.
-        target: Where the tool starts.
+        target: Start pose of the tool.
 
     Raises:
-        InputError: If it is out of reach, or the tool's tilt, where it is no task, is far from
-            what the task's orientation asks.
+        InputError: If the pose is out of reach, or the tool's tilt, where it is no task, is far
+            from the tilt of the task's orientation.
     """
     near = posture_near(posture_deg, chain)
     if target.yaw_axis is None:
@@ -41,7 +41,7 @@ def start_posture(posture_deg: list[float], chain: SerialChain, target: ToolTarg
 
 
 def _tilt(chain: SerialChain, q_J: np.ndarray, target: ToolTarget) -> float:
-    """Return by how much the tool is tilted against the target [rad], where that is no task."""
+    """Return the tilt of the tool against the target [rad], where it is no task."""
     return target.tilt(np.array(pose_function(chain)(q_J)).ravel()[3:].reshape(3, 3))
 
 
@@ -50,19 +50,19 @@ def _require_upright(chain: SerialChain, q_J: np.ndarray, target: ToolTarget) ->
     if tilt > _LARGEST_TILT_DEG:
         raise InputError(
             f"start: the tool is tilted by {tilt:.3g} deg against the orientation of the task, and "
-            f"task: yaw leaves the tilt as it is; at most {_LARGEST_TILT_DEG:g} deg are allowed: "
+            f"task: yaw does not control the tilt; at most {_LARGEST_TILT_DEG:g} deg are allowed: "
             "give the orientation the tool's tilt (a tool that points down: angles_deg "
             "[yaw, 0, 180], convention zyx)"
         )
 
 
 def tilt_warnings(chain: SerialChain, q_J: np.ndarray, target: ToolTarget) -> list[str]:
-    """Return what is said of a tilt that the task asks and the tool does not have.
+    """Return a warning if the tool is tilted against the task's orientation.
 
     Args:
         chain: The robot.
         q_J: Start posture, shape (N,) [rad or m].
-        target: Where the tool starts.
+        target: Start pose of the tool.
     """
     if target.yaw_axis is None:
         return []
@@ -71,20 +71,20 @@ def tilt_warnings(chain: SerialChain, q_J: np.ndarray, target: ToolTarget) -> li
         return []
     return [
         f"the tool is tilted by {tilt:.3g} deg against the orientation of the task; task: yaw "
-        "leaves the tilt as it is"
+        "does not control the tilt"
     ]
 
 
 def posture_warnings(
     posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, target: ToolTarget
 ) -> list[str]:
-    """Return what is odd about a given start posture, one sentence each.
+    """Return warnings about the start posture of the scenario, one sentence each.
 
     Args:
-        posture_deg: As the scenario gives it; empty for none.
+        posture_deg: Posture of the scenario; empty for none.
         chain: The robot.
-        q_J: The start posture found from there, shape (N,) [rad or m].
-        target: Where the tool starts.
+        q_J: The start posture found from it, shape (N,) [rad or m].
+        target: Start pose of the tool.
     """
     if not posture_deg:
         return []
@@ -109,12 +109,12 @@ def posture_warnings(
 
 
 def _written(is_angle: np.ndarray, q: np.ndarray) -> str:
-    """Return joint coordinates [rad or m] as they stand in a scenario, in degrees or m."""
+    """Return joint coordinates [rad or m] in the units of a scenario, degrees or m."""
     return ", ".join(f"{value:.4g}" for value in np.where(is_angle, np.rad2deg(q), q))
 
 
 def _fits_in_radians(posture_deg: list[float], chain: SerialChain, target: ToolTarget) -> bool:
-    """Return whether the same digits, as radians, are next to a solution of their own."""
+    """Return whether the numbers of the posture, read as radians, are close to a solution."""
     angles = np.array([link.is_revolute for link in chain.links])
     as_radians = np.array(posture_deg)
     turns = np.abs(as_radians[angles]).max(initial=0.0)
@@ -128,21 +128,22 @@ def _fits_in_radians(posture_deg: list[float], chain: SerialChain, target: ToolT
 
 
 def posture_near(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
-    """Return the posture from which the start is looked for, shape (N,) [rad or m].
+    """Return the initial guess for the start posture, shape (N,) [rad or m].
 
     Args:
-        posture_deg: As the scenario gives it; empty for the middle of the limits.
+        posture_deg: Posture of the scenario; empty for the middle of the limits.
         chain: The robot.
 
     Raises:
-        InputError: If there are more or fewer joints.
+        InputError: If the number of values differs from the number of joints.
     """
     if not posture_deg:
         return middle_posture(chain)
     posture_deg = spread(posture_deg, chain.dimension)
     if len(posture_deg) != chain.dimension:
         raise InputError(
-            f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"
+            f"start.posture_deg = {list(posture_deg)}; allowed: {chain.dimension} values, one per "
+            "joint"
         )
     is_angle = np.array([link.is_revolute for link in chain.links])
     return np.where(is_angle, np.deg2rad(posture_deg), posture_deg)

@@ -1,4 +1,4 @@
-"""What a robot's tool may touch."""
+"""Workpiece that a robot's tool may touch."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
 
 @dataclass
 class FurtherLength:
-    """Something else in a station that is worth a look.
+    """Further length of a station, for logs and figures.
 
     Attributes:
         values: Signal [m], shape (samples, size).
         labels: Name of each component.
-        limit: Magnitude up to which it is free [m].
+        limit: Magnitude up to which there is no contact [m].
     """
 
     values: np.ndarray
@@ -29,12 +29,12 @@ class FurtherLength:
 
 
 @dataclass(frozen=True)
-class WorkpieceLook:
-    """How a workpiece is drawn, and what of the tool touches it.
+class WorkpieceDrawing:
+    """Drawing of a workpiece, and of the parts of the tool that touch it.
 
     Attributes:
         surface: Triangles of the workpiece, axes of the world.
-        tool_parts: What of the tool touches it.
+        tool_parts: Parts of the tool that touch it.
     """
 
     surface: Triangles
@@ -42,7 +42,7 @@ class WorkpieceLook:
 
 
 class Workpiece(ABC):
-    """A workpiece in the world, and what on the tool touches it."""
+    """A workpiece in the world, and the part of the tool that touches it."""
 
     @property
     @abstractmethod
@@ -52,7 +52,7 @@ class Workpiece(ABC):
     @property
     @abstractmethod
     def reach(self) -> float:
-        """Distance of what touches from the tool point [m]."""
+        """Distance of the touching part from the tool point [m]."""
 
     @property
     @abstractmethod
@@ -61,7 +61,7 @@ class Workpiece(ABC):
 
     @abstractmethod
     def add(self, plant: MultibodyPlant, tool: Frame) -> list[GeometryId]:
-        """Fix the workpiece to the world, and what touches it to the tool.
+        """Fix the workpiece to the world, and the part that touches it to the tool.
 
         Args:
             plant: A plant that is registered with a scene graph and not finalized.
@@ -71,35 +71,35 @@ class Workpiece(ABC):
             Contact geometries of the tool.
 
         Raises:
-            InputError: If it is not known where up is.
+            InputError: If there is no gravity, which defines the upward direction.
         """
 
     @abstractmethod
     def start_shift(self, gravity: np.ndarray) -> np.ndarray:
-        """Return how far from the start of the task nothing is touched [m], shape (3,).
+        """Return the displacement from the start of the task to a free position [m], shape (3,).
 
         Args:
             gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
 
         Raises:
-            InputError: If it is not known where up is.
+            InputError: If there is no gravity, which defines the upward direction.
         """
 
     @abstractmethod
     def lengths(
-        self, y_t: np.ndarray, initial_place: np.ndarray, gravity: np.ndarray
+        self, y_t: np.ndarray, initial_projection: np.ndarray, gravity: np.ndarray
     ) -> dict[str, FurtherLength]:
-        """Return what is worth a look in a run, by name.
+        """Return further lengths of a run, by name.
 
         Args:
             y_t: Motion of the tool point [m], shape (samples, 3).
-            initial_place: Place on the manifold near the first sample.
+            initial_projection: Projection onto the manifold near the first sample.
             gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
         """
 
     @abstractmethod
-    def look(self, gravity: np.ndarray) -> WorkpieceLook:
-        """Return how it is drawn.
+    def drawing(self, gravity: np.ndarray) -> WorkpieceDrawing:
+        """Return the drawing of the workpiece.
 
         Args:
             gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
@@ -113,7 +113,7 @@ class Workpiece(ABC):
             y_t: Tool point at the start [m], shape (3,).
 
         Raises:
-            InputError: If it is.
+            InputError: If it is inside.
         """
 
     def normal(self, axes: np.ndarray) -> np.ndarray | None:
@@ -131,12 +131,12 @@ def upwards(gravity: np.ndarray, key: str) -> np.ndarray:
 
     Args:
         gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
-        key: What needs it, for the message.
+        key: Key of the scenario, for the message.
 
     Raises:
         InputError: If there is no gravity.
     """
     size = float(np.linalg.norm(gravity))
     if size == 0.0:
-        raise InputError(f"{key}: gravity is zero; where up is must be known")
+        raise InputError(f"{key}: gravity is zero; it must define the upward direction")
     return 0.0 - gravity / size

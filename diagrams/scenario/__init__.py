@@ -1,6 +1,6 @@
 """Format of scenario files, one file per block."""
 
-from diagrams.scenario.holder import HeldWorkpieceParameters, HolderParameters, SolidParameters
+from diagrams.scenario.holder import HolderParameters, HolderWorkpiece, SolidParameters
 from diagrams.scenario.manifolds import PathParameters, SurfaceParameters
 from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -49,9 +49,9 @@ __all__ = [
     "GainParameters",
     "HandParameters",
     "HandWaypoint",
-    "HeldWorkpieceParameters",
     "HoldBackParameters",
     "HolderParameters",
+    "HolderWorkpiece",
     "Intersection",
     "JointFrictionParameters",
     "Keyframe",

@@ -1,4 +1,4 @@
-"""A second robot that holds the workpiece, on which the path of the first one is."""
+"""A workpiece robot: a second robot, which holds the workpiece with the path of the first one."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -28,7 +28,7 @@ class SolidParameters(Parameters):
     Attributes:
         box: Edges along x, y, z [m]; empty for a cylinder.
         cylinder: Radius, and length along z [m]; empty for a box.
-        pose: Where its centre and axes are in the workpiece's frame.
+        pose: Pose of its centre and axes in the workpiece's frame.
         mass: Its mass, evenly spread [kg].
     """
 
@@ -43,7 +43,7 @@ class SolidParameters(Parameters):
 
     @property
     def inertia(self) -> SpatialInertia:
-        """Its inertia about the origin of the workpiece's frame, axes of that."""
+        """Its inertia about the origin of the workpiece's frame, axes of that frame."""
         if self.box:
             unit = UnitInertia.SolidBox(*self.box)
         else:
@@ -54,12 +54,12 @@ class SolidParameters(Parameters):
 
 
 @dc.dataclass
-class HeldWorkpieceParameters:
+class HolderWorkpiece:
     """The workpiece that a robot holds.
 
     Attributes:
-        pose: Where its frame is in the ``tool_frame`` of the robot that holds it.
-        solids: What it consists of, one or more with mass.
+        pose: Pose of its frame in the ``tool_frame`` of the robot that holds it.
+        solids: Solids that it consists of, one or more with mass.
     """
 
     pose: PoseParameters = dc.field(default_factory=PoseParameters)
@@ -74,7 +74,7 @@ class HeldWorkpieceParameters:
         return total
 
     def check(self) -> None:
-        """Refuse what is no body.
+        """Refuse invalid solids.
 
         Raises:
             InputError: If a solid is neither a box nor a cylinder, or there is no mass.
@@ -84,40 +84,39 @@ class HeldWorkpieceParameters:
             allowed = "given where there is no box, and only there"
             require(one, f"workpiece.solids[{i}].cylinder", solid.cylinder, allowed)
         mass = sum(solid.mass for solid in self.solids)
-        given = f"{len(self.solids)} given, {mass:g} kg"
-        require(mass > 0.0, "workpiece.solids", given, "one or more, with mass")
+        found = f"{len(self.solids)} given, {mass:g} kg"
+        require(mass > 0.0, "workpiece.solids", found, "one or more, with mass")
 
 
 @dc.dataclass
 class HolderParameters(Parameters):
     """A robot that holds the workpiece and moves it along a path of its own.
 
-    The scenario's ``path`` or ``surface`` is then one of the workpiece, in the workpiece's frame,
-    and its robot follows it wherever the workpiece is.
+    The scenario's ``path`` or ``surface`` is then fixed to the workpiece, in the workpiece's frame,
+    and the scenario's robot follows it while the workpiece moves.
 
     Attributes:
-        robot: Which robot; its ``tool_frame`` is where it holds the workpiece.
-        workpiece: What it holds.
+        robot: The robot; its ``tool_frame`` holds the workpiece.
+        workpiece: The workpiece.
         path: Path of the workpiece's frame in the world.
         controller: Its controller, with the sampling time of the other one.
-        model_error: What its controller believes wrongly of the robot and, as its tool, of the
-            workpiece.
-        placement_error: Where its base is believed to be, in its own axes, beside where it is: an
-            error of calibration that no controller sees.
+        model_error: Errors of its nominal model: of the robot and, as its tool, of the workpiece.
+        placement_error: Pose of its base in the controllers' model relative to the actual one, axes
+            of the base: an error of calibration that no controller measures.
         reference: Motion along its path.
-        start: Where it starts.
+        start: Start on its path.
         friction: Friction of its joints.
-        encoders: What its encoders do to its joint state.
-        faults: What is a fault, and how it ends. A fault of one robot stops both.
-        sensor_failure: One of its sensors that fails on the way.
-        derivatives: What the other robot's controller knows of the workpiece's motion: ``known``:
-            all derivatives that its law needs; for comparison ``planned``, those of the reference;
+        encoders: Encoders of its joints.
+        faults: Fault detection and stops. A fault of one robot stops both.
+        sensor_failure: Failure of one of its sensors during the run.
+        derivatives: Derivatives of the workpiece's motion in the other robot's controller:
+            ``known``: all that its law needs; for comparison ``planned``, those of the reference;
             ``differenced``, from the poses of the last ticks; or ``none``, the pose alone.
         highest: Highest derivative that is known, planned or differenced, 0 to 4.
     """
 
     robot: RobotParameters = dc.field(default_factory=RobotParameters)
-    workpiece: HeldWorkpieceParameters = dc.field(default_factory=HeldWorkpieceParameters)
+    workpiece: HolderWorkpiece = dc.field(default_factory=HolderWorkpiece)
     path: PathParameters = dc.field(default_factory=PathParameters)
     controller: ControllerParameters = dc.field(default_factory=ControllerParameters)
     model_error: ModelErrorParameters = dc.field(default_factory=ModelErrorParameters)
@@ -134,9 +133,9 @@ class HolderParameters(Parameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         manifold = self.controller.manifold
-        require(manifold == "path", "controller.manifold", manifold, "path, of a robot that holds")
+        require(manifold == "path", "controller.manifold", manifold, "path, for a workpiece robot")
         law = self.controller.law
-        allowed = "a law of torques, of a robot that holds"
+        allowed = "a law of torques, for a workpiece robot"
         require(self.controller.law_record.commands_torque, "controller.law", law, allowed)
         delay = self.controller.delay
-        require(delay is None, "controller.delay", delay, "null, of a robot that holds")
+        require(delay is None, "controller.delay", delay, "null, for a workpiece robot")

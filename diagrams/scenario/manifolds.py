@@ -15,7 +15,7 @@ from pfsc_drake.geometry.shapes.tool_orientation import (
     SurfaceOrientationParameters,
 )
 
-# shapes of paths and of guides; the first is what a shape without a tag means
+# shapes of paths and of guides; the first is the default of a shape without a tag
 FreePath = Union[Waypoints, BentLemniscate, Circle, Line]  # noqa: UP007 (Drake's YAML needs it)
 PathShape = Union[FreePath, OnSurface, Intersection, Streamed]  # noqa: UP007
 GuideShape = Union[FreePath, Intersection]  # noqa: UP007

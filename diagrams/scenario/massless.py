@@ -9,14 +9,13 @@ _BLOCKS = ("hand", "operator", "teleoperation", "notch", "workpiece", "plate", "
 
 
 def check_massless(scenario: Scenario) -> None:
-    """Refuse what needs masses, for a robot of which kinematics alone are known.
+    """Refuse blocks that need masses, for a robot with kinematics alone.
 
     Args:
         scenario: The scenario; its law is ``velocity_servo``.
 
     Raises:
-        InputError: If forces are to act, to be measured or to be estimated, or motion is to be
-            chosen for torques.
+        InputError: If forces act, are measured or estimated, or the motion depends on torques.
     """
     controller, hold_back = scenario.controller, scenario.hold_back
     brakes = scenario.faults.brakes
@@ -34,5 +33,5 @@ def check_massless(scenario: Scenario) -> None:
         "faults.brakes.torque": brakes is not None and bool(brakes.torque),
         "reference.speed": scenario.reference.speed == "fastest",
     }
-    for key, given in needs.items():
-        require(not given, key, "given", _ALLOWED)
+    for key, is_set in needs.items():
+        require(not is_set, key, "given", _ALLOWED)

@@ -1,4 +1,4 @@
-"""What the controller of a scenario believes wrongly of the robot."""
+"""Errors of the nominal model in the controller of a scenario."""
 
 import dataclasses as dc
 from collections.abc import Sequence
@@ -41,10 +41,10 @@ def _one() -> list[float]:
 
 @dc.dataclass
 class RandomModelError(Parameters):
-    """Standard deviations of errors that are drawn for every link anew; none by default.
+    """Standard deviations of random errors, independent for every link; none by default.
 
     Attributes:
-        seed: Another one draws other errors; the draws of a kind depend on nothing else.
+        seed: Seed of the errors; those of a kind depend on nothing else.
         mass: Relative.
         inertia: Relative.
         center: Error of each link's centre of mass along every axis [m].
@@ -52,8 +52,8 @@ class RandomModelError(Parameters):
         stiffness: Relative.
         friction: Relative, Coulomb and viscous apart.
         link_length: Relative.
-        joint_offset_deg: [deg].
-        tool_mass: [kg].
+        joint_offset_deg: Error of the zero position [deg].
+        tool_mass: Error of the tool's mass [kg].
     """
 
     seed: Seed = 0
@@ -76,7 +76,7 @@ class RandomModelError(Parameters):
 
         Args:
             kind: Name of an attribute.
-            shape: How many.
+            shape: Shape of the array.
         """
         generator = np.random.default_rng([self.seed, self._kinds().index(kind)])
         return getattr(self, kind) * generator.standard_normal(shape)
@@ -84,9 +84,9 @@ class RandomModelError(Parameters):
 
 @dc.dataclass
 class ModelErrorParameters(Parameters):
-    """What the controller believes of the robot, beside what is true of the plant.
+    """Errors of the nominal model in the controller, relative to the simulated robot.
 
-    Factors are what is believed in units of what is true: 0.95 is 5 % too low. They are one
+    A factor is the nominal value divided by the actual one: 0.95 is 5 % too low. Factors are one
     number for all links, or a list, base first; of a DELTA robot slides, rods and end-effector
     are the links, with ``l_A``, ``l_BC`` and ``l_EC`` their lengths.
 
@@ -97,7 +97,7 @@ class ModelErrorParameters(Parameters):
         stiffness: Factor of the joint stiffnesses.
         friction: Factor of the drives' friction, Coulomb and viscous.
         link_length: Factor of the distance to the next joint, the last to the tool point.
-        joint_offset_deg: What is believed of each joint's zero, minus the truth [deg; m for
+        joint_offset_deg: Error of each joint's zero position, nominal minus actual [deg; m for
             slides].
         tool_mass: Added to the tool [kg].
         tool_center: Error of the tool's centre of mass, axes of the tool frame [m].
@@ -119,22 +119,22 @@ class ModelErrorParameters(Parameters):
 
     @property
     def warnings(self) -> list[str]:
-        """What was perhaps not meant, one sentence each: errors where factors are asked for."""
+        """Warnings about factors that may be meant as relative errors, one sentence each."""
         least, most = _DOUBTED
         doubted = {
             key: next((f for f in getattr(self, key) if not least <= f <= most), None)
             for key in _FACTORS
         }
         return [
-            f"model_error.{key} = {factor:g} is a factor: the controller believes "
-            f"{factor:g} times what is true; 0.95 is 5 % too low, 1.05 is 5 % too high"
+            f"model_error.{key} = {factor:g} is a factor: the nominal value is {factor:g} times "
+            "the actual one; 0.95 is 5 % too low, 1.05 is 5 % too high"
             for key, factor in doubted.items()
             if factor is not None
         ]
 
     @property
     def is_given(self) -> bool:
-        """Whether anything is believed wrongly."""
+        """Whether there is an error."""
         return self != ModelErrorParameters(random=RandomModelError(seed=self.random.seed))
 
     def error(self, is_revolute: np.ndarray) -> ModelError:
@@ -144,7 +144,7 @@ class ModelErrorParameters(Parameters):
             is_revolute: Whether each of the robot's N joints turns, shape (N,).
 
         Raises:
-            InputError: If there are more or fewer links, or a draw leaves no positive number.
+            InputError: If there are more or fewer links, or a random factor is not positive.
         """
         n, random = len(is_revolute), self.random
         unit = np.where(is_revolute, np.pi / 180.0, 1.0)
@@ -172,8 +172,8 @@ class ModelErrorParameters(Parameters):
         return np.broadcast_to(np.array(values, dtype=float), n)
 
     def _factor(self, key: str, n: int, rows: int | None = None) -> np.ndarray:
-        given = self._per_link(key, n)
-        factor = given * (1.0 + self.random.draw(key, n if rows is None else (rows, n)))
+        mean = self._per_link(key, n)
+        factor = mean * (1.0 + self.random.draw(key, n if rows is None else (rows, n)))
         if not np.all(factor >= _LEAST):
             raise InputError(
                 f"model_error.random.{key} = {getattr(self.random, key):g}: with seed "

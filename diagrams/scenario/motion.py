@@ -1,4 +1,4 @@
-"""Where a scenario starts and how it moves along."""
+"""Start and reference motion of a scenario."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -9,18 +9,18 @@ from pfsc_drake.controller.options.motion_limits import ACCELERATION, VELOCITY, 
 from pfsc_drake.yaml.fields import NUMBERS_OR_END, ONE_FOR_ALL, equal
 from pfsc_drake.yaml.rules import Count, Numbers, Parameters, Range
 
-_FARTHEST = 1e6  # m, many rounds of a closed path
+_FARTHEST = 1e6  # m, many revolutions of a closed path
 _SEVERAL = Count(2, words="two or more finite numbers")
 _TRANSITIONS = (1e-3, 1e3)  # s
 
 
-_Way = Annotated[list[float], Numbers(each=Range(-_FARTHEST, _FARTHEST, "m")), _SEVERAL]
-_Place = Annotated[list[float], Numbers(2, Range(-_FARTHEST, _FARTHEST, "m"))]
+_Points = Annotated[list[float], Numbers(each=Range(-_FARTHEST, _FARTHEST, "m")), _SEVERAL]
+_Pair = Annotated[list[float], Numbers(2, Range(-_FARTHEST, _FARTHEST, "m"))]
 
 
 @dc.dataclass
 class SecondReference(Parameters):
-    """Motion along the second tangential coordinate of a surface, at its own pace.
+    """Motion along the second tangential coordinate of a surface, with its own speed.
 
     Attributes:
         points: Coordinates to visit [m], at most 1e6; the first is the start.
@@ -28,7 +28,7 @@ class SecondReference(Parameters):
         acceleration: Largest acceleration [m/s^2].
     """
 
-    points: _Way = dc.field(default_factory=lambda: [0.0, 0.1])
+    points: _Points = dc.field(default_factory=lambda: [0.0, 0.1])
     velocity: Annotated[float, VELOCITY] = 0.1
     acceleration: Annotated[float, ACCELERATION] = 1.0
 
@@ -39,32 +39,33 @@ class ReferenceParameters(MotionLimits):
 
     Attributes:
         points: Arc lengths to visit [m], at most 1e6; the first is the start. Of a path ``end``
-            stands for its length, so that ``[0, end]`` is all of it, and ``[0, end, 0]`` there and
-            back; a closed one ends where it began.
-        places: Places of a surface, instead: pairs of tangential coordinates to visit [m], along
+            stands for its length, so that ``[0, end]`` is the whole path, and ``[0, end, 0]`` there
+            and back; on a closed one ``end`` is the start again.
+        places: Points of a surface, instead: pairs of tangential coordinates to visit [m], along
             straight lines of these coordinates.
-        second: Second of a surface, with points for its first coordinate: the motion of the second.
+        second: Motion of the second coordinate of a surface, where ``points`` are those of the
+            first.
         velocity: Largest velocity, 1e-6 to 1e3 [m/s]; null for 0.1, and with ``speed: fastest`` for
             any.
         acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2]; with ``speed: fastest`` the drives
-            decide.
+            limit it.
         dwell: Rest before, between and after the moves, 0 or 1e-6 to 1e6 [s].
-        swings: How the path or surface itself moves along its normals (5.1), (5.2).
-        limits: ``respect``: where the drives, as they are believed, could not follow, the
-            reference is slowed; ``warn``: only that is said.
+        swings: Oscillation of the path or surface itself along its normals (5.1), (5.2).
+        limits: ``respect``: a reference that exceeds the limits of the drives, by the nominal
+            model, is slowed; ``warn``: there is only a warning.
         reserve: Share of the drives' torques, and of the speeds of velocity servos, that the
             reference leaves, from 0 to below 1.
-        speed: ``asked``: as velocity and acceleration say; ``fastest``: in the least time in which
-            the drives, as they are believed, can follow, all but the reserve.
-        torque_rate: With ``speed: fastest`` the largest rate of the drives' torques [Nm/s], of
-            strong ones ten times their largest torque in a second; ``.inf`` for any.
+        speed: ``asked``: the requested velocity and acceleration; ``fastest``: the shortest time
+            within the limits of the drives, by the nominal model, less the reserve.
+        torque_rate: With ``speed: fastest`` the largest rate of the drives' torques [Nm/s]; for
+            strong drives ten times their largest torque per second; ``.inf`` for any.
     """
 
     points: Annotated[list[Annotated[float, Range(-_FARTHEST, _FARTHEST, "m")] | str], _SEVERAL] = (
         dc.field(default_factory=lambda: [0.0, 0.1], metadata=NUMBERS_OR_END)
     )
     swings: list[Swing] = dc.field(default_factory=list)
-    places: Annotated[list[_Place], Count(2, empty=True, words="two or more pairs, or none")] = (
+    places: Annotated[list[_Pair], Count(2, empty=True, words="two or more pairs, or none")] = (
         dc.field(default_factory=list)
     )
     second: SecondReference | None = None
@@ -77,7 +78,7 @@ class ReferenceParameters(MotionLimits):
             self._check_fastest()
 
     def _check_fastest(self) -> None:
-        """Refuse motions of which the fastest is not looked for."""
+        """Refuse motions for which no fastest one is computed."""
         allowed = "none with speed: fastest"
         require(self.second is None, "second", "given", f"{allowed}; write places")
         require(not self.swings, "swings", f"{len(self.swings)} given", allowed)
@@ -86,10 +87,10 @@ class ReferenceParameters(MotionLimits):
         """Return the points [m].
 
         Args:
-            length: What ``end`` stands for [m]; None for a surface, which has no end.
+            length: Length for ``end`` [m]; None for a surface, which has no end.
 
         Raises:
-            InputError: If there is an ``end`` and no length.
+            InputError: If there is an ``end`` without a length.
         """
         words = [point for point in self.points if isinstance(point, str)]
         allowed = "numbers; a surface has no end"
@@ -99,19 +100,19 @@ class ReferenceParameters(MotionLimits):
 
 @dc.dataclass
 class StartParameters(Parameters):
-    """Where the tool is at the start, at rest.
+    """Start of the tool, at rest.
 
     Attributes:
-        offset: Transversal coordinates [m] beside the first point of the reference, one number for
-            equal ones; of a surface the first is the distance along its normal.
-        theta: Parameters of a surface: its parameters where the tool starts; empty for its middle.
-        position: Position of a surface, instead: the tool point [m].
-        rotation_deg: ZYX angles [deg] away from the path's orientation.
+        offset: Transversal coordinates [m] relative to the first point of the reference, one number
+            for equal ones; of a surface the first is the distance along its normal.
+        theta: Parameters of a surface at the start; empty for its middle.
+        position: Position of the tool point on a surface, instead [m].
+        rotation_deg: ZYX angles [deg] relative to the path's orientation.
         posture_deg: Joint angles [deg] near the start pose (m for prismatic joints), one number
             for all that are equal; they choose the branch of the inverse kinematics.
-        transition: Time in which the reference goes over from where the tool is to the path, so
-            that a start beside the path asks for no jump of the drives, 0 or 1e-3 to 1e3 [s];
-            0 for a reference that is on the path from the start.
+        transition: Time in which the reference moves from the tool to the path, so that a start
+            off the path causes no jump of the drives, 0 or 1e-3 to 1e3 [s]; 0 for a reference on
+            the path from the start.
     """
 
     offset: Annotated[list[float], Numbers(2)] = dc.field(

@@ -1,9 +1,9 @@
-"""Obstacles that cross the path, how they are measured, and how progress waits for them."""
+"""Obstacles that cross the path, their sensor, and the waiting of progress for them."""
 
 import dataclasses as dc
 from typing import Annotated
 
-from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
+from pfsc_drake.control.obstacles.elbow_clearance import ElbowParameters
 from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.physics.moving_obstacle import ObstacleParameters, ObstacleSensorParameters
 from pfsc_drake.yaml.rules import Count, Parameters
@@ -14,10 +14,10 @@ class CrossingParameters(Parameters):
     """Obstacles, for a tool that follows a path or a surface.
 
     Attributes:
-        moving: What moves, and where.
-        sensor: What measures it.
-        watch: How progress waits for it.
-        elbow: How the elbow of an arm with joints to spare gives way; it does not without.
+        moving: The obstacles, with their motion.
+        sensor: Their sensor.
+        watch: Waiting of progress for them.
+        elbow: Null-space avoidance by the elbow of a redundant arm; none without the block.
     """
 
     moving: Annotated[list[ObstacleParameters], Count(1)] = dc.field(

@@ -1,4 +1,4 @@
-"""A scenario of two robots: that of the one which holds the workpiece, and what does not go."""
+"""A scenario of two robots: the scenario of the workpiece robot, and excluded combinations."""
 
 import dataclasses as dc
 
@@ -8,10 +8,10 @@ from pfsc_drake.checks import require
 
 
 def holder_scenario(scenario: Scenario) -> Scenario:
-    """Return the scenario of the robot that holds the workpiece alone.
+    """Return the scenario of the workpiece robot alone.
 
     Args:
-        scenario: One with a holder.
+        scenario: A scenario with ``holder``.
     """
     holder = scenario.holder
     assert holder is not None
@@ -31,7 +31,7 @@ def holder_scenario(scenario: Scenario) -> Scenario:
     )
 
 
-# what acts where the world's axes or one robot alone are meant
+# blocks that need a fixed workpiece or a single robot
 _BESIDE_HOLDER = (
     *("pushes", "hand", "operator", "hold_back", "servo", "driver", "compliance"),
     *("notch", "workpiece", "plate", "teleoperation", "obstacles"),
@@ -39,31 +39,32 @@ _BESIDE_HOLDER = (
 
 
 def check_carrier(scenario: Scenario, *, simulated: bool = True) -> None:
-    """Refuse what does not go with a workpiece that moves, if it is one.
+    """Refuse blocks that exclude a moving workpiece, if the scenario has one.
 
     Args:
         scenario: The scenario.
-        simulated: Whether its station is for a simulation, not for margins nor a robot elsewhere.
+        simulated: Whether its station is simulated: not for margins, nor for a robot in another
+            process.
 
     Raises:
-        InputError: If there is something of the kind.
+        InputError: If there is such a block.
     """
     if scenario.holder is None and scenario.turntable is None:
         return
     plain, manifold = Scenario(), scenario.controller.manifold
     both = scenario.holder is not None and scenario.turntable is not None
-    require(not both, "turntable", "given", "null where a holder has the workpiece")
+    require(not both, "turntable", "given", "null where a robot holds the workpiece")
     carrier = "holder" if scenario.turntable is None else "turntable"
-    allowed = "null where margins are told, or a robot is driven elsewhere"
+    allowed = "null for margins, and for a robot in another process"
     require(simulated, carrier, "given", allowed)
     for key in _BESIDE_HOLDER:
-        given = getattr(scenario, key) != getattr(plain, key)
-        require(not given, key, "given", f"left out where a {carrier} has the workpiece")
-    allowed = f"path, trajectory or surface where a {carrier} has the workpiece"
+        is_set = getattr(scenario, key) != getattr(plain, key)
+        require(not is_set, key, "given", f"left out with a {carrier}")
+    allowed = f"path, trajectory or surface with a {carrier}"
     require(manifold != "space", "controller.manifold", manifold, allowed)
     controller = scenario.controller
     for i, pulse in enumerate(scenario.forces):
-        allowed = f"empty where a {carrier} has the workpiece: forces are between it and the tool"
+        allowed = f"empty with a {carrier}: forces act between workpiece and tool"
         require(not pulse.link, f"forces[{i}].link", f"'{pulse.link}'", allowed)
     allowed = f"null, with a {carrier}"
     require(controller.delay is None, "controller.delay", controller.delay, allowed)

@@ -1,4 +1,4 @@
-"""The plate that is taken from a magazine and mounted into a frame (Sec. 5.3)."""
+"""Plate that is taken from a magazine and mounted into a frame (Sec. 5.3)."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -40,8 +40,8 @@ class PinParameters(Parameters):
 
     Attributes:
         positions: Positions of their axes in the plate's frame [m], one ``[x, y]`` each.
-        radius: [m].
-        length: From the plate's underside to the tip [m], more than the radius.
+        radius: Radius [m].
+        length: Length from the plate's underside to the tip [m], more than the radius.
     """
 
     positions: Annotated[list[Pair], Count(2, words="two pins or more")] = dc.field(
@@ -57,10 +57,10 @@ class PinParameters(Parameters):
 
 @dc.dataclass
 class RandomMisplacement(Parameters):
-    """A misplacement that is drawn, in addition; uniform in two balls. None by default.
+    """Random misplacement, in addition; uniform in two balls. None by default.
 
     Attributes:
-        seed: Another one draws another.
+        seed: Seed of the random numbers.
         shift: Radius of the ball of shifts [m].
         turn: Radius of the ball of rotation vectors [rad].
     """
@@ -79,17 +79,16 @@ class RandomMisplacement(Parameters):
 
 @dc.dataclass
 class CarrierParameters(Parameters):
-    """Where a plate lies: a magazine or a frame.
+    """Carrier of a plate: a magazine or a frame.
 
-    The path was taught with the tool in its pose at the arc length ``at`` when a gripped plate lies
-    there. Since then the carrier moved.
+    When the path was taught, a gripped plate lay in the carrier with the tool at the arc length
+    ``at``. Since then the carrier has moved.
 
     Attributes:
         at: Arc length of the path [m].
-        shift: How far it moved, axes of the tool in that pose [m].
-        turn: Rotation vector by which it turned about the tool point in that pose, same axes
-            [rad].
-        random: What is drawn in addition.
+        shift: Displacement since then, axes of the tool in that pose [m].
+        turn: Rotation vector since then, about the tool point in that pose, same axes [rad].
+        random: Random misplacement in addition.
     """
 
     at: NotNegative = 0.0
@@ -109,7 +108,7 @@ class CarrierParameters(Parameters):
             require(small, key, values, f"a vector of at most {most:g} {unit}")
 
     def misplacement(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return shift [m] and rotation vector [rad] with what is drawn, shape (3,) each."""
+        """Return shift [m] and rotation vector [rad], random parts included, shape (3,) each."""
         shift, turn = self.random.draw()
         return np.array(self.shift) + shift, np.array(self.turn) + turn
 
@@ -120,11 +119,10 @@ class FrameParameters(CarrierParameters):
 
     Attributes:
         size: Length and width of the frame [m]; one number for a square.
-        clearance: Diameter of the bores less that of the pins [m].
-        ring: Radius around the axis of a bore within which there is material for a pin to touch
-            [m].
+        clearance: Difference between the diameters of bores and pins [m].
+        ring: Radius around the axis of a bore within which there is material for contact [m].
         depth: Depth of the bores [m].
-        wedges: Number of convex pieces that a bore is made of, see :func:`bore_wedges`.
+        wedges: Number of convex pieces of a bore, see :func:`bore_wedges`.
     """
 
     size: Annotated[list[float], Numbers(2, Range(0.0, open=True))] = dc.field(
@@ -138,7 +136,7 @@ class FrameParameters(CarrierParameters):
 
 @dc.dataclass
 class PlateContactParameters(Parameters):
-    """What happens where plate, magazine and frame touch.
+    """Contact between plate, magazine and frame.
 
     Attributes:
         stiffness: Stiffness of point contact [N/m].
@@ -156,26 +154,27 @@ class PlateContactParameters(Parameters):
 
 @dc.dataclass
 class PlateParameters(Parameters):
-    """A plate with pins, where it lies and where it is to go, and the gripper that takes it there.
+    """A plate with pins, its magazine, the frame that it is mounted into, and the gripper.
 
     A gripped plate has the frame of the tool: origin in the middle of its upper face, z into it.
 
     Attributes:
         size: Length, width and thickness [m].
-        mass: [kg].
-        believed_mass: What the controller takes off the measured force while it is held [kg].
+        mass: Mass [kg].
+        believed_mass: Mass whose weight is removed from the measured force while it is gripped
+            [kg].
         pins: Its pins.
-        rests: Where its underside lies on magazine and frame, ``[x, y]`` each [m].
-        magazine: Where it comes from.
-        frame: Where it goes.
-        contact: What happens where they touch.
+        rests: Points of its underside that lie on magazine and frame, ``[x, y]`` each [m].
+        magazine: Magazine that it is taken from.
+        frame: Frame that it is mounted into.
+        contact: Contact with magazine and frame.
         suction: The gripper's cups.
-        start: Where a plate is at the start: in the ``magazine``; ``held`` where the tool starts;
-            mounted in the ``frame`` and still held, the tool starting there, with another one in
-            the magazine.
-        release: When the vacuum ends if nobody decides [s].
-        operator: Who mounts it; ``hand`` then says what the hand is like. None: the vacuum is on
-            from the start.
+        start: Plate at the start: in the ``magazine``; ``held`` by the gripper at the start of the
+            tool; or mounted in the ``frame`` and still gripped, with the tool starting there and
+            another plate in the magazine.
+        release: Time at which the vacuum ends without an operator [s].
+        operator: Operator who mounts it, with the hand of ``hand``. None: the vacuum is on from the
+            start.
     """
 
     size: Annotated[list[float], Numbers(3, Range(_SMALLEST, _LARGEST, "m"))] = dc.field(
@@ -212,8 +211,8 @@ class PlateParameters(Parameters):
         )
         for i, position in enumerate(pins.positions):
             self._require_on_plate(f"pins.positions[{i}]", position, pins.radius)
-            room = np.array(self.frame.size) / 2.0 - ring
-            inside = bool(np.all(np.abs(position) <= room))
+            largest = np.array(self.frame.size) / 2.0 - ring
+            inside = bool(np.all(np.abs(position) <= largest))
             allowed = f"bores at least frame.ring = {ring:g} m inside of frame.size"
             require(inside, f"pins.positions[{i}]", position, allowed)
             for other in pins.positions[:i]:
@@ -225,5 +224,5 @@ class PlateParameters(Parameters):
                 require(free, "rests", rest, f"at least frame.ring = {ring:g} m from every pin")
 
     def _require_on_plate(self, key: str, position: list[float], margin: float) -> None:
-        room = np.array(self.size[:2]) / 2.0 - margin
-        require(bool(np.all(np.abs(position) <= room)), key, position, "a place on the plate")
+        largest = np.array(self.size[:2]) / 2.0 - margin
+        require(bool(np.all(np.abs(position) <= largest)), key, position, "a point on the plate")

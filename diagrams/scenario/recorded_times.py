@@ -5,7 +5,7 @@ import numpy as np
 from pfsc_drake.errors import InputError
 
 TIME, TICK = "time", "tick"
-# of a sampling interval, by which a time may be early
+# share of a sampling interval by which a time may be early
 _ROUNDING = 1e-3
 _DECIMALS = 9
 
@@ -30,7 +30,7 @@ def time_text(tick: int, period: float) -> str:
 
 
 def sampling_instants(name: str, column: str, times: np.ndarray, period: float) -> np.ndarray:
-    """Return the first sampling instants at which times have come, shape (rows,).
+    """Return the first sampling instants not before given times, shape (rows,).
 
     Args:
         name: The file.

@@ -6,10 +6,10 @@ from typing import Annotated
 
 from pfsc_drake.checks import require
 from pfsc_drake.control.law.reference import rest_to_rest
-from pfsc_drake.control.law.swing import SwingingCourse
+from pfsc_drake.control.law.swing import OscillatingMotion
 from pfsc_drake.geometry.regions.moving import (
-    Course,
-    CurveCourse,
+    CurveMotion,
+    Motion,
     MovingRegion,
     ShiftedRegion,
     TurningRegion,
@@ -25,16 +25,16 @@ from pfsc_drake.yaml.rules import (
     Range,
 )
 
-_LARGEST = 10.0  # m: how far a region may move
+_LARGEST = 10.0  # m, displacement of a region
 _LARGEST_DEG = 360.0
 
 
 @dc.dataclass
 class Visiting(Parameters):
-    """A way that comes to rest at every one of several points.
+    """Motion through several points, at rest at each.
 
     Attributes:
-        points: Places to visit [m], of a turn [deg]; where the scenario shows the region is 0.
+        points: Points to visit [m], of a turn [deg]; 0 is the pose of the region in the scenario.
         velocity: Largest velocity [m/s], of a turn [deg/s].
         acceleration: Largest acceleration [m/s^2], of a turn [deg/s^2].
         dwell: Rest before, between and after the moves [s].
@@ -56,11 +56,11 @@ class Visiting(Parameters):
 
     @property
     def extent(self) -> float:
-        """Largest distance from where the scenario shows the region [m], or [deg]."""
+        """Largest distance from the pose of the region in the scenario [m], or [deg]."""
         return max(map(abs, self.points))
 
-    def course(self, unit: float) -> Course:
-        """Return the course in m or rad.
+    def motion(self, unit: float) -> Motion:
+        """Return the motion in m or rad.
 
         Args:
             unit: Its unit in m or rad.
@@ -71,18 +71,18 @@ class Visiting(Parameters):
             acceleration=unit * self.acceleration,
             dwell=self.dwell,
         )
-        return CurveCourse(curve, repeat=self.repeat)
+        return CurveMotion(curve, repeat=self.repeat)
 
 
 @dc.dataclass
 class Swinging(Parameters):
-    """A way ``amplitude sin(2 pi frequency (t - begin))`` that begins smoothly.
+    """Oscillation ``amplitude sin(2 pi frequency (t - begin))`` with a smooth begin.
 
     Attributes:
-        amplitude: [m], of a turn [deg].
-        frequency: [Hz].
-        begin: Until when it rests [s].
-        ramp: Time in which it comes to its full amplitude [s].
+        amplitude: Amplitude [m], of a turn [deg].
+        frequency: Frequency [Hz].
+        begin: Time of the begin [s]; before, the region rests.
+        ramp: Time from rest to the full amplitude [s].
     """
 
     amplitude: Positive = 0.02
@@ -92,16 +92,16 @@ class Swinging(Parameters):
 
     @property
     def extent(self) -> float:
-        """Largest distance from where the scenario shows the region [m], or [deg]."""
+        """Largest distance from the pose of the region in the scenario [m], or [deg]."""
         return self.amplitude
 
-    def course(self, unit: float) -> Course:
-        """Return the course in m or rad.
+    def motion(self, unit: float) -> Motion:
+        """Return the motion in m or rad.
 
         Args:
             unit: Its unit in m or rad.
         """
-        return SwingingCourse(
+        return OscillatingMotion(
             unit * self.amplitude, self.frequency, begin=self.begin, ramp=self.ramp
         )
 
@@ -111,8 +111,8 @@ class Shift(Parameters):
     """A region that moves along a direction.
 
     Attributes:
-        direction: World axes, of any length.
-        way: ``!Visiting`` or ``!Swinging`` [m].
+        direction: Direction, world axes, of any length.
+        way: Motion along it, ``!Visiting`` or ``!Swinging`` [m].
     """
 
     direction: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
@@ -124,12 +124,12 @@ class Shift(Parameters):
         require(far, "way", self.way.extent, f"no further than {_LARGEST:g} m")
 
     def moving(self, region: Region) -> MovingRegion:
-        """Return a region that moves so.
+        """Return a region with this motion.
 
         Args:
-            region: The region where it is shown.
+            region: The region in its pose in the scenario.
         """
-        return ShiftedRegion(region, self.way.course(1.0), self.direction)
+        return ShiftedRegion(region, self.way.motion(1.0), self.direction)
 
 
 @dc.dataclass
@@ -137,9 +137,9 @@ class Turn(Parameters):
     """A region that turns about an axis.
 
     Attributes:
-        axis: World axes, of any length.
-        point: On the axis [m].
-        way: ``!Visiting`` or ``!Swinging`` [deg].
+        axis: Direction of the axis, world axes, of any length.
+        point: A point of the axis [m].
+        way: Motion about it, ``!Visiting`` or ``!Swinging`` [deg].
     """
 
     axis: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
@@ -152,12 +152,12 @@ class Turn(Parameters):
         require(far, "way", self.way.extent, f"no further than {_LARGEST_DEG:g} deg")
 
     def moving(self, region: Region) -> MovingRegion:
-        """Return a region that moves so.
+        """Return a region with this motion.
 
         Args:
-            region: The region where it is shown.
+            region: The region in its pose in the scenario.
         """
-        return TurningRegion(region, self.way.course(math.pi / 180.0), self.point, self.axis)
+        return TurningRegion(region, self.way.motion(math.pi / 180.0), self.point, self.axis)
 
 
 RegionMotion = Shift | Turn

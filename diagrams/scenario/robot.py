@@ -1,4 +1,4 @@
-"""Which robot a scenario is about, with its drives and its force sensor."""
+"""The robot of a scenario, with its drives and its force sensor."""
 
 import dataclasses as dc
 from pathlib import Path
@@ -26,7 +26,7 @@ from pfsc_drake.yaml.rules import (
     Range,
 )
 
-# what moves a DELTA robot
+# plants of a DELTA robot
 MULTIBODY, ANALYTIC = "multibody", "analytic"
 _FARTHEST = 1e6  # m
 _STRONGEST = 1e6  # m/s^2
@@ -38,7 +38,7 @@ class PoseParameters(Parameters):
 
     Attributes:
         position: Origin [m].
-        zyx_deg: Angles about z, then the new y, then the new x [deg]:
+        zyx_deg: Angles about z, then the new y, then the new x [deg],
             ``R = Rz(a) Ry(b) Rx(c)``. Upside down is ``[0, 0, 180]``.
     """
 
@@ -57,7 +57,7 @@ class PoseParameters(Parameters):
 
 @dc.dataclass
 class ElasticParameters:
-    """What becomes of the joints of a rigid model: a number for all, or a list, base first.
+    """Elastic joints of a rigid model: one number for all joints, or a list, base first.
 
     Attributes:
         stiffness: ``K_s`` [Nm/rad or N/m]; ``.inf`` for joints that stay rigid.
@@ -76,7 +76,7 @@ class ElasticParameters:
         self.joints()
 
     def joints(self) -> ElasticJoints:
-        """Return them as the library wants them."""
+        """Return the joints as arrays."""
         return ElasticJoints(
             *(np.array(getattr(self, f.name), dtype=float) for f in dc.fields(self))
         )
@@ -84,7 +84,7 @@ class ElasticParameters:
 
 @dc.dataclass
 class RobotParameters(Parameters):
-    """Which robot.
+    """The robot.
 
     Attributes:
         model: Name of a shipped model, a ``package://`` URI, or an SDF, URDF or MJCF file.
@@ -93,22 +93,21 @@ class RobotParameters(Parameters):
         tool_frame: Frame of the model whose origin follows the path.
         base: Frame of the model that is welded to the world; by default the root link, if the
             model leaves it floating.
-        base_pose: Where that frame stands.
+        base_pose: Pose of that frame in the world.
         gravity: Gravitational acceleration [m/s^2].
-        fixed_joints: Joints that do not move, and where they stand [rad or m].
+        fixed_joints: Joints that do not move, with their positions [rad or m].
         packages: Folders of packages that the model refers to (``package://name/``). Packages
-            above the model's folder and in ROS_PACKAGE_PATH are found without.
+            above the model's folder and in ROS_PACKAGE_PATH are found without this key.
         elastic: Elastic joints and rotors in a model without.
         joint_damping: ``K_d`` of its elastic joints, base first, or one number for all
             [Nm s/rad or N s/m]; empty for the model's.
-        rotor_coupling: Name of a shipped robot, or YAML file with robot parameters, that says
-            where the rotors of its drives sit. The robot then obeys the full elastic model
+        rotor_coupling: Name of a shipped robot, or YAML file with robot parameters, with the
+            mounting of the drives' rotors. The robot then obeys the full elastic model
             (2.64), with the inertia coupling of spinning rotors and moving links that the
             laws neglect; empty for the simplified model (2.65).
-        plant: Plant of a DELTA robot: ``multibody`` for bodies that rods tie together, (2.71),
-            discrete with ``simulation.max_step`` or less where they touch nothing; ``analytic`` for
-            (2.72) in continuous time, without contact, whose error is that of the integration
-            alone.
+        plant: Plant of a DELTA robot: ``multibody`` for bodies coupled by rods, (2.71), discrete,
+            with steps of at most ``simulation.max_step`` without contact; ``analytic`` for (2.72)
+            in continuous time, without contact, where only the integration has an error.
     """
 
     model: str = dc.field(default="comau_racer_1_4", metadata=NAME_OR_FILE)
@@ -126,10 +125,10 @@ class RobotParameters(Parameters):
     plant: Annotated[str, OneOf((MULTIBODY, ANALYTIC))] = MULTIBODY
 
     def options(self, folder: Path) -> ModelOptions:
-        """Return what is to be made of the model.
+        """Return the options for reading the model.
 
         Args:
-            folder: Where relative folder names start.
+            folder: Base folder of relative folder names.
         """
         return ModelOptions(
             self.base,
@@ -147,11 +146,11 @@ _SHORTEST_PERIOD = 1e-6  # s
 
 @dc.dataclass
 class LostFrames:
-    """When a bus loses its frames.
+    """Interval in which a bus loses its frames.
 
     Attributes:
-        begin: From when on [s].
-        end: Until when [s]; not later than ``begin`` for never.
+        begin: Begin [s].
+        end: End [s]; not later than ``begin`` for never.
     """
 
     begin: float = 0.0
@@ -174,9 +173,9 @@ class ServoParameters(Parameters):
             same.
         bus_delay: Delay between law and servo [s], a multiple of the controller's
             sampling time, at most 10,000 of it; 0 for none.
-        lost: When the bus loses what is sent; it needs a delay.
-        watchdog: How long no reference may come over the bus until the servos stop by
-            themselves [s]; 0 for ever.
+        lost: Interval in which the bus loses its frames; it needs a delay.
+        watchdog: Time without a reference over the bus after which the servos stop by themselves
+            [s]; 0 for never.
     """
 
     bandwidth: Positive = 200.0
@@ -199,12 +198,12 @@ _LONGEST_DELAY = 1000  # ticks
 
 @dc.dataclass
 class DriverParameters(Parameters):
-    """What is between a law that commands torques and the robot's drives.
+    """Driver between a law that commands torques and the robot's drives.
 
     Attributes:
-        delay: Until a torque acts that is told [s], a multiple of the controller's sampling time,
-            at most 1,000 of it. A link to a robot costs one.
-        low_pass: Cut-off frequency of the low pass that torques go through [Hz]; 0 for none.
+        delay: Delay from command to torque [s], a multiple of the controller's sampling time, at
+            most 1,000 of it. A link to a robot takes one.
+        low_pass: Cut-off frequency of the low pass of the torques [Hz]; 0 for none.
     """
 
     delay: NotNegative = 0.0
@@ -217,40 +216,40 @@ class DriverParameters(Parameters):
             period: Sampling time of the controller [s].
 
         Raises:
-            InputError: If it is no multiple of that.
+            InputError: If it is no multiple of the period.
         """
         return require_whole_ticks("driver.delay", self.delay, period, _LONGEST_DELAY)
 
 
 @dc.dataclass
 class SensorParameters(ForceTorqueParameters, ToolCompensationParameters):
-    """The force/torque sensor and how its signal is used; only built with compliance.
+    """The force/torque sensor and the processing of its signal; only built with compliance.
 
     In arrays of six, the first three entries are forces [N], the others torques [Nm]; two numbers
-    stand for equal forces and equal torques, one for six equal entries. A sensor that
-    has noise and repeats itself to the last bit is lost; its bandwidth is that of the tool's
-    compensation, too.
+    stand for equal forces and equal torques, one for six equal entries. A sensor with noise that
+    repeats a value exactly is detected as lost. Its bandwidth is also used for the compensation of
+    the tool.
 
     Attributes:
         joint: Fixed joint of the model with the sensor in it; its child side is the tool. By
             default, of those between the last moving link and the tool frame, the nearest to the
             tool that has mass behind it.
-        delay: Until the controller has what is measured [s], a multiple of its sampling time,
-            shorter than taring and than what a sensor may stand still.
-        unknown_mass: What may hang below the sensor beside what is believed [kg]: for what is
-            said before a run alone, see
+        delay: Delay of the measurement [s], a multiple of the controller's sampling time, shorter
+            than taring and than the time after which a constant signal is a fault.
+        unknown_mass: Mass that may hang below the sensor in addition to the nominal load [kg]; only
+            for warnings before a run, see
             :func:`~diagrams.warnings.sensed_load.sensed_load_warnings`, and for margins.
     """
 
     joint: str = ""
     delay: float = 0.0
     unknown_mass: NotNegative = 0.0
-    # accelerations are known to no component of the station
+    # no component of the station measures accelerations
     inertia: Annotated[str, OneOf(("differentiated", "none"))] = "differentiated"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        # until something comes there is nothing to tare, and a sensor that says nothing is lost
+        # taring needs measurements, and a sensor without them is lost
         longest = min(STILL_TIME, self.taring_time)
         allowed = f"at least 0 and below {longest:g} s"
         require(0.0 <= self.delay < longest, "delay", self.delay, allowed)

@@ -1,4 +1,4 @@
-"""The schema of a scenario file, and what is left of one where the robot stands elsewhere.
+"""Schema of a scenario file, and its reduction for a robot in another process.
 
 Lengths in m, angles in rad unless a name ends in ``_deg``, times in s.
 """
@@ -43,11 +43,11 @@ from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 @dc.dataclass
 class Target:
-    """What a metric should be.
+    """Target of a metric.
 
     Attributes:
         bound: Comparison and number in SI units, e.g. ``< 5e-5``.
-        source: Where it comes from.
+        source: Source of the target.
     """
 
     bound: str = ""
@@ -62,48 +62,49 @@ class Scenario(Parameters):
         name: Name of the scenario.
         section: Section of the dissertation.
         description: One line.
-        robot: Which robot.
-        path: Which path.
-        surface: Which surface, for ``controller.manifold: surface`` or a path on it.
+        robot: The robot.
+        path: The path.
+        surface: The surface, for ``controller.manifold: surface`` or a path on it.
         fixtures: Regions that the tool may not enter, for ``controller.manifold: space``.
         controller: The controller.
-        model_error: What the controller believes wrongly of the robot.
+        model_error: Errors of the controller's nominal model of the robot.
         reference: Motion along the path.
-        start: Where it starts.
-        simulation: How it is integrated.
+        start: Start of the tool.
+        simulation: Integration, recording and sensor failures.
         forces: Wrenches on the tool, or on a link, over time.
-        pushes: Hands that take hold of links and move them.
+        pushes: Hands that hold links and move them.
         hand: An operator's hand on the tool, in addition to the forces; none without the block
             or with ``hand: null``.
-        operator: A person who guides the tool while the robot moves, in a live session or as
-            recorded in one. None without the block.
-        teleoperation: What is between the tool and the hand, or the person, that leads it from
-            afar. None without the block: they are at the tool.
+        operator: A person who guides the tool while the robot moves, in a live session or recorded
+            in one. None without the block.
+        teleoperation: Leader device and channel, by which hand or person command the tool from a
+            distance. None without the block: they are at the tool.
         hold_back: A wrench that only slows the robot down.
         servo: Velocity controllers of the joints, for the law ``velocity_servo``.
-        driver: What is between a law that commands torques and the drives.
+        driver: Driver between a law that commands torques and the drives.
         friction: Friction of the joints.
-        drive_friction: Whether the drives have the friction that the robot's own parameters
-            tell, as those of DELTA robots do; null if they do and ``friction`` is empty.
-        encoders: What the encoders do to the joint state.
-        compliance: How the tool yields to measured forces.
+        drive_friction: Whether the drives have the friction of the robot's own parameters, which
+            DELTA robots have; null for true if ``friction`` is empty.
+        encoders: Encoder model: resolution, filter and differentiation of joint positions.
+        compliance: Compliance of the tool under measured forces.
         sensor: The force/torque sensor that measures them.
-        faults: What is a fault, and how it ends.
+        faults: Fault detection and stops.
         notch: Workpiece with a notch along the path, and a ball on the tool that runs in it; it
-            starts in the middle of the notch, ``start.offset`` beside. None without the block.
+            starts in the middle of the notch, displaced by ``start.offset``. None without the
+            block.
         workpiece: Workpiece under the surface, and a ball on the tool that presses on it. None
             without the block.
-        holder: Second robot, which holds the workpiece that the path is on. None without the block.
-        turntable: Turntable that carries the workpiece which the path is on. None without the
-            block.
+        holder: Workpiece robot: a second robot, which holds the workpiece with the path. None
+            without the block.
+        turntable: Turntable that carries the workpiece with the path. None without the block.
         plate: Plate with pins that a gripper takes from a magazine and mounts into a frame. None
             without the block.
-        obstacles: What moves across the path, for which progress waits. None without the block.
+        obstacles: Obstacles that cross the path, for which progress waits. None without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
-        judged_after: Simulated time after which targets count, which a run that was cut short does
-            not reach [s]; 0 for ``duration``.
+        judged_after: Simulated time from which on targets are checked; a shorter run does not check
+            them [s]; 0 for ``duration``.
         settling_tolerance: Distance from the path that counts as converged [m].
-        targets: What metrics should be, by metric; under a law's name for that law only.
+        targets: Targets of metrics, by metric; under a law's name for that law only.
     """
 
     name: str = ""
@@ -166,13 +167,13 @@ class Scenario(Parameters):
 
     @property
     def needs_sensor(self) -> bool:
-        """Whether something acts on measured forces."""
+        """Whether measured forces are used."""
         controllers = [self.controller] + ([] if self.holder is None else [self.holder.controller])
         measured = any(each.external_torque.source == "measured" for each in controllers)
         return measured or self.compliance.needs_sensor
 
 
-# blocks of a plant, and what is around it
+# blocks of the plant and its environment
 _OF_THE_PLANT = (
     "forces",
     "pushes",
@@ -183,29 +184,29 @@ _OF_THE_PLANT = (
     "notch",
     "workpiece",
 )
-_ONE_SIDE = "from_torque or observed: a robot tells one side of its joints"
+_ONE_SIDE = "from_torque or observed: a robot measures one side of its joints"
 _TRANSITION = 0.5  # s
 
 
-# drivers limit how fast torques change: a stop that asks for more swings itself up
+# drivers limit the rate of torques: a stop with larger torques would oscillate
 _STOP_SHARE, _HOLD_BANDWIDTH = 0.35, 40.0
-# with springs between drives and links, so that a stop bears two ticks that nobody knows of
+# with springs between drives and links, so that a stop tolerates two ticks of unmodelled delay
 _HOLD_OF_SPRINGS = 20.0
 
 
 def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
-    """Return a scenario without what belongs to the plant, and what was changed, in words.
+    """Return a scenario without the blocks of the plant, and the changes, one sentence each.
 
     Args:
         scenario: The scenario.
 
     Raises:
-        InputError: If it needs what only a simulation knows.
+        InputError: If it needs quantities that only a simulation has.
     """
     left, plain = deepcopy(scenario), Scenario()
     for key in ("plate", "operator", "holder", "turntable"):
-        given = getattr(scenario, key) is not None
-        require(not given, key, "given", "null where the robot stands elsewhere")
+        absent = getattr(scenario, key) is None
+        require(absent, key, "given", "null where the robot is in another process")
     if scenario.teleoperation is not None:
         bus = scenario.teleoperation.lcm
         require(bool(bus), "teleoperation.lcm", repr(bus), "the bus of a leader (lead)")
@@ -213,7 +214,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
     finds_links = not controller.law_record.knows_links or controller.state != "measured"
     require(finds_links, "controller.state", controller.state, _ONE_SIDE)
     known = not isinstance(scenario.path.shape, Streamed)
-    beforehand = "a path that is known beforehand, where the robot stands elsewhere"
+    beforehand = "a path that is known beforehand, where the robot is in another process"
     require(known, "path.shape", "!Streamed", beforehand)
     source = scenario.controller.external_torque.source
     allowed = "none, measured or observed; forces are known in simulation only"
@@ -227,16 +228,16 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         if getattr(scenario.simulation, key) != getattr(plain.simulation, key):
             setattr(left.simulation, key, getattr(plain.simulation, key))
             ignored.append(f"simulation.{key}")
-    said = []
+    changes = []
     if scenario.teleoperation is not None and "hand" in ignored:
         ignored.remove("hand")
-        said.append("left to the leader: hand")
+        changes.append("left to the leader: hand")
     if ignored:
-        said.append(f"left to the robot: {', '.join(ignored)}")
+        changes.append(f"left to the robot: {', '.join(ignored)}")
     if scenario.obstacles is not None:
-        said.append(
-            "obstacles.moving, obstacles.sensor: where obstacles are comes by messages; without "
-            "them nothing moves"
+        changes.append(
+            "obstacles.moving, obstacles.sensor: messages report the obstacles; without them there "
+            "are none"
         )
     faults = left.faults
     rigid = not controller.law_record.knows_links
@@ -244,17 +245,16 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
     if faults.effort_share > _STOP_SHARE or faults.hold_bandwidth > holding:
         faults.effort_share = min(faults.effort_share, _STOP_SHARE)
         faults.hold_bandwidth = min(faults.hold_bandwidth, holding)
-        said.append(
+        changes.append(
             f"faults.effort_share = {faults.effort_share:g}, faults.hold_bandwidth = "
-            f"{faults.hold_bandwidth:g} rad/s: a robot's torques change no faster than its driver "
-            "lets them"
+            f"{faults.hold_bandwidth:g} rad/s: the robot's driver limits the rate of torques"
         )
     if not rigid and controller.delay is None:
         left.controller.delay = controller.sampling_time
-        said.append(
-            f"controller.delay = {controller.sampling_time:g} s: a link to a robot costs a tick"
+        changes.append(
+            f"controller.delay = {controller.sampling_time:g} s: a link to a robot takes a tick"
         )
     if left.start.transition == 0.0 and left.controller.manifold != "space":
         left.start.transition = _TRANSITION
-        said.append(f"start.transition = {_TRANSITION:g} s: a robot starts smoothly")
-    return left, said
+        changes.append(f"start.transition = {_TRANSITION:g} s: a robot starts smoothly")
+    return left, changes

@@ -1,4 +1,4 @@
-"""How a scenario is simulated, what pushes the tool, who leads it."""
+"""Simulation of a scenario: integration, sensor failures, a wrench on the tool, a person."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -12,7 +12,7 @@ from pfsc_drake.physics.operator_hand import LiveHandParameters
 from pfsc_drake.yaml.fields import FILE
 from pfsc_drake.yaml.rules import Finite, OneOf, Parameters, Positive, Range
 
-# the integrator that is chosen for a robot before it runs
+# for an integrator that is chosen before the run
 AUTO = "auto"
 _SCHEMES = (AUTO, *GetIntegrationSchemes())
 
@@ -22,13 +22,12 @@ class SensorFailureParameters(Parameters):
     """A component of the measured joint state that fails.
 
     Attributes:
-        time: When [s]; negative for never.
+        time: Time of the failure [s]; negative for never.
         component: Index in ``[q_J, v_J, q_M, v_M]``.
-        kind: ``nan``: it is no number any more; ``frozen``: it rests at its last value;
-            ``jump``: it is off by ``size``.
+        kind: ``nan``: it becomes NaN; ``frozen``: it keeps its last value; ``jump``: it has an
+            error of ``size``.
         size: Size of the jump [rad, rad/s, m or m/s].
-        whole_joint: Whether everything fails that is measured of the component's joint, on
-            both sides.
+        whole_joint: Whether all measurements of the component's joint fail, on both sides.
     """
 
     time: float = -1.0
@@ -40,19 +39,19 @@ class SensorFailureParameters(Parameters):
 
 @dc.dataclass
 class SimulationParameters(Parameters):
-    """How the plant is integrated.
+    """Integration of the plant, frames of the recording, sensor failures.
 
     Attributes:
         integrator: Drake's name of the integration scheme; ``auto`` for the cheapest one that is
-            stable and whose error over the first tenths of a second, against a step five times
-            shorter, stays below 1e-6 (rad, m).
+            stable and has an error below 1e-6 (rad, m) over the first tenths of a second, compared
+            with a step five times shorter.
         max_step: Largest step [s].
         accuracy: Accuracy of error control, 1e-10 to 0.1; 0 for fixed steps.
         frame_period: Time between the frames of the recording, 1e-3 to 1e3 [s].
-        sensor_failure: A sensor that fails on the way.
-        force_sensor_failure: The same for the force/torque sensor; ``component`` is an index in
-            ``[force, torque]``, of which ``whole_joint`` takes all.
-        fused: Whether all blocks are evaluated as one function, which is faster; one by one they
+        sensor_failure: Failure of a sensor during the run.
+        force_sensor_failure: Failure of the force/torque sensor; ``component`` is an index in
+            ``[force, torque]``; with ``whole_joint`` all components fail.
+        fused: Whether all blocks are evaluated as one function, which is faster; single blocks
             give the same log.
     """
 
@@ -68,7 +67,7 @@ class SimulationParameters(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        # their error control works on stale values after a rejected step
+        # their error control uses stale values after a rejected step
         stale = ("runge_kutta5", "bogacki_shampine3")
         require(
             self.accuracy == 0.0 or self.integrator not in stale,
@@ -83,9 +82,9 @@ class HoldBackParameters(Parameters):
     """A wrench that holds the robot back along its path and has no other effect (Sec. 3.8.4).
 
     Attributes:
-        begin: When it leaves zero [s].
-        end: When it is zero again [s].
-        force: Along the tangent [N], negative against growing ``eta``; 0 for none.
+        begin: Begin of the pulse [s].
+        end: End of the pulse [s].
+        force: Force along the tangent [N], negative against growing ``eta``; 0 for none.
         ramp: Time from zero to full and back [s].
     """
 
@@ -102,14 +101,14 @@ class HoldBackParameters(Parameters):
 
 @dc.dataclass
 class OperatorParameters:
-    """A person at the controls: a hand on the tool, and the impedance that yields to it.
+    """A person at the controls: a hand on the tool, and settings of the impedance.
 
     Attributes:
-        inputs: CSV file with what was done, one line per change, see
+        inputs: CSV file with recorded controls, one line per change, see
             :mod:`diagrams.environment.operator`; a live session leaves it empty. Its column
             ``time`` is in s; ``tick``, of older files, counts sampling intervals.
         hand: The hand.
-        tuning: How the impedance follows what the person sets.
+        tuning: Transition of the impedance to the settings of the person.
     """
 
     inputs: str = dc.field(default="", metadata=FILE)

@@ -1,4 +1,4 @@
-"""A path whose way points come while the tool moves. Lengths in m, angles in degrees."""
+"""A path whose waypoints come while the tool moves. Lengths in m, angles in degrees."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -9,16 +9,16 @@ from pfsc_drake.yaml.fields import FILE
 from pfsc_drake.yaml.rules import Direction, NotNegative, Numbers, Parameters, Point, Range
 
 _RATES = (0.01, 1000.0)  # 1/s
-_MOST_TOLD = 1024
+_MOST_WAYPOINTS = 1024  # of a message
 
 
 @dc.dataclass
 class NewPath(Parameters):
-    """A new path to go over to while the tool moves.
+    """A new path that the tool changes to while it moves.
 
     Attributes:
-        file: CSV file with its way points, as that of the stream.
-        at: When its first way point comes [s]; those of the path before then come no more.
+        file: CSV file with its waypoints, in the format of the stream's file.
+        at: Time of its first waypoint [s]; further waypoints of the path before are dropped.
     """
 
     file: str = dc.field(default="", metadata=FILE)
@@ -30,13 +30,13 @@ class DrawnPlane(Parameters):
     """A rectangle in space in which a person draws, in a browser.
 
     Attributes:
-        origin: Its middle, where the tool rests at first [m].
-        right: Direction that is to the right on the page, of any length.
-        up: Direction that is upwards on the page, at least 0.1 deg from ``right``; the plane's is
-            its part perpendicular to it.
-        width: Along ``right`` [m].
-        height: Along ``up`` [m].
-        zyx_deg: ZYX angles [deg] of the orientation that the tool keeps; empty for none.
+        origin: Its middle, the start of the tool [m].
+        right: Direction to the right on the page, of any length.
+        up: Direction upwards on the page, at least 0.1 deg from ``right``; only its part
+            perpendicular to ``right`` counts.
+        width: Width along ``right`` [m].
+        height: Height along ``up`` [m].
+        zyx_deg: ZYX angles [deg] of the constant orientation of the tool; empty for none.
     """
 
     origin: Point = dc.field(default_factory=lambda: [0.9, 0.0, 1.0])
@@ -49,23 +49,23 @@ class DrawnPlane(Parameters):
 
 @dc.dataclass
 class Streamed(Parameters):
-    """A path whose way points come one after the other while the tool moves.
+    """A path whose waypoints come one after the other while the tool moves.
 
     Attributes:
-        file: CSV file with the way points, as that of ``!Waypoints``; the tool rests at the first
-            one. Empty where ``inputs`` or ``plane`` are given.
-        rate: Way points per second [1/s].
-        begin: When the first one is sent [s].
-        delay: From when one is sent until it comes [s].
-        jitter: Largest further delay [s]; the order stays.
+        file: CSV file with the waypoints, in the format of ``!Waypoints``; the tool starts at the
+            first one. Empty where ``inputs`` or ``plane`` are given.
+        rate: Waypoints per second [1/s].
+        begin: Time at which the first one is sent [s].
+        delay: Delay of each [s].
+        jitter: Largest further delay [s]; the order is preserved.
         noise: Standard deviation of each coordinate [m].
-        seed: Of jitter and noise.
+        seed: Seed of jitter and noise.
         new_paths: Further paths, one after the other.
-        plane: Where a person draws, in ``live``.
-        inputs: CSV file with what a person has drawn, as a live session leaves it. Its column
-            ``time`` is in s; ``tick``, of older files, counts sampling intervals.
-        length: How many way points a message holds.
-        follow: How way points become a path, and how fast it is followed.
+        plane: Plane in which a person draws, in ``live``.
+        inputs: CSV file with a drawing, written by a live session. Its column ``time`` is in s;
+            ``tick``, of older files, counts sampling intervals.
+        length: Number of waypoints in a message.
+        follow: Construction of the path from waypoints, and the speed along it.
     """
 
     file: str = dc.field(default="", metadata=FILE)
@@ -78,14 +78,14 @@ class Streamed(Parameters):
     new_paths: list[NewPath] = dc.field(default_factory=list)
     plane: DrawnPlane | None = None
     inputs: str = dc.field(default="", metadata=FILE)
-    length: Annotated[int, Range(1, _MOST_TOLD)] = 32
+    length: Annotated[int, Range(1, _MOST_WAYPOINTS)] = 32
     follow: StreamParameters = dc.field(default_factory=StreamParameters)
 
     def check(self) -> None:
-        """Refuse what does not go together.
+        """Refuse combinations of keys that exclude each other.
 
         Raises:
-            InputError: If so.
+            InputError: If there is such a combination.
         """
         one = bool(self.file) != (self.plane is not None)
         require(one, "file", self.file or "none given", "a file, or a plane to draw in")

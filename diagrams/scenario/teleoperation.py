@@ -1,4 +1,4 @@
-"""A robot that is led from afar: coupling, channel, the device in the operator's hand."""
+"""Teleoperation: coupling, channel, and the leader device in the operator's hand."""
 
 import dataclasses as dc
 
@@ -9,30 +9,30 @@ from pfsc_drake.physics.leader_clutch import ClutchParameters
 from pfsc_drake.physics.leader_device import LeaderParameters
 from pfsc_drake.yaml.rules import Positive
 
-# the way back draws its own delays and losses
+# the channel back has random delays and losses of its own
 _OTHER_SEED = 1000
 _BUSES = ("udpm", "memq")
 
 
 @dc.dataclass
 class TeleoperationParameters(CouplingParameters):
-    """A hand elsewhere that leads the tool, and feels what the tool feels.
+    """Teleoperation: a hand at a leader device commands the tool and feels its forces.
 
-    The scenario's ``hand`` holds the leader then, and says where the tool is to be.
+    The scenario's ``hand`` then holds the leader device, and its targets are those of the tool.
 
     Attributes:
-        channel: Between the two, each way.
+        channel: Channel between both sides, in each direction.
         leader: The device in the operator's hand.
-        clutch: When the operator lets it loose, to take hold of it elsewhere.
-        lcm: LCM bus on which a leader in another process leads (``lead``), such as
-            ``udpm://239.255.76.67:7667?ttl=0``; the run waits for the clock then, and channel and
+        clutch: Intervals in which the operator releases the device, to take it elsewhere.
+        lcm: LCM bus of a leader in another process (``lead``), such as
+            ``udpm://239.255.76.67:7667?ttl=0``; the run then waits for the clock, and channel and
             leader are those of the other process. Empty where both are simulated here.
-        silence: How long that leader may be silent until a robot that is driven is stopped [s].
-        follower_force: Largest force by which the tool is led [N].
-        follower_speed: Largest speed that the tool is led with, which the follower's reserve of
-            energy is for [m/s]; within regions it is at least that of ``fixtures.guidance``.
-        follower_moment: Largest moment by which the tool is turned [Nm].
-        follower_turning: Largest angular velocity that it is turned with [rad/s].
+        silence: Time without messages of that leader after which a driven robot is stopped [s].
+        follower_force: Largest force that moves the tool [N].
+        follower_speed: Largest speed of the tool, for the follower's reserve of energy [m/s];
+            within regions it is at least the speed of ``fixtures.guidance``.
+        follower_moment: Largest moment that turns the tool [Nm].
+        follower_turning: Largest angular velocity of the tool [rad/s].
     """
 
     channel: ChannelParameters = dc.field(default_factory=ChannelParameters)

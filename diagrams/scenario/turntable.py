@@ -1,11 +1,11 @@
-"""A turntable that carries the workpiece, on which the path of the robot is."""
+"""A turntable that carries the workpiece with the path of the robot."""
 
 import dataclasses as dc
 from typing import Annotated
 
 import numpy as np
 
-from diagrams.scenario.holder import HeldWorkpieceParameters
+from diagrams.scenario.holder import HolderWorkpiece
 from diagrams.scenario.robot import PoseParameters
 from pfsc_drake.checks import require, require_between, require_numbers
 from pfsc_drake.yaml.rules import (
@@ -19,7 +19,7 @@ from pfsc_drake.yaml.rules import (
 )
 
 DERIVATIVES = ("known", "differenced", "none")
-# deg, that an axis may turn; s, by which what it tells may be late
+# deg, largest angle of an axis; s, largest delay of its angles
 _FARTHEST, _LATEST = 1e5, 0.1
 
 
@@ -28,8 +28,8 @@ class TurntableAxisParameters(Parameters):
     """An axis of a turntable, in the axes of its base while all angles are zero.
 
     Attributes:
-        direction: About which it turns, of any length, shape (3,).
-        point: A point of it, from the base [m], shape (3,).
+        direction: Direction of the axis, of any length, shape (3,).
+        point: A point of the axis, relative to the base [m], shape (3,).
     """
 
     direction: Direction = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
@@ -45,31 +45,32 @@ class TurntableAxisParameters(Parameters):
 class TurntableParameters(Parameters):
     """A turntable with one axis or more, which turns the workpiece from stop to stop.
 
-    Its drives follow their command ``lag`` late. Its controller tells the angles of its encoders,
-    ``delay`` late, and the derivatives of the command.
+    Its drives follow their command with a ``lag``. Its controller reports the angles of its
+    encoders, with a ``delay``, and the derivatives of the command.
 
     Attributes:
-        base_pose: Where it stands.
-        axes: Its axes, that at the base first; each carries the next.
-        workpiece: What the last axis carries; its pose is that from the base while all angles are
+        base_pose: Pose of its base.
+        axes: Its axes, the one at the base first; each carries the next.
+        workpiece: Workpiece on the last axis; its pose is relative to the base while all angles are
             zero.
         stops_deg: Angles of all axes at each stop; from one to the next on a straight line [deg].
-        velocity_deg: Largest rate of the axis that has the longest way [deg/s].
+        velocity_deg: Largest rate of the axis with the largest angle to turn [deg/s].
         acceleration_deg: Its largest acceleration [deg/s^2].
         dwell: Rest before the first move and after each [s].
         increments: Increments of each encoder per turn; 0 for exact ones.
-        lag: Time by which the axes are behind their command, which nobody is told [s].
-        delay: Time by which angles come late; a whole number of sampling times [s].
-        believed_delay: What the robot's controller makes up for; ``delay`` if null [s].
-        placement_error: Where it is believed to stand, in its own axes, beside where it stands.
-        derivatives: What the robot's controller knows of the motion: ``known``: derivatives of the
+        lag: Lag of the axes behind their command, which the controllers do not model [s].
+        delay: Delay of the reported angles, a whole number of sampling times [s].
+        believed_delay: Delay that the robot's controller compensates; ``delay`` if null [s].
+        placement_error: Pose of its base in the controller's model relative to the actual one, axes
+            of the base.
+        derivatives: Derivatives of the motion in the robot's controller: ``known``: those of the
             command; ``differenced``, from the angles of the last ticks; ``none``.
         highest: Highest derivative that is known or differenced, 0 to 4.
     """
 
     base_pose: PoseParameters = dc.field(default_factory=PoseParameters)
     axes: list[TurntableAxisParameters] = dc.field(default_factory=list)
-    workpiece: HeldWorkpieceParameters = dc.field(default_factory=HeldWorkpieceParameters)
+    workpiece: HolderWorkpiece = dc.field(default_factory=HolderWorkpiece)
     stops_deg: list[list[float]] = dc.field(default_factory=list)
     velocity_deg: Positive = 90.0
     acceleration_deg: Positive = 180.0
@@ -83,10 +84,10 @@ class TurntableParameters(Parameters):
     highest: Annotated[int, Range(0, 4)] = 4
 
     def check(self) -> None:
-        """Refuse a table that has no axes, nowhere to go, or is believed to be too late.
+        """Refuse a table without axes or stops, or with a delay out of range.
 
         Raises:
-            InputError: If so.
+            InputError: If a parameter is invalid.
         """
         if self.believed_delay is not None:
             require_between("turntable.believed_delay", self.believed_delay, 0.0, _LATEST, "s")
@@ -98,4 +99,4 @@ class TurntableParameters(Parameters):
             near = max(map(abs, stop)) <= _FARTHEST
             require(near, f"{key}[{i}]", stop, f"angles of at most {_FARTHEST:g} deg")
             moves = i == 0 or stop != self.stops_deg[i - 1]
-            require(moves, f"{key}[{i}]", stop, "another place than the stop before")
+            require(moves, f"{key}[{i}]", stop, "angles unlike those of the stop before")

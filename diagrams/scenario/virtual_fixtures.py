@@ -1,4 +1,4 @@
-"""Virtual fixtures of a scenario: regions that a tool led by hand may not enter."""
+"""Virtual fixtures of a scenario: regions that a hand-guided tool may not enter."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -19,20 +19,19 @@ _STIFFNESS = (1.0, 1e6)  # N/m
 
 @dc.dataclass
 class RegionParameters(Parameters):
-    """A surface that the tool must not cross, and the side on which it may be.
+    """A surface that the tool must not cross, with its admissible side.
 
-    Planes, cylinders, cones and paraboloids have no ends, whatever part of them the shape tells;
-    nor have extruded profiles and the open ones of surfaces of revolution, which go on straight.
-    A fitted surface ends at its border, and beside it is no region.
+    Planes, cylinders, cones and paraboloids are unbounded, also if the shape describes only a part
+    of them; so are extruded profiles and open profiles of surfaces of revolution, which continue
+    straight. A fitted surface ends at its border, without a region beyond it.
 
     Attributes:
         shape: A shape by its tag, such as ``!Cylinder``; without a part of a turn, ``angles_deg``.
-        admissible: ``inside`` or ``outside`` of what encloses something; ``above``, on the side of
-            the normal, or ``below`` of a plane, a fitted surface and open profiles; empty for
+        admissible: ``inside`` or ``outside`` of a closed surface; ``above``, on the side of the
+            normal, or ``below`` of a plane, a fitted surface and open profiles; empty for
             ``outside``, or ``above``.
         motion: ``!Shift`` or ``!Turn``; null for a region at rest.
-        stiffness: Stiffness of a soft region, that pushes back by so much [N/m]; null for a hard
-            one.
+        stiffness: Stiffness of a soft region [N/m]; null for a hard one.
     """
 
     shape: RegionShape = dc.field(default_factory=Plane)
@@ -46,20 +45,20 @@ class RegionParameters(Parameters):
 
     @property
     def inside(self) -> bool:
-        """Whether what is enclosed is admissible, or what is below."""
+        """Whether the inside, or the side below, is admissible."""
         return self.admissible in ("inside", "below")
 
 
 @dc.dataclass
 class GuideParameters(Parameters):
-    """A path that attracts the tool, next to it like a spring and from its reach on not at all.
+    """A path that attracts the tool: like a spring next to it, without force beyond its reach.
 
     See :class:`~pfsc_drake.control.fixtures.guides.Guide`.
 
     Attributes:
         shape: A shape of a path by its tag, such as ``!Line``.
         stiffness: Stiffness next to the path [N/m].
-        reach: Distance from which on it does not attract [m].
+        reach: Distance beyond which there is no force [m].
     """
 
     shape: GuideShape = dc.field(default_factory=Line)
@@ -72,20 +71,19 @@ _START = ("refuse", "move_out")
 
 @dc.dataclass
 class FixtureParameters(FixtureOptions):
-    """What limits a tool that is led through space, ``controller.manifold: space``.
+    """Regions and guides of a tool that is guided through space, ``controller.manifold: space``.
 
     Mass and damping of the free motion are those of ``compliance.tangential``. Further attributes
     are those of :class:`FixtureOptions`.
 
     Attributes:
-        regions: Where the tool may not go.
+        regions: Regions that the tool may not enter.
         guides: Paths that attract it.
-        orientation: That the tool keeps.
-        start_inside: Start inside of a region that the tool starts in: ``refuse``, or ``move_out``
-            slowly.
-        servo_lag: ``tau`` [s] of the velocity servos as it is believed; negative for the inverse
-            of ``servo.bandwidth``.
-        bound: How deep the tool may be in a hard region [m]; a run in which it was deeper says so
+        orientation: Constant orientation of the tool.
+        start_inside: Treatment of a start inside of a region: ``refuse``, or ``move_out`` slowly.
+        servo_lag: Nominal lag ``tau`` of the velocity servos [s]; negative for the inverse of
+            ``servo.bandwidth``.
+        bound: Largest depth of the tool in a hard region [m]; a run with a larger one reports that
             and ends with status 3.
     """
 
@@ -102,21 +100,21 @@ class FixtureParameters(FixtureOptions):
 
     @property
     def names(self) -> list[str]:
-        """What the regions are called: kind of shape and number, from 1 on."""
+        """Names of the regions: kind of shape and number, from 1 on."""
         kinds = (type(region.shape).__name__.lower() for region in self.regions)
         return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
 
     @property
     def guide_names(self) -> list[str]:
-        """What the guides are called, likewise."""
+        """Names of the guides: kind of shape and number, from 1 on."""
         kinds = (type(guide.shape).__name__.lower() for guide in self.guides)
         return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
 
     def lag_behind(self, bandwidth: float) -> float:
-        """Return ``tau`` [s] of the servos as it is believed.
+        """Return the nominal lag ``tau`` of the servos [s].
 
         Args:
-            bandwidth: Bandwidth of the servos as the scenario has it [rad/s].
+            bandwidth: Bandwidth of the servos in the scenario [rad/s].
         """
         return self.servo_lag if self.servo_lag >= 0.0 else 1.0 / bandwidth
 

@@ -1,4 +1,4 @@
-"""What a tool presses on or runs in, and the ball that it touches with."""
+"""Workpieces in contact with a tool: a surface or a notch, and the ball on the tool."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -26,7 +26,7 @@ class SoftBall(Parameters):
         modulus: Elasticity of the shell, pressure per relative depth [Pa].
         dissipation: Dissipation of Hunt and Crossley [s/m].
         friction: Coulomb coefficient between ball and workpiece.
-        resolution: Edge length of the mesh that contact is computed with, 1e-4 m or more.
+        resolution: Edge length of the mesh for the contact, 1e-4 m or more.
     """
 
     radius: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 0.02
@@ -36,21 +36,22 @@ class SoftBall(Parameters):
     resolution: Annotated[float, Range(SMALLEST, LARGEST, "m, a positive number")] = 6e-3
 
     def stiffness(self, force: float) -> float:
-        """Return by how much the force on a flat rigid body grows with the depth [N/m].
+        """Return the stiffness of the contact with a flat rigid body [N/m].
 
-        The pressure in the ball grows with the depth, from zero at its skin to the modulus E in
-        its centre. A flat at depth d bears ``F = pi E d^2 (1 - 2 d / (3 R))``, the pressure's
-        integral over the disc that is touched, so that ``dF / dd = 2 pi E d (1 - d / R)``.
+        The pressure in the ball grows with the depth, from zero at its surface to the modulus E in
+        its centre. The force on a flat at depth d is ``F = pi E d^2 (1 - 2 d / (3 R))``, the
+        integral of the pressure over the disc of contact, so that
+        ``dF / dd = 2 pi E d (1 - d / R)``.
 
         Args:
-            force: That it bears there [N].
+            force: Contact force [N].
         """
         R, E = self.radius, self.modulus
 
         def missing(d: float) -> float:
             return float(np.pi * E * d**2 * (1.0 - 2.0 * d / (3.0 * R)) - force)
 
-        # from half of the way on the slope falls again: the steepest is on the safe side
+        # beyond half of the radius the slope falls again: the steepest is on the safe side
         deepest = R / 2.0
         d = deepest if missing(deepest) <= 0.0 else float(brentq(missing, 0.0, deepest))
         return float(2.0 * np.pi * E * d * (1.0 - d / R))
@@ -64,7 +65,7 @@ class BallParameters(SoftBall):
     the robot's parameters.
 
     Attributes:
-        distance: From the tool point down to the ball's centre [m]; 0 on robots that turn
+        distance: Distance from the tool point down to the ball's centre [m]; 0 on robots that turn
             their tool.
     """
 
@@ -75,15 +76,14 @@ class BallParameters(SoftBall):
 class NotchParameters(Parameters):
     """A rigid workpiece with a round-bottomed notch, and the ball that runs in it.
 
-    The path is where the tool point is when the ball lies on the bottom of the notch of a
-    workpiece that stands where it stood when the path was taught.
+    On the path the ball lies on the bottom of the notch of a workpiece in its taught pose.
 
     Attributes:
         ball: The ball.
-        displacement: Displacement of the workpiece since then [m], world axes (z_0 down for DELTA
-            robots).
+        displacement: Displacement of the workpiece from its taught pose [m], world axes (z_0 down
+            for DELTA robots).
         radius: Radius of the bottom [m], more than the ball's.
-        depth: From the rim down to the bottom [m], not less than ``radius``.
+        depth: Depth from the rim to the bottom [m], not less than ``radius``.
         width: Width of the workpiece across the notch [m].
         time_step: Time step of the plant, a whole fraction of the controller's sampling time [s].
     """
@@ -105,7 +105,7 @@ class NotchParameters(Parameters):
 
     @property
     def clearance(self) -> float:
-        """From the bottom up to where the ball touches nothing, the notch's axis [m]."""
+        """Distance of the ball's centre from the notch's axis at contact with the bottom [m]."""
         return self.radius - self.ball.radius
 
 
@@ -116,14 +116,14 @@ _LARGEST_TURN = 45.0  # deg
 class WorkpieceParameters(Parameters):
     """A rigid workpiece under the scenario's surface, and the soft ball on the tool.
 
-    The surface was taught with the tool point, where the ball is nearest to the workpiece, on it;
-    the material is on the side that the normal points away from.
+    The surface was taught with the tool point, the point of the ball that is nearest to the
+    workpiece; the normal points out of the material.
 
     Attributes:
         ball: The ball, whose centre is its radius behind the tool point.
-        shift: Shift of the workpiece since it was taught [m], world axes.
-        turn_zyx_deg: How it turned about the middle of the surface since then [deg].
-        spacing: Between the vertices of its mesh [m].
+        shift: Shift of the workpiece from its taught pose [m], world axes.
+        turn_zyx_deg: Turn of the workpiece about the middle of the surface since then [deg].
+        spacing: Distance between the vertices of its mesh [m].
         time_step: Time step of the plant, a whole fraction of the controller's sampling time [s].
     """
 

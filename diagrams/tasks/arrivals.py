@@ -1,4 +1,4 @@
-"""When the way points of a scenario's stream come."""
+"""Arrival times of the waypoints of a scenario's stream."""
 
 from collections.abc import Sequence
 from pathlib import Path as FilePath
@@ -8,21 +8,21 @@ import numpy as np
 
 from diagrams.scenario.recorded_times import TIME, sampling_instants, time_column, time_text
 from diagrams.scenario.streamed import Streamed
+from pfsc_drake.control.streams.growing_path import POSE, POSITION
 from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender
-from pfsc_drake.control.streams.stream_course import POSE, POSITION
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import read_waypoints
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
 from pfsc_drake.physics.waypoint_source import Arrivals
 
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
-# of what a person has drawn: a way point, the first one of a new path, the end of a line
-WAY_POINT, NEW_PATH, END = range(3)
+# events of a drawing: a waypoint, the first one of a new path, the end of a line
+WAYPOINT, NEW_PATH, END = range(3)
 _SOON = 1  # tick
 
 
 def columns(dimension: int, when: str = TIME) -> list[str]:
-    """Return the columns of a file of what was drawn.
+    """Return the columns of a file with a drawing.
 
     Args:
         dimension: 3 or 7.
@@ -32,7 +32,7 @@ def columns(dimension: int, when: str = TIME) -> list[str]:
 
 
 def read_poses(file: FilePath, key: str) -> np.ndarray:
-    """Return the way points of a file, with their quaternions if there are any, shape (n, d).
+    """Return the waypoints of a file, with their quaternions if there are any, shape (n, d).
 
     Args:
         file: The file.
@@ -46,7 +46,7 @@ def read_poses(file: FilePath, key: str) -> np.ndarray:
     except InputError as error:
         raise InputError(f"{key}: {error}") from None
     if len(table.positions) < 2:
-        raise InputError(f"{key}: {file.name} has {len(table.positions)} way points; 2 or more")
+        raise InputError(f"{key}: {file.name} has {len(table.positions)} waypoints; 2 or more")
     if table.yaw_alone:
         raise InputError(f"{key}: {file.name} has yaw alone; roll and pitch besides are required")
     if table.quaternions is None:
@@ -54,12 +54,12 @@ def read_poses(file: FilePath, key: str) -> np.ndarray:
     return np.hstack([table.positions, table.quaternions])
 
 
-def made_arrivals(shape: Streamed, folder: FilePath, period: float) -> tuple[np.ndarray, Arrivals]:
-    """Return where a stream of files begins, shape (d,), and when its way points come.
+def read_arrivals(shape: Streamed, folder: FilePath, period: float) -> tuple[np.ndarray, Arrivals]:
+    """Return the begin of a stream of files, shape (d,), and the arrival of its waypoints.
 
     Args:
-        shape: What the scenario says.
-        folder: Where relative file names start.
+        shape: Path of the scenario.
+        folder: Base folder of relative file names.
         period: Sampling time [s].
 
     Raises:
@@ -74,14 +74,14 @@ def made_arrivals(shape: Streamed, folder: FilePath, period: float) -> tuple[np.
         further = read_poses(folder / path.file, f"{key}.file")
         if further.shape[1] != len(start):
             raise InputError(f"{key}.file: {path.file} has an orientation, or the first file has")
-        kept = times < path.at
-        if not kept.any():
-            raise InputError(f"{key}.at = {path.at} s: must be later than the way points before")
-        begun = np.arange(len(further)) == 0
-        rows, new = np.vstack([rows[kept], further]), np.concatenate([new[kept], begun])
-        times = np.concatenate([times[kept], path.at + np.arange(len(further)) / shape.rate])
+        before = times < path.at
+        if not before.any():
+            raise InputError(f"{key}.at = {path.at} s: must be later than the waypoints before")
+        first = np.arange(len(further)) == 0
+        rows, new = np.vstack([rows[before], further]), np.concatenate([new[before], first])
+        times = np.concatenate([times[before], path.at + np.arange(len(further)) / shape.rate])
     late = shape.delay + shape.jitter * random.random(len(times))
-    # one behind the other
+    # in their order
     come = np.maximum.accumulate(times + late)
     noisy = rows.copy()
     noisy[:, :POSITION] += shape.noise * random.standard_normal((len(rows), POSITION))
@@ -90,12 +90,12 @@ def made_arrivals(shape: Streamed, folder: FilePath, period: float) -> tuple[np.
 
 
 class Event(NamedTuple):
-    """Something that a person does with a pen.
+    """Event of a drawing by a person.
 
     Attributes:
-        tick: Sampling interval from which on it is told.
-        kind: ``WAY_POINT``, ``NEW_PATH`` or ``END``.
-        pose: Way point, shape (d,).
+        tick: Sampling interval from which on it is sent.
+        kind: ``WAYPOINT``, ``NEW_PATH`` or ``END``.
+        pose: Waypoint, shape (d,).
     """
 
     tick: int
@@ -103,8 +103,8 @@ class Event(NamedTuple):
     pose: np.ndarray
 
 
-def tell(sender: WaypointSender, event: Event) -> None:
-    """Let a sender tell an event.
+def send_event(sender: WaypointSender, event: Event) -> None:
+    """Send an event.
 
     Args:
         sender: The sender.
@@ -116,33 +116,35 @@ def tell(sender: WaypointSender, event: Event) -> None:
         sender.add(event.pose, new_path=event.kind == NEW_PATH)
 
 
-def told_messages(events: Sequence[Event], layout: WaypointLayout) -> tuple[np.ndarray, np.ndarray]:
-    """Return when messages change, shape (k + 1,), and what they become, shape (k + 1, size).
+def waypoint_messages(
+    events: Sequence[Event], layout: WaypointLayout
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ticks at which messages change, shape (k + 1,), and the messages, (k + 1, size).
 
-    The first is that before all events, at tick 0.
+    The first is the message before all events, at tick 0.
 
     Args:
-        events: What a person did.
+        events: Events of the drawing.
         layout: Layout of the messages.
     """
     sender = WaypointSender(layout)
     ticks, rows = [0], [sender.message]
     for event in events:
-        tell(sender, event)
+        send_event(sender, event)
         ticks.append(event.tick)
         rows.append(sender.message)
     return np.array(ticks), np.array(rows)
 
 
 def strokes(events: Sequence[Event]) -> list[np.ndarray]:
-    """Return lines through what was drawn [m], each (points, 3).
+    """Return the lines of a drawing [m], each (points, 3).
 
     Args:
-        events: What a person did.
+        events: Events of the drawing.
     """
     lines: list[list[np.ndarray]] = [[]]
     for event in events:
-        if event.kind != WAY_POINT and lines[-1]:
+        if event.kind != WAYPOINT and lines[-1]:
             lines.append([])
         if event.kind != END:
             lines[-1].append(event.pose[:POSITION])
@@ -150,10 +152,10 @@ def strokes(events: Sequence[Event]) -> list[np.ndarray]:
 
 
 def drawn_text(events: Sequence[Event], dimension: int, period: float) -> str:
-    """Return what :func:`read_drawn` reads back, to the last bit.
+    """Return the text of a file that :func:`read_drawn` reads back exactly.
 
     Args:
-        events: What a person did.
+        events: Events of the drawing.
         dimension: 3 or 7.
         period: Sampling time [s].
     """
@@ -165,7 +167,7 @@ def drawn_text(events: Sequence[Event], dimension: int, period: float) -> str:
 
 
 def read_drawn(name: str, dimension: int, period: float) -> list[Event]:
-    """Return what a person has drawn.
+    """Read the drawing of a person.
 
     Args:
         name: The file.
@@ -176,14 +178,14 @@ def read_drawn(name: str, dimension: int, period: float) -> list[Event]:
         InputError: If it cannot be read, or its times decrease.
     """
 
-    def check_header(place: str, header: list[str]) -> None:
+    def check_header(location: str, header: list[str]) -> None:
         known = columns(dimension, time_column(header))
-        check_columns(place, header, known=known, required=known)
+        check_columns(location, header, known=known, required=known)
 
     table = read_numbers(name, "events of a drawing", check_header)
     when = time_column(table.header)
     rows = table.rows[:, [table.header.index(label) for label in columns(dimension, when)]]
     ticks = sampling_instants(name, when, rows[:, 0], period)
-    if not np.all(np.isin(rows[:, 1], (WAY_POINT, NEW_PATH, END))):
-        raise InputError(f"{name}: column 'kind' must be {WAY_POINT}, {NEW_PATH} or {END}")
+    if not np.all(np.isin(rows[:, 1], (WAYPOINT, NEW_PATH, END))):
+        raise InputError(f"{name}: column 'kind' must be {WAYPOINT}, {NEW_PATH} or {END}")
     return [Event(int(tick), int(row[1]), row[2:]) for tick, row in zip(ticks, rows, strict=True)]

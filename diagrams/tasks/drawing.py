@@ -1,4 +1,4 @@
-"""How paths, surfaces, regions and workpieces are drawn."""
+"""Drawing of paths, surfaces, regions and workpieces."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,16 +11,20 @@ from pydrake.geometry import Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
-from diagrams.robots.workpiece import WorkpieceLook
+from diagrams.robots.workpiece import WorkpieceDrawing
 from diagrams.tasks.regions_and_guides import DrawnFixture
 from pfsc_drake.control.fixtures.guides import Guide
-from pfsc_drake.control.manifolds.manifold import PlaceManifold
+from pfsc_drake.control.manifolds.manifold import ProjectedManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.geometry.path_on_surface import CurveOnSurface
 from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.systems.drawing.manifold_visualizer import (
+    GUIDE_COLOR,
+    LINE_COLOR,
+    SKIN_COLOR,
+    TUBE_COLOR,
     PathVisualizer,
     RegionVisualizer,
     SurfaceVisualizer,
@@ -28,33 +32,47 @@ from pfsc_drake.systems.drawing.manifold_visualizer import (
     draw_surface,
 )
 from pfsc_drake.systems.drawing.numbers import SceneNumber
-from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer
+from pfsc_drake.systems.drawing.tool_visualizer import AXIS_COLORS, ToolVisualizer
 
+AXIS = "axis: "  # begin of an axis' description in a legend
 _POINTS = 600
-# of a surface, in each direction, and of the points of each line
+# lines of a surface in each direction, and points of each line
 _LINES, _LINE_POINTS = 11, 61
-# of the tube round a guide, along it and round it
+# points of the tube round a guide, along it and round it
 _TUBE_POINTS, _AROUND = 160, 17
-_CORE = 2.5e-3  # m, radius of what stands for the guide itself
+_CORE = 2.5e-3  # m, radius of the tube that shows the guide itself
 
 
 class ManifoldDrawing(Protocol):
-    """What draws a manifold, and its frame next to the tool."""
+    """Drawing of a manifold, and of its frame next to the tool."""
 
     def outline(self) -> list[np.ndarray]:
         """Return lines that show the manifold [m], each (points, 3)."""
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """Add what draws it.
+        """Add the visualizer.
 
         Args:
             builder: Builder of the diagram.
-            meshcat: Where to draw.
+            meshcat: Meshcat instance to draw in.
             period: Time between frames [s].
 
         Returns:
             Port for the point of the manifold next to the tool.
         """
+
+    def legend(self) -> dict[str, Rgba]:
+        """Return the colours of the drawing by the description of what has them."""
+
+
+def axis_legend(*axes: str) -> dict[str, Rgba]:
+    """Return the colours of a frame's three axes by their descriptions."""
+    return {AXIS + text: color for text, color in zip(axes, AXIS_COLORS, strict=True)}
+
+
+def path_axis_legend() -> dict[str, Rgba]:
+    """Return the same of the frame of a path."""
+    return axis_legend("tangent at the closest point of the path", "first normal", "second normal")
 
 
 @dataclass(frozen=True)
@@ -75,13 +93,19 @@ class PathDrawing:
         return [curve.derivatives(np.linspace(*curve.domain, _POINTS), 0)[:, 0]]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """Add what draws it."""
+        """Add the visualizer."""
         curve = self.path.position
         if isinstance(curve, CurveOnSurface):
             draw_surface(meshcat, "path_surface", *skin_and_lines(curve.surface))
         visualizer = PathVisualizer(self.path, self.layout, meshcat, period)
         drawing = builder.AddNamedSystem("path_visualizer", visualizer)
         return drawing.GetInputPort("path_point")
+
+    def legend(self) -> dict[str, Rgba]:
+        """Return the colours of the drawing by the description of what has them."""
+        on_surface = isinstance(self.path.position, CurveOnSurface)
+        surface = {"surface of the path": SKIN_COLOR} if on_surface else {}
+        return {"path": LINE_COLOR} | surface | path_axis_legend()
 
 
 @dataclass(frozen=True)
@@ -90,29 +114,36 @@ class SurfaceDrawing:
 
     Attributes:
         surface: The surface.
-        manifold: As the law sees it.
+        manifold: Manifold of the law.
     """
 
     surface: Surface
-    manifold: PlaceManifold
+    manifold: ProjectedManifold
 
     def outline(self) -> list[np.ndarray]:
         """Return lines that show the manifold [m], each (points, 3)."""
         return skin_and_lines(self.surface)[1]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """Add what draws it."""
+        """Add the visualizer."""
         layout = self.manifold.layout
 
-        def place(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def frame(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return point[layout.position][:3], self.manifold.axes(point).full()
 
         skin, lines = skin_and_lines(self.surface)
         drawing = builder.AddNamedSystem(
             "surface_visualizer",
-            SurfaceVisualizer(skin, lines, layout.size, place, meshcat, period),
+            SurfaceVisualizer(skin, lines, layout.size, frame, meshcat, period),
         )
         return drawing.GetInputPort("manifold_point")
+
+    def legend(self) -> dict[str, Rgba]:
+        """Return the colours of the drawing by the description of what has them."""
+        axes = axis_legend(
+            "first tangent at the closest point of the surface", "second tangent", "normal"
+        )
+        return {"surface": SKIN_COLOR, "its coordinate lines": LINE_COLOR} | axes
 
 
 def skin_and_lines(surface: Surface) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -126,12 +157,12 @@ def skin_and_lines(surface: Surface) -> tuple[np.ndarray, list[np.ndarray]]:
 
 @dataclass(frozen=True)
 class SpaceDrawing:
-    """The surfaces of regions, drawn where they are at rest; with numbers if they are several.
+    """The surfaces of regions, drawn at rest; with numbers if there are several.
 
     Attributes:
         fixtures: The regions.
-        manifold: Space as the law sees it.
-        guides: Paths that attract the tool, drawn with where they pull the most.
+        manifold: Manifold of the law, space.
+        guides: Paths that attract the tool, drawn with the tube of the largest force.
     """
 
     fixtures: Sequence[DrawnFixture]
@@ -145,7 +176,7 @@ class SpaceDrawing:
         return lines + [_tube(guide, 0.0)[0] for guide in self.guides]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """Add what draws it."""
+        """Add the visualizer."""
         for k, guide in enumerate(self.guides):
             tubes = _tube(guide, _CORE), _tube(guide, guide.strongest)
             draw_guide(meshcat, f"guides/{k}", *tubes)
@@ -165,6 +196,14 @@ class SpaceDrawing:
         )
         return drawing.GetInputPort("manifold_point")
 
+    def legend(self) -> dict[str, Rgba]:
+        """Return the colours of the drawing by the description of what has them."""
+        entries = {"boundary of a region": SKIN_COLOR} if self.fixtures else {}
+        if self.guides:
+            entries["attracting path"] = GUIDE_COLOR
+            entries["distance of its largest force"] = TUBE_COLOR
+        return entries | axis_legend("world's x, drawn at the tool", "world's y", "world's z")
+
 
 def _tube(guide: Guide, radius: float) -> np.ndarray:
     """Return points at a radius [m] round a guide [m], shape (around, along, 3)."""
@@ -177,7 +216,7 @@ def _tube(guide: Guide, radius: float) -> np.ndarray:
     return line + radius * across
 
 
-# to who looks at the regions from their side with the robot to the left, and that one's right
+# directions to a viewer with the robot to the left, and to the viewer's right
 _TO_VIEWER, _ACROSS = np.array([0.53, -0.79, 0.31]), np.array([0.83, 0.56, 0.0])
 _NUMBER, _OWN = 0.06, 0.4  # height of a number against the size of all regions, and of its own
 
@@ -185,7 +224,7 @@ _NUMBER, _OWN = 0.06, 0.4  # height of a number against the size of all regions,
 def region_numbers(skins: Sequence[np.ndarray], firsts: Sequence[int]) -> dict[int, SceneNumber]:
     """Return the number of each region, by its first surface; none for a single region.
 
-    It stands where the region is next to who looks, before it.
+    It stands in front of the point of the region that is next to the viewer.
 
     Args:
         skins: Points of all surfaces [m], each (rows, columns, 3).
@@ -205,13 +244,13 @@ def region_numbers(skins: Sequence[np.ndarray], firsts: Sequence[int]) -> dict[i
         points = np.concatenate(clouds[first:end])
         height = min(_NUMBER * size, _OWN * float(np.linalg.norm(np.ptp(points, axis=0))))
         middle = points[np.argmax(points @ view)] + height / 2.0 * view
-        foot = middle - height / 2.0 * np.eye(3)[2]
-        numbers[first] = SceneNumber(k + 1, foot, across, height)
+        bottom = middle - height / 2.0 * np.eye(3)[2]
+        numbers[first] = SceneNumber(k + 1, bottom, across, height)
     return numbers
 
 
 def _placement(region: MovingRegion, clock: float) -> RigidTransform:
-    """Return where what moves with a region is at a time of the clock."""
+    """Return the pose of a region at a time of its clock."""
     rotation, origin = region.placement(clock)
     return RigidTransform(RotationMatrix(rotation), origin)
 
@@ -222,35 +261,35 @@ _VIEW = np.array([0.5, -0.4, 0.35])  # m, from the workpiece to the camera, z up
 
 def add_workpiece_drawing(
     builder: DiagramBuilder,
-    look: WorkpieceLook,
+    workpiece: WorkpieceDrawing,
     tool_pose: OutputPort,
     meshcat: Meshcat,
     period: float,
 ) -> None:
-    """Draw a workpiece, and let what touches it move with the tool.
+    """Draw a workpiece, and the touching part of the tool, which moves with the tool.
 
     Args:
         builder: Builder of the replay.
-        look: How they are drawn.
+        workpiece: Drawing of both.
         tool_pose: ``[y_t, R_e]``.
-        meshcat: Where to draw, axes of the inertial frame.
+        meshcat: Meshcat instance to draw in, axes of the inertial frame.
         period: Time between frames [s].
     """
-    draw_workpiece(look, meshcat)
+    draw_workpiece(workpiece, meshcat)
     tool = builder.AddNamedSystem(
-        "tool_visualizer", ToolVisualizer(look.tool_parts, meshcat, period)
+        "tool_visualizer", ToolVisualizer(workpiece.tool_parts, meshcat, period)
     )
     builder.Connect(tool_pose, tool.GetInputPort("tool_pose"))
 
 
-def draw_workpiece(look: WorkpieceLook, meshcat: Meshcat) -> None:
+def draw_workpiece(workpiece: WorkpieceDrawing, meshcat: Meshcat) -> None:
     """Draw a workpiece.
 
     Args:
-        look: How it is drawn.
-        meshcat: Where to draw, axes of the inertial frame.
+        workpiece: Its drawing.
+        meshcat: Meshcat instance to draw in, axes of the inertial frame.
     """
-    surface = look.surface
+    surface = workpiece.surface
     meshcat.SetTriangleMesh("workpiece", surface.vertices.T, surface.triangles.T, _WORKPIECE)
 
 
@@ -258,7 +297,7 @@ def look_down_at(meshcat: Meshcat, target: np.ndarray) -> None:
     """Turn the camera to a workpiece.
 
     Args:
-        meshcat: Whose camera it is.
-        target: Where the workpiece is [m], shape (3,), z upwards.
+        meshcat: Meshcat instance with the camera.
+        target: Position of the workpiece [m], shape (3,), z upwards.
     """
     meshcat.SetCameraPose(target + _VIEW, target)

@@ -1,17 +1,18 @@
-"""How a path whose way points come is drawn, and the plane that a person draws in."""
+"""Drawing of a streamed path, and of the plane in which a person draws."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from pydrake.geometry import Meshcat
+from pydrake.geometry import Meshcat, Rgba
 from pydrake.systems.framework import DiagramBuilder, InputPort
 
 from diagrams.scenario.streamed import DrawnPlane
+from diagrams.tasks.drawing import path_axis_legend
 from pfsc_drake.checks import require
 from pfsc_drake.geometry import PathPointLayout
-from pfsc_drake.systems.drawing.manifold_visualizer import LineVisualizer
+from pfsc_drake.systems.drawing.manifold_visualizer import LINE_COLOR, LineVisualizer
 
 _PARALLEL = 2e-3  # rad
 SIDE = 20  # points of each side of a plane that is drawn
@@ -34,10 +35,14 @@ class StreamDrawing:
         return list(self.lines)
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """Add what draws it."""
+        """Add the visualizer."""
         visualizer = LineVisualizer(self.lines, self.layout, meshcat, period)
         drawing = builder.AddNamedSystem("path_visualizer", visualizer)
         return drawing.GetInputPort("path_point")
+
+    def legend(self) -> dict[str, Rgba]:
+        """Return the colours of the drawing by the description of what has them."""
+        return {"path or plane known beforehand": LINE_COLOR} | path_axis_legend()
 
 
 def plane_axes(plane: DrawnPlane) -> np.ndarray:
@@ -53,7 +58,7 @@ def plane_axes(plane: DrawnPlane) -> np.ndarray:
     right /= np.linalg.norm(right)
     across = up - (up @ right) * right
     slanted = np.linalg.norm(across) > _PARALLEL * np.linalg.norm(up)
-    require(bool(slanted), "path.shape.plane.up", plane.up, "a direction that is not that of right")
+    require(bool(slanted), "path.shape.plane.up", plane.up, "a direction not parallel to right")
     return np.stack([right, across / np.linalg.norm(across)])
 
 
@@ -61,7 +66,7 @@ def border(plane: DrawnPlane) -> np.ndarray:
     """Return points along the border of a plane [m], shape (points, 3)."""
     across = plane_axes(plane) * np.array([[plane.width], [plane.height]]) / 2.0
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
-    places = np.array(plane.origin) + corners @ across
+    corners = np.array(plane.origin) + corners @ across
     steps = np.linspace(0.0, 1.0, SIDE, endpoint=False)[:, None]
-    sides = [begin + steps * (end - begin) for begin, end in pairwise(places)]
-    return np.vstack([*sides, places[-1:]])
+    sides = [begin + steps * (end - begin) for begin, end in pairwise(corners)]
+    return np.vstack([*sides, corners[-1:]])

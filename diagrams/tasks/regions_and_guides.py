@@ -1,4 +1,4 @@
-"""Virtual fixtures of a scenario: regions as rules, logs and pictures need them, and guides."""
+"""Virtual fixtures of a scenario: regions for laws, logs and drawings, and guides."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from pfsc_drake.geometry.shapes.shape import ShapeInputs
 from pfsc_drake.geometry.shapes.tool_orientation import OrientationParameters
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
-# a place on it is all that is asked of a guide
+# a guide needs positions only
 _AS_SMOOTH_AS_FOR = "velocity_servo"
 
 
@@ -35,7 +35,7 @@ class DrawnFixture(Fixture):
     """A region that a tool may not enter, with its drawing.
 
     Attributes:
-        surfaces: What of its boundary is drawn, where it is at rest.
+        surfaces: Surfaces of its boundary to draw, at rest.
     """
 
     surfaces: Sequence[Surface]
@@ -47,22 +47,22 @@ def make_fixtures(
     folder: FilePath,
     progress: Progress | None = None,
 ) -> tuple[list[DrawnFixture], list[str]]:
-    """Return the regions of a scenario, and what is odd about them, one sentence each.
+    """Return the regions of a scenario, and warnings about them, one sentence each.
 
     Args:
-        parameters: What the scenario says.
-        start: Where the tool starts [m], shape (3,).
-        folder: Where relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
+        parameters: Parameters of the scenario.
+        start: Start of the tool point [m], shape (3,).
+        folder: Base folder of relative file names.
+        progress: Receives the fraction done and the name of the step, where that takes its time.
 
     Raises:
-        InputError: If a region cannot be made, is given twice, or covers the start and that is to
-            be refused.
+        InputError: If a region cannot be created, is given twice, or covers a start that is to be
+            refused.
     """
     fixtures = []
-    for number, (name, said) in enumerate(zip(parameters.names, parameters.regions, strict=True)):
+    for number, (name, region) in enumerate(zip(parameters.names, parameters.regions, strict=True)):
         try:
-            fixtures.append(_make_fixture(name, said, folder, progress))
+            fixtures.append(_make_fixture(name, region, folder, progress))
         except InputError as error:
             raise InputError(f"fixtures.regions[{number}]: {error}") from None
     by_name = {fixture.name: fixture.region for fixture in fixtures}
@@ -73,31 +73,31 @@ def make_fixtures(
             refuse_forbidden_start(hard, start)
     except InputError as error:
         raise InputError(f"fixtures: {error}") from None
-    odd = [*blocked_start(hard, start), *tangent_regions(hard, start)]
-    return fixtures, [f"fixtures: {sentence}" for sentence in odd]
+    warnings = [*blocked_start(hard, start), *tangent_regions(hard, start)]
+    return fixtures, [f"fixtures: {warning}" for warning in warnings]
 
 
 def _make_fixture(
-    name: str, said: RegionParameters, folder: FilePath, progress: Progress | None
+    name: str, parameters: RegionParameters, folder: FilePath, progress: Progress | None
 ) -> DrawnFixture:
-    region = make_region(said, folder, progress)
-    stiffness = math.inf if said.stiffness is None else said.stiffness
-    surfaces = said.shape.drawn_surfaces(ShapeInputs(folder))
+    region = make_region(parameters, folder, progress)
+    stiffness = math.inf if parameters.stiffness is None else parameters.stiffness
+    surfaces = parameters.shape.drawn_surfaces(ShapeInputs(folder))
     return DrawnFixture(region, stiffness, name=name, surfaces=surfaces)
 
 
 def make_region(
     parameters: RegionParameters, folder: FilePath, progress: Progress | None = None
 ) -> Region | MovingRegion:
-    """Return a region, which moves if the scenario says so.
+    """Return a region, which moves if the scenario has a motion for it.
 
     Args:
-        parameters: What the scenario says.
-        folder: Where relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
+        parameters: Parameters of the scenario.
+        folder: Base folder of relative file names.
+        progress: Receives the fraction done and the name of the step, where that takes its time.
 
     Raises:
-        InputError: If a file cannot be used, or no region be made of it.
+        InputError: If a file cannot be used, or does not define a region.
     """
     inputs = ShapeInputs(folder, progress=progress)
     region = parameters.shape.region(inputs, inside=parameters.inside)
@@ -110,21 +110,21 @@ def make_guides(
     """Return the paths that attract a tool, by their names.
 
     Args:
-        parameters: What the scenario says.
-        folder: Where relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
+        parameters: Parameters of the scenario.
+        folder: Base folder of relative file names.
+        progress: Receives the fraction done and the name of the step, where that takes its time.
 
     Raises:
-        InputError: If a path cannot be made.
+        InputError: If a path cannot be created.
     """
     guides = {}
-    for number, (name, said) in enumerate(
+    for number, (name, guide) in enumerate(
         zip(parameters.guide_names, parameters.guides, strict=True)
     ):
-        shape = PathParameters(said.shape, OrientationParameters(task="none"))
+        shape = PathParameters(guide.shape, OrientationParameters(task="none"))
         try:
             path = make_path(shape, _AS_SMOOTH_AS_FOR, folder, progress)
-            guides[name] = Guide(path, said.stiffness, said.reach)
+            guides[name] = Guide(path, guide.stiffness, guide.reach)
         except InputError as error:
             raise InputError(f"fixtures.guides[{number}]: {error}") from None
     return guides

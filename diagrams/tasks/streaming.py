@@ -1,4 +1,4 @@
-"""Following a path whose way points come while the tool moves."""
+"""Path following along waypoints that come while the tool moves."""
 
 from collections.abc import Iterator
 from pathlib import Path as FilePath
@@ -8,13 +8,13 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import ControllerParameters, PathParameters, StartParameters, Streamed
 from diagrams.scenario.streamed import DrawnPlane
-from diagrams.tasks.arrivals import Event, made_arrivals, read_drawn, strokes, told_messages
+from diagrams.tasks.arrivals import Event, read_arrivals, read_drawn, strokes, waypoint_messages
 from diagrams.tasks.drawn_plane import SIDE, border
 from diagrams.tasks.task_geometry import followed_angles
 from pfsc_drake.checks import require
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
-from pfsc_drake.control.streams.stream_course import POSE, POSITION
+from pfsc_drake.control.streams.growing_path import POSE, POSITION
 from pfsc_drake.controller.tasks.stream_task import StreamTask
 from pfsc_drake.controller.tasks.streamed_path import StreamedPath
 from pfsc_drake.errors import InputError
@@ -24,8 +24,8 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedPen
 
-_SETTLES = 3.0  # s, after the last way point has come, of a run that tells no duration
-_SLOWEST = 0.3  # of the largest speed, to tell how long a run may take
+_SETTLES = 3.0  # s, after the last waypoint, of a run without a duration
+_SLOWEST = 0.3  # of the largest speed, for the duration of a run
 
 
 class ScenarioStream(StreamTask):
@@ -44,7 +44,7 @@ class ScenarioStream(StreamTask):
     period: float
 
     def drawn_lines(self) -> list[np.ndarray]:
-        """Return lines through the way points that will come, or the border of the plane [m]."""
+        """Return lines through the coming waypoints, or the border of the plane [m]."""
         if self.plane is not None:
             return [border(self.plane), *strokes(self.drawn or [])]
         assert self.arrivals is not None
@@ -55,7 +55,7 @@ class ScenarioStream(StreamTask):
     def add_source(
         self, builder: DiagramBuilder, stream: OutputPort, period: float
     ) -> tuple[OutputPort, OperatorPanel | None]:
-        """Add what way points come from.
+        """Add the source of waypoints.
 
         Args:
             builder: Builder of the diagram.
@@ -74,38 +74,39 @@ class ScenarioStream(StreamTask):
         parts = {"waypoints": np.zeros(messages.size)}
         panel = builder.AddNamedSystem("pen_panel", OperatorPanel(parts, period))
         if self.drawn is not None:
-            told = told_messages(self.drawn, messages)
-            pen = RecordedPen(*told, messages.length, period)
+            recorded = waypoint_messages(self.drawn, messages)
+            pen = RecordedPen(*recorded, messages.length, period)
             player = builder.AddNamedSystem("recorded_pen", pen)
             builder.Connect(stream, player.get_input_port())
             builder.Connect(player.get_output_port(), panel.GetInputPort("controls"))
         return panel.GetOutputPort("waypoints"), panel
 
-    def add_true_place(
+    def add_actual_projection(
         self,
         builder: DiagramBuilder,
         robot: RobotModel,
         joint_state: OutputPort,
-        course: OutputPort,
+        path: OutputPort,
         period: float,
     ) -> OutputPort:
-        """Add what finds where on the path the tool really is, for the log.
+        """Add the projection of the actual tool onto the path, for the log.
 
         Args:
             builder: Builder of the diagram.
-            robot: The robot as it is.
-            joint_state: Its state as it is.
-            course: The path, laid out by :class:`Course`.
+            robot: The simulated robot.
+            joint_state: Its actual state.
+            path: The path, laid out by :class:`GrowingPath`.
             period: Sampling time [s].
         """
         tool = builder.AddNamedSystem("true_tool", BlockSystem(ToolKinematics(robot), period))
         builder.Connect(joint_state, tool.GetInputPort("joint_state"))
-        place = builder.AddNamedSystem("true_place", BlockSystem(self.path.projector, period))
-        builder.Connect(tool.GetOutputPort("tool_pose"), place.GetInputPort("tool_pose"))
-        builder.Connect(course, place.GetInputPort("course"))
-        return place.GetOutputPort("manifold_point")
+        block = BlockSystem(self.path.projector, period)
+        projection = builder.AddNamedSystem("actual_projection", block)
+        builder.Connect(tool.GetOutputPort("tool_pose"), projection.GetInputPort("tool_pose"))
+        builder.Connect(path, projection.GetInputPort("path"))
+        return projection.GetOutputPort("manifold_point")
 
-    def way(self) -> Iterator[tuple[np.ndarray, str]]:
+    def tool_positions(self) -> Iterator[tuple[np.ndarray, str]]:
         """Yield positions of the tool along its motion [m], each (3,), with their names."""
         if self.plane is not None:
             for corner in border(self.plane)[::SIDE]:
@@ -113,7 +114,7 @@ class ScenarioStream(StreamTask):
             return
         assert self.arrivals is not None
         for k, row in enumerate(self.arrivals.rows, start=1):
-            yield row[:POSITION], f"way point {k}"
+            yield row[:POSITION], f"waypoint {k}"
 
 
 def stream_task(
@@ -130,59 +131,60 @@ def stream_task(
         controller: The controller; its law decides how smooth the path is made.
         start: Start of the tool.
         duration: Simulated time [s]; 0 for as long as it may take.
-        folder: Where relative file names start.
+        folder: Base folder of relative file names.
 
     Raises:
-        InputError: If a file cannot be read, or the start is not where the path begins.
+        InputError: If a file cannot be read, or the start is not at the begin of the path.
     """
-    shape, said, period = parameters.shape, parameters.orientation, controller.sampling_time
+    shape, orientation = parameters.shape, parameters.orientation
+    period = controller.sampling_time
     assert isinstance(shape, Streamed)
     try:
         shape.check()
     except InputError as error:
         raise InputError(f"path.shape.{error}") from None
-    keyframes = f"{len(said.keyframes)} given"
-    require(not said.keyframes, "path.orientation.keyframes", keyframes, "none of a stream")
+    keyframes = f"{len(orientation.keyframes)} given"
+    require(not orientation.keyframes, "path.orientation.keyframes", keyframes, "none of a stream")
     arrivals, drawn, plane = None, None, shape.plane
     if plane is None:
-        begin, arrivals = made_arrivals(shape, folder, period)
+        begin, arrivals = read_arrivals(shape, folder, period)
         ahead = arrivals.rows[0, :POSITION] - begin[:POSITION]
     else:
         begin, ahead = np.array(plane.origin), np.array(plane.right)
         if plane.zyx_deg:
             begin = np.concatenate([begin, zyx_to_quaternion(np.deg2rad(plane.zyx_deg))])
-    if said.task == "none":
+    if orientation.task == "none":
         begin, arrivals = begin[:POSITION], without_orientation(arrivals)
     if shape.inputs:
         try:
             drawn = read_drawn(str(folder / shape.inputs), len(begin), period)
         except InputError as error:
             raise InputError(f"path.shape.inputs: {error}") from None
-    require(any(ahead), "path.shape.file", shape.file, "way points that differ")
+    require(any(ahead), "path.shape.file", shape.file, "waypoints that differ")
     order = RELATIVE_DEGREE[controller.law]
     path = StreamedPath(begin, shape.follow, order, direction=ahead, length=shape.length)
     task = ScenarioStream(
         path,
-        followed_angles(said),
+        followed_angles(orientation),
         rotation_deg=start.rotation_deg,
         duration=duration or _longest(path, arrivals, shape, period),
     )
     task.arrivals, task.drawn, task.plane, task.period = arrivals, drawn, plane, period
-    placed = not any(start.offset)
-    require(placed, "start.offset", start.offset, "0 where way points come while it moves")
+    on_path = not any(start.offset)
+    require(on_path, "start.offset", start.offset, "0 where waypoints come while it moves")
     return task
 
 
 def _longest(
     path: StreamedPath, arrivals: Arrivals | None, shape: Streamed, period: float
 ) -> float:
-    """Return how long a run may take [s]."""
+    """Return the duration of a run [s]."""
     if arrivals is None:
         raise InputError("duration = 0: must be a positive number [s] where a person draws")
-    places = np.vstack([path.start, arrivals.rows[:, :-1]])[:, :POSITION]
-    way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    points = np.vstack([path.start, arrivals.rows[:, :-1]])[:, :POSITION]
+    distance = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
     come = arrivals.ends * period
-    return float(np.ceil(max(come, way / (_SLOWEST * shape.follow.velocity)) + _SETTLES))
+    return float(np.ceil(max(come, distance / (_SLOWEST * shape.follow.velocity)) + _SETTLES))
 
 
 def without_orientation(arrivals: Arrivals | None) -> Arrivals | None:

@@ -26,20 +26,20 @@ def drawing_of(task: Task) -> ManifoldDrawing:
 
 @drawing_of.register
 def _(task: PathTask) -> ManifoldDrawing:
-    return PathDrawing(task.path, task.place.layout)
+    return PathDrawing(task.path, task.projected_manifold.layout)
 
 
 @drawing_of.register
 def _(task: SurfaceTask) -> ManifoldDrawing:
-    return SurfaceDrawing(task.surface, task.place)
+    return SurfaceDrawing(task.surface, task.projected_manifold)
 
 
 @drawing_of.register
 def _(task: SpaceTask) -> ManifoldDrawing:
     fixtures = cast(Sequence[DrawnFixture], task.fixtures)
-    return SpaceDrawing(fixtures, task.place, [*task.guides.values()])
+    return SpaceDrawing(fixtures, task.projected_manifold, [*task.guides.values()])
 
 
 @drawing_of.register
 def _(task: ScenarioStream) -> ManifoldDrawing:
-    return StreamDrawing(task.drawn_lines(), task.place.layout)
+    return StreamDrawing(task.drawn_lines(), task.projected_manifold.layout)

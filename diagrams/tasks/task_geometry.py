@@ -1,4 +1,4 @@
-"""The path and the surface of a scenario, made for a law and checked for a robot."""
+"""Path and surface of a scenario, smooth enough for a law, with checks of the robot's joints."""
 
 from pathlib import Path as FilePath
 from typing import Any, Literal, cast
@@ -12,13 +12,13 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, rotation_to_axis
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.shapes.on_surface import OnSurface
-from pfsc_drake.geometry.shapes.shape import MadeSurface, PlacedSurface, ShapeInputs
+from pfsc_drake.geometry.shapes.shape import PlacedSurface, ShapeInputs, SurfaceResult
 from pfsc_drake.geometry.shapes.tool_orientation import (
     OrientationParameters,
     SurfaceOrientationParameters,
 )
 
-_KEYFRAMES = "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
+_KEYFRAMES = "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one for a constant orientation"
 
 
 def make_path(
@@ -27,13 +27,13 @@ def make_path(
     """Return the path, smooth enough for the law, without an orientation that is no task.
 
     Args:
-        parameters: What the scenario says; on a surface :func:`make_path_on_surface` makes it.
+        parameters: The path; not one on a surface, see :func:`make_path_on_surface`.
         law: Key of ``RELATIVE_DEGREE``; decides the class C^(r+1) of splines.
-        folder: Where relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
+        folder: Base folder of relative file names.
+        progress: Receives the fraction done and the name of the step, where that takes its time.
 
     Raises:
-        InputError: If the path cannot be made or is not smooth enough.
+        InputError: If the path cannot be created or is not smooth enough.
     """
     assert not isinstance(parameters.shape, OnSurface | Streamed)
     inputs = _inputs(law, folder, progress)
@@ -58,14 +58,14 @@ def make_path(
 def surface_of_path(
     path: PathParameters, surface: SurfaceParameters | None
 ) -> SurfaceParameters | None:
-    """Return the surface that a path lies on, or None if it lies on none.
+    """Return the surface that a path lies on, or None.
 
     Args:
         path: The path.
         surface: The surface, if there is one.
 
     Raises:
-        InputError: If the path is on a surface and there is none, or both say the orientation.
+        InputError: If the path is on a surface and there is none, or both have an orientation.
     """
     if not isinstance(path.shape, OnSurface):
         return None
@@ -73,8 +73,8 @@ def surface_of_path(
         raise InputError(
             "path.shape = !OnSurface: there is no surface; write surface: {shape: !Plane {..}}"
         )
-    said = path.orientation
-    if said.keyframes or said.task != "full" or said.jacobian != "geometric":
+    own = path.orientation
+    if own.keyframes or own.task != "full" or own.jacobian != "geometric":
         raise InputError(
             "path.orientation: given, and a path on a surface takes surface.orientation: "
             "{kind: none|given|normal, task: full|tool_axis|yaw}; leave out path.orientation"
@@ -92,35 +92,35 @@ def make_path_on_surface(
     """Return a path on a surface, smooth enough for the law.
 
     Args:
-        path: What the scenario says of the path; its shape is :class:`OnSurface`.
-        surface: What it says of the surface.
+        path: The path; its shape is :class:`OnSurface`.
+        surface: The surface.
         law: Key of ``RELATIVE_DEGREE``, r; decides the class C^(r+1) of splines.
-        folder: Where relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
+        folder: Base folder of relative file names.
+        progress: Receives the fraction done and the name of the step, where that takes its time.
 
     Raises:
-        InputError: If surface or path cannot be made, or are not smooth enough.
+        InputError: If surface or path cannot be created, or are not smooth enough.
     """
     assert isinstance(path.shape, OnSurface)
     inputs = _inputs(law, folder, progress)
-    made = path.shape.path_on(surface.shape, surface.orientation, inputs)
-    made.require_smoothness(inputs.smoothness, inputs.needed_by)
-    return made
+    result = path.shape.path_on(surface.shape, surface.orientation, inputs)
+    result.require_smoothness(inputs.smoothness, inputs.needed_by)
+    return result
 
 
 def make_surface(
     shape: PlacedSurface, law: str, folder: FilePath, progress: Progress | None = None
-) -> MadeSurface:
+) -> SurfaceResult:
     """Return a surface, smooth enough for the law and a single sheet.
 
     Args:
-        shape: What the scenario says.
-        law: Key of ``RELATIVE_DEGREE``, r; decides the class C^(r+1) that is needed.
-        folder: Where relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
+        shape: Shape of the scenario.
+        law: Key of ``RELATIVE_DEGREE``, r; requires the class C^(r+1).
+        folder: Base folder of relative file names.
+        progress: Receives the fraction done and the name of the step, where that takes its time.
 
     Raises:
-        InputError: If the surface cannot be made, or is not smooth enough.
+        InputError: If the surface cannot be created, or is not smooth enough.
     """
     return shape.smooth_sheet(_inputs(law, folder, progress))
 
@@ -134,27 +134,28 @@ def make_surface_manifold(order: int, parameters: SurfaceParameters) -> SurfaceM
 
     Args:
         order: Relative degree of the law.
-        parameters: What the scenario says.
+        parameters: Parameters of the scenario.
 
     Raises:
-        InputError: If the law has no such order.
+        InputError: If no law has that order.
     """
-    said = parameters.orientation
-    kind = None if said.kind == "none" else cast(Literal["given", "normal"], said.kind)
-    offset = said.offset if kind == "normal" else None
-    return SurfaceManifold(order, orientation=kind, offset=offset, **followed_angles(said))
+    chosen = parameters.orientation
+    kind = None if chosen.kind == "none" else cast(Literal["given", "normal"], chosen.kind)
+    offset = chosen.offset if kind == "normal" else None
+    return SurfaceManifold(order, orientation=kind, offset=offset, **followed_angles(chosen))
 
 
 def followed_angles(
     orientation: OrientationParameters | SurfaceOrientationParameters,
 ) -> dict[str, Any]:
-    """Return the axis of the tool, or that in the world, that alone follows, or whose angles do.
+    """Return the part of the orientation that is followed: an axis, or Euler angles.
 
     Args:
-        orientation: What the scenario says.
+        orientation: Orientation of the scenario.
 
     Returns:
-        ``tool_axis`` and ``yaw_axis``, each of shape (3,) and length one, or None; ``euler``, the
+        ``tool_axis``, an axis of the tool that alone is followed, and ``yaw_axis``, an axis in the
+        world about which alone the tool turns, unit vectors of shape (3,) or None; ``euler``, the
         convention of Euler angles whose differences are the coordinates, or None.
     """
     none = isinstance(orientation, SurfaceOrientationParameters) and orientation.kind == "none"
@@ -169,16 +170,16 @@ def followed_angles(
 
 
 def require_orientation(path: Path, task: str, num_joints: int) -> None:
-    """Refuse a path that asks for more than a robot's joints can do, or for less by oversight.
+    """Refuse a path with more outputs than joints, or with too few of them by oversight.
 
     Args:
-        path: The path, from :func:`make_path`.
+        path: Path from :func:`make_path`.
         task: ``path.orientation.task`` of the scenario.
         num_joints: Number of joints of the robot.
 
     Raises:
-        InputError: If there are too few joints, or four or more that nothing tells to give up the
-            orientation.
+        InputError: If there are too few joints, or four or more without an orientation and without
+            ``task: none``.
     """
     if path.orientation is None:
         num_outputs, outputs = 3, "position only"
@@ -188,39 +189,39 @@ def require_orientation(path: Path, task: str, num_joints: int) -> None:
         num_outputs, outputs = 4, "position and turn about the vertical"
     else:
         num_outputs, outputs = 6, "position and orientation"
-    said = f"path: {num_joints} joints for {num_outputs} outputs ({outputs})"
+    counts = f"path: {num_joints} joints for {num_outputs} outputs ({outputs})"
     if num_joints < num_outputs:
-        ways = ["3 joints follow a path without orientation, 6 one with"]
+        advice = ["3 joints follow a path without orientation, 6 one with"]
         if num_joints == 5:
-            ways.append("5 the direction of an axis: write path.orientation.task: tool_axis")
+            advice.append("5 the direction of an axis: write path.orientation.task: tool_axis")
         if num_joints in (4, 5):
-            ways.append("4 a turn about the vertical: write path.orientation.task: yaw")
+            advice.append("4 a turn about the vertical: write path.orientation.task: yaw")
         if num_joints >= 3:
-            ways.append("for a position only write path.orientation.task: none")
-        raise InputError("; ".join([said, *ways]))
+            advice.append("for a position only write path.orientation.task: none")
+        raise InputError("; ".join([counts, *advice]))
     if num_joints > 3 and path.orientation is None and task != "none":
-        ways = [_give_orientation(path), "if none is meant, write path.orientation.task: none"]
+        advice = [_give_orientation(path), "if none is meant, write path.orientation.task: none"]
         if num_joints != 6:
             hold = f"hold {num_joints - 3} of them: robot.fixed_joints: {{NAME: VALUE}}"
-            ways[-1] += f", or {hold}"
-        raise InputError("; ".join([said, *ways]))
+            advice[-1] += f", or {hold}"
+        raise InputError("; ".join([counts, *advice]))
 
 
 def _give_orientation(path: Path) -> str:
-    """Return how a path gets an orientation."""
+    """Return advice to give a path an orientation."""
     columns = "columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
     return f"give the orientation too: {columns if path.waypoints else ''}{_KEYFRAMES}"
 
 
 def require_joints(manifold: Manifold, num_joints: int) -> None:
-    """Refuse a robot with fewer joints than a surface, or a path on it, has coordinates.
+    """Refuse a robot with fewer joints than coordinates of a surface, or of a path on it.
 
     Args:
         manifold: The manifold.
         num_joints: Number of joints of the robot.
 
     Raises:
-        InputError: If it has.
+        InputError: If there are fewer joints.
     """
     names = [coordinate.name for coordinate in manifold.coordinates]
     if num_joints < len(names):

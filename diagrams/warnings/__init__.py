@@ -1,1 +1,1 @@
-"""What is said beforehand of a scenario: where its law will not do what one hopes."""
+"""Warnings before a run of a scenario, about its law, its sensors and its environment."""

@@ -1,4 +1,4 @@
-"""What a load below the force sensor will do to the sensor, and to a compliance that answers."""
+"""Warnings about the load below the force sensor, for the sensor and the compliance loop."""
 
 from dataclasses import dataclass
 
@@ -13,9 +13,9 @@ from diagrams.scenario import (
 )
 from pfsc_drake.control.compliance.measured_wrench import TARING_BLOCK
 from pfsc_drake.control.compliance.tuned_impedance import (
-    bearable_share,
-    carried_share,
     load_inertia,
+    load_inertia_ratio,
+    tolerable_inertia_ratio,
 )
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
@@ -25,9 +25,9 @@ from pfsc_drake.physics.joint_sensors import encoder_resolution
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad
 
-# of the inertia below the sensor at which the loop becomes unstable, up to which it is robust
+# share of the inertia at the stability limit, up to which the loop is robust
 _ROBUST = 0.5
-# of that share; a mass may be chosen that bears it exactly
+# of that share, for a mass chosen exactly at the limit
 _ROUNDING = 1e-6
 # sampling intervals that a loop over the sensor loses: the hold and the filter of the impedance
 _LOST_TICKS = 1.5
@@ -35,12 +35,12 @@ _LOST_TICKS = 1.5
 
 @dataclass(frozen=True)
 class SensorLoop:
-    """What a force sensor feels, and what answers to it.
+    """Loop over a force sensor: sensor, compliance, controller, servos.
 
     Attributes:
         sensor: The sensor.
-        compliance: How the tool yields to what it measures.
-        encoders: From which the tool's inertial load is computed.
+        compliance: Compliance of the tool under measured forces.
+        encoders: Encoders, by which the tool's inertial load is computed.
         controller: The controller.
         servo: Velocity servos behind it, for a law that commands velocities.
     """
@@ -59,12 +59,12 @@ def sensed_load_warnings(
     law: FollowingLaw,
     rest: RestPosture,
 ) -> list[str]:
-    """Return what a load below the sensor will do, one sentence each.
+    """Return warnings about a load below the sensor, one sentence each.
 
     Args:
-        loop: The sensor, and what answers to it.
-        robot: The robot, as it is believed.
-        load: What is believed to hang below the sensor.
+        loop: The loop over the sensor.
+        robot: Nominal model of the robot.
+        load: Nominal load below the sensor.
         law: The law behind the compliance.
         rest: The start, and the manifold's point there.
     """
@@ -83,35 +83,37 @@ def _heavy_load(
     law: FollowingLaw,
     rest: RestPosture,
 ) -> list[str]:
-    """Warn of an inertia that is felt and not taken off, too much for the virtual masses."""
+    """Warn of an uncompensated inertia that is too large for the virtual masses."""
     sensor, coordinates = loop.sensor, law.linearization.manifold.coordinates
     impedance = loop.compliance.impedance()
     kinds = [impedance.of(coordinate.kind) for coordinate in coordinates]
-    # without a stiffness of its own a coordinate yields, too
-    yields = [bool(kind.stiffness.at) or np.isfinite(kind.stiffness.value) for kind in kinds]
-    masses = np.where(yields, [least_of(kind.mass) for kind in kinds], np.inf)
+    # a coordinate without a stiffness of its own is compliant, too
+    complies = [bool(kind.stiffness.at) or np.isfinite(kind.stiffness.value) for kind in kinds]
+    masses = np.where(complies, [least_of(kind.mass) for kind in kinds], np.inf)
     felt = load_inertia(robot, load, rest.q_J, sensor.unknown_mass)
     mass = load.mass + sensor.unknown_mass
     if sensor.inertia != "none":
         felt -= load_inertia(robot, load, rest.q_J)
         mass = sensor.unknown_mass
-    share, worst = carried_share(felt, slope_at_rest(law, rest), masses)
-    bearable = bearable_share(*_lag(loop))
-    if share <= (_ROBUST + _ROUNDING) * bearable:
+    share, worst = load_inertia_ratio(felt, slope_at_rest(law, rest), masses)
+    tolerable = tolerable_inertia_ratio(*_lag(loop))
+    if share <= (_ROBUST + _ROUNDING) * tolerable:
         return []
     unit = "kg m^2" if coordinates[worst].kind is Kind.ROTATIONAL else "kg"
-    needed = masses[worst] * share / (_ROBUST * bearable)
+    needed = masses[worst] * share / (_ROBUST * tolerable)
     kind = coordinates[worst].kind.value
     block = {"eta": "tangential", "xi": "transversal", "phi": "rotational"}.get(kind, kind)
     cure = f"compliance.{block}.mass of {needed:.2g} {unit} or more"
     if sensor.inertia == "none" and load.mass > sensor.unknown_mass:
-        cure = f"sensor.inertia: differentiated, which takes off the {load.mass:.3g} kg, or {cure}"
-    verb = "chatters" if share > bearable else "may chatter where a little more hangs there"
+        cure = (
+            f"sensor.inertia: differentiated, which compensates the {load.mass:.3g} kg, or {cure}"
+        )
+    verb = "is unstable" if share > tolerable else "may oscillate with a slightly larger load"
     return [
-        f"the sensor feels the inertia of {mass:.3g} kg below it, which is not taken off, and the "
-        f"compliance answers: {share / bearable:.2g} times what the mass of {masses[worst]:g} "
-        f"{unit} in {coordinates[worst].name} bears, and with more than {_ROBUST:g} it {verb}: "
-        f"{cure}"
+        f"the sensor measures the inertia of {mass:.3g} kg below it, which is not compensated, and "
+        f"the compliance responds: {share / tolerable:.2g} times the inertia that the mass of "
+        f"{masses[worst]:g} {unit} in {coordinates[worst].name} tolerates, and with more than "
+        f"{_ROBUST:g} the loop {verb}: {cure}"
     ]
 
 
@@ -127,11 +129,11 @@ def _lag(loop: SensorLoop) -> tuple[float, float]:
 def _noisy_inertia(
     loop: SensorLoop, robot: RobotModel, load: ToolLoad, rest: RestPosture
 ) -> list[str]:
-    """Warn of encoders too coarse for what the tool's inertia is computed from."""
+    """Warn of encoders too coarse for the compensation of the tool's inertia."""
     sensor, encoders = loop.sensor, loop.encoders
     if not encoders.difference_quotient or sensor.inertia == "none":
         return []
-    # one increment within a block changes its mean acceleration by so much
+    # change of the mean acceleration of a block by one increment
     link, _ = encoder_resolution(robot, encoders)
     change = link / (loop.controller.sampling_time * TARING_BLOCK)
     levers = np.sqrt(load.mass * np.diag(load_inertia(robot, load, rest.q_J)))
@@ -141,6 +143,6 @@ def _noisy_inertia(
     return [
         "the tool's inertial load comes from the second difference of encoder positions, where "
         f"one increment is {noise:.2g} N; with more than sensor.taring_spread = {allowed:g} N it "
-        "may never be tared, and what would yield rests: filter the velocities "
+        "may never be tared, and compliant coordinates stay at rest: filter the velocities "
         "(encoders.filter_time) or take sensor.inertia 'none'"
     ]

@@ -1,4 +1,4 @@
-"""What is said beforehand of links that are outside of the capsules by which distances are told."""
+"""Warning about links outside of the capsules that model the arm's distance from obstacles."""
 
 import itertools
 
@@ -13,21 +13,21 @@ from pfsc_drake.geometry.segments import to_point
 from pfsc_drake.robot.serial.outline import outline_points
 from pfsc_drake.systems.drawing.robot_visualizer import BodyPart, Triangles
 
-# m, by which a link may be outside without a word; rad or m, by which joints are bent
+# m, by which a link may be outside without a warning; rad or m, by which joints are bent
 _ROUNDING, _BENT = 1e-3, 0.1
-# directions round an axis in which the rim of a round part is looked at
+# directions round an axis in which the rim of a round part is sampled
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
 
 
 def uncovered_links(part: Arm, drawn: list[BodyPart], ahead: ArmAhead) -> list[str]:
-    """Return which links are outside of the capsules of an arm, one sentence or none.
+    """Return the links that are outside of the capsules of an arm, in one sentence or none.
 
-    It is looked at with all joints at zero. What is before the second joint is left out, as it is
-    of the capsules.
+    They are checked with all joints at zero. Links before the second joint are left out, since the
+    capsules leave them out too.
 
     Args:
-        part: The arm as it is simulated.
-        drawn: What it looks like.
+        part: The simulated arm.
+        drawn: Its visual geometry.
         ahead: Its capsules.
     """
     outline, q_J = ahead.outline, np.zeros(ahead.chain.dimension)
@@ -40,28 +40,28 @@ def uncovered_links(part: Arm, drawn: list[BodyPart], ahead: ArmAhead) -> list[s
             points = (pose @ shown.X_BP @ _corners(shown.form).T).T
             name = shown.body.name()
             farthest[name] = max(farthest.get(name, 0.0), _distances(points, axis).max())
-    told = [
+    uncovered = [
         f"{name} {distance:.3g} m"
         for name, distance in farthest.items()
         if distance > outline.radius + _ROUNDING
     ]
-    if not told:
+    if not uncovered:
         return []
     return [
         f"obstacles.watch.arm_radius = {outline.radius:g} m; as far from the arm's axis are "
-        f"{', '.join(told)}: no margin is kept from what is farther than the radius"
+        f"{', '.join(uncovered)}: the margin does not hold for parts farther away than the radius"
     ]
 
 
 def _poses(part: Arm, drawn: list[BodyPart], q_J: np.ndarray) -> list[RigidTransform]:
-    """Return the poses of the bodies of drawn parts, the arm being at rest."""
+    """Return the poses of the bodies of drawn parts, for an arm at rest."""
     context = part.model.CreateDefaultContext()
     part.model.SetPositionsAndVelocities(context, part.state_at_rest(q_J))
     return [part.model.EvalBodyPoseInWorld(context, each.body) for each in drawn]
 
 
 def _corners(form: Shape | Triangles) -> np.ndarray:
-    """Return points between which a form is, shape (n, 3) [m]."""
+    """Return points whose convex hull contains a form, shape (n, 3) [m]."""
     if isinstance(form, Triangles):
         return form.vertices
     if isinstance(form, Mesh | Convex):

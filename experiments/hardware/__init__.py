@@ -1,1 +1,1 @@
-"""Robots and controllers in two processes: a simulated robot, and what drives one."""
+"""Robot and controller in two processes: a simulated robot, and control by messages."""

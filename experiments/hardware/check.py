@@ -1,40 +1,40 @@
-"""Limits of a drive, and the checks of a robot before anything moves."""
+"""Limits of a driven robot, and checks before it moves."""
 
 import time
 from dataclasses import replace
 
 import numpy as np
 
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEndpoint
 from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus
 from pfsc_drake.errors import InputError
 
 AT_REST = 0.01  # rad/s or m/s
 AT_START = 0.02  # rad or m
-# how long no status may come [s], and how many may be missing in a row and are made up for
+# longest time without status [s], and number of consecutive missing ones that are bridged
 SILENCE, BRIDGED = 0.1, 10
-# after which a robot that is to stop is left alone, and how long it rests before [s]
+# longest stop, after which commands end, and rest before that [s]
 LONGEST_STOP, RESTED_FOR = 2.0, 0.2
-# a stop that makes the robot faster than this is none: a multiple of its speed, and more [rad/s]
+# a failed stop exceeds a multiple of the initial speed plus an offset [rad/s]
 STOP_FACTOR, STOP_SPEED = 1.5, 0.2
-# beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
+# jump of a position: factor of the largest speed, default largest speed, and noise
 TWICE, FASTEST, LEAST_JUMP = 2.0, 10.0, 2e-3
-# ticks that are missing for longer are none of a robot's: its clock was set [s]
+# a larger gap is a change of the robot's clock [s]
 LARGEST_GAP = 1.0
 FOREIGN = "another sender commands the robot"
 _LISTENED, _FOREIGN = 0.5, 0.1  # s
 
 
 def check_first(status: RobotStatus, mode: ControlMode, start: np.ndarray) -> None:
-    """Refuse a robot that is not that of a scenario, at rest at its start.
+    """Reject a robot that is not the scenario's, at rest at its start.
 
     Args:
         status: The robot's first status.
-        mode: What the law commands.
+        mode: Kind of the law's commands.
         start: Joint coordinates at the start, shape (N,).
 
     Raises:
-        InputError: One line that says what is, and what must be.
+        InputError: With the actual and the required value.
     """
     check_ready(status, mode, len(start))
     off = status.q - start
@@ -49,15 +49,15 @@ def check_first(status: RobotStatus, mode: ControlMode, start: np.ndarray) -> No
 
 
 def check_ready(status: RobotStatus, mode: ControlMode, count: int) -> None:
-    """Refuse a robot that cannot be driven, is another one, or moves.
+    """Reject a robot that cannot be driven, is a different one, or moves.
 
     Args:
-        status: What it tells.
-        mode: What it is to be commanded by.
-        count: How many joints the scenario's robot has.
+        status: Its status.
+        mode: Kind of the commands.
+        count: Number of joints of the scenario's robot.
 
     Raises:
-        InputError: One line that says what is, and what must be.
+        InputError: With the actual and the required value.
     """
     if status.robot_mode is not RobotMode.MOVE:
         raise InputError(
@@ -81,11 +81,11 @@ def check_ready(status: RobotStatus, mode: ControlMode, count: int) -> None:
 
 
 def check_joints(status: RobotStatus, count: int) -> None:
-    """Refuse a robot with another number of joints.
+    """Reject a robot with another number of joints.
 
     Args:
-        status: What it tells.
-        count: How many joints the scenario's robot has.
+        status: Its status.
+        count: Number of joints of the scenario's robot.
 
     Raises:
         InputError: If it has another number.
@@ -94,16 +94,16 @@ def check_joints(status: RobotStatus, count: int) -> None:
         raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {count}")
 
 
-def check_alone(end: ControllerEnd) -> None:
-    """Refuse a robot that another sender commands.
+def check_alone(end: ControllerEndpoint) -> None:
+    """Reject a robot with commands from another sender.
 
     Args:
         end: The link.
 
     Raises:
-        InputError: If commands are heard within 0.1 s that were not sent from here.
+        InputError: If commands of another sender are received within 0.1 s.
     """
-    end.receive(0.0)  # what came while nobody listened
+    end.receive(0.0)  # discard old messages
     end.foreign, until = 0, time.monotonic() + _FOREIGN
     while (left := until - time.monotonic()) > 0.0:
         end.receive(left)
@@ -114,8 +114,8 @@ def check_alone(end: ControllerEnd) -> None:
         )
 
 
-def listen(end: ControllerEnd, period: float) -> RobotStatus:
-    """Return the mean of what a robot at rest tells for half a second.
+def listen(end: ControllerEndpoint, period: float) -> RobotStatus:
+    """Return the mean status of a robot at rest over half a second.
 
     Args:
         end: The link.

@@ -1,4 +1,4 @@
-"""A controller that drives a robot by messages: one tick for each status that comes."""
+"""Control of a robot by messages: one tick for each received status."""
 
 import time
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ from experiments.hardware.drive_inputs import DriveInputs
 from experiments.results.run_log import RunLog
 from experiments.simulation import SimulationResult
 from pfsc_drake.controller.tasks.space_task import SpaceTask
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEndpoint
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
 from pfsc_drake.physics.driver import torque_rates
 from pfsc_drake.robot.robot_model import gravity_function
 
-# where the reference remembers its own time and its pace
-PACE = "controller.reference_generator.pace"
-# largest rate of commanded torques, as drivers have it [Nm/s], and share of a joint's effort limit
+# state of the reference with its own time and its speed scaling
+SPEED_SCALING = "controller.reference_generator.pace"
+# largest rate of commanded torques, as in drivers [Nm/s], and share of a joint's effort limit
 _TORQUE_RATE, _EFFORT_SHARE = 1000.0, 0.95
 _US = 1e6
 _FAULT = "a fault"
@@ -40,15 +40,15 @@ _SECOND = 1000  # ticks
 
 @dataclass
 class DrivenTick:
-    """What is noted of one tick.
+    """Record of one tick.
 
     Attributes:
-        age: Time from its status to its answer [s]; NaN where there was no status.
-        missed: 1 where there was none.
-        clipped: How many joints were told less than the law wanted.
-        robot_mode: What the robot does.
-        sent: What it was told, shape (N,).
-        override: Share of the planned pace that was asked for.
+        age: Time from its status to its command [s]; NaN without a status.
+        missed: 1 without a status.
+        clipped: Number of joints with limited commands.
+        robot_mode: Mode of the robot.
+        sent: Command, shape (N,).
+        override: Requested speed scaling.
     """
 
     age: float
@@ -60,32 +60,32 @@ class DrivenTick:
 
 
 class Drive:
-    """A station's controller, advanced by what a robot tells.
+    """Controller of a station, advanced by the status messages of a robot.
 
     Args:
-        station: A station whose robot stands elsewhere.
+        station: A station for a robot in another process.
         end: The link.
-        override: Share of its planned pace at which the reference moves at first.
+        override: Initial speed scaling of the reference.
 
     Attributes:
         period: Sampling time [s].
-        mode: What the robot is commanded by.
-        limit: Largest torques that are sent [Nm or N], shape (N,).
-        rate: How fast they may change [Nm/s or N/s], shape (N,).
-        inputs: What the station receives.
-        ticks: What is noted of each tick.
-        fault: Why it ended, or None.
-        override: Share of its planned pace at which the reference is to move.
-        fastest_pace: Largest share of the planned pace.
-        motion_time: How far it is in the time of the motion as planned [s].
-        has_motion: Whether the reference moves by itself, not because a hand leads the tool.
+        mode: Kind of the commands.
+        limit: Largest commanded torques [Nm or N], shape (N,).
+        rate: Their largest rates [Nm/s or N/s], shape (N,).
+        inputs: Inputs of the station.
+        ticks: Records of the ticks.
+        fault: Reason of the end, or None.
+        override: Requested speed scaling of the reference.
+        largest_scaling: Largest speed scaling.
+        motion_time: Time in the planned motion [s].
+        has_motion: Whether the reference moves by itself, not by hand guiding.
     """
 
-    def __init__(self, station: Station, end: ControllerEnd, override: float = 1.0) -> None:
+    def __init__(self, station: Station, end: ControllerEndpoint, override: float = 1.0) -> None:
         assert isinstance(station.part, RemoteArm)
         self._station, self._part, self._end = station, station.part, end
         self.inputs, self.ticks = DriveInputs(station), list[DrivenTick]()
-        robot = station.part.belief.robot
+        robot = station.part.nominal_model.robot
         self._n, self.period = robot.dimension, station.controller.period
         self._weight = gravity_function(robot)
         effort = robot.gather("effort_limit")
@@ -99,11 +99,11 @@ class Drive:
         self._stopping: str | None = None
         self._stop_time, self._stop_speed = 0.0, np.inf
         self.fault: str | None = None
-        self.fastest_pace, plan = LARGEST_OVERRIDE, station.task.drive_plan
+        self.largest_scaling, plan = LARGEST_OVERRIDE, station.task.drive_plan
         if plan is not None:
             r = station.law.linearization.relative_degree
-            self.fastest_pace = min(LARGEST_OVERRIDE, plan.fastest_pace(r))
-        self.override, self.motion_time = min(override, self.fastest_pace), 0.0
+            self.largest_scaling = min(LARGEST_OVERRIDE, plan.largest_scaling(r))
+        self.override, self.motion_time = min(override, self.largest_scaling), 0.0
         self.has_motion = not isinstance(station.task, SpaceTask)
 
     @property
@@ -113,11 +113,11 @@ class Drive:
 
     @property
     def time(self) -> float:
-        """Time since the first status, as the robot counts it [s]."""
+        """Time since the first status by the robot's clock [s]."""
         return self._tick * self.period
 
     def begin(self, status: RobotStatus) -> np.ndarray:
-        """Check a robot before anything moves, and return what it would be told first, shape (N,).
+        """Check a robot before it moves, and return the first command, shape (N,).
 
         Args:
             status: Its first status.
@@ -128,17 +128,17 @@ class Drive:
         check_first(status, self.mode, self._station.start_posture)
         self._first = status
         self._station.set_start(self.root)
-        self._tell(self._state(status), status.torque)
+        self._set_inputs(self._state(status), status.torque)
         self._part.set_override(self.root, self.override)
         self._simulator.Initialize()
-        return self._wanted()
+        return self._command()
 
     def answer(self, status: RobotStatus, received: float | None = None) -> None:
-        """Go on by the tick that a status tells of, and send what the robot is to do.
+        """Advance to the tick of a status, and send the command.
 
         Args:
             status: The status.
-            received: When it came, by ``time.perf_counter`` [s].
+            received: Its arrival time by ``time.perf_counter`` [s].
         """
         assert self._first is not None
         received = time.perf_counter() if received is None else received
@@ -156,17 +156,17 @@ class Drive:
         self._bridge(state, missed, status)
         if missed > BRIDGED:
             self.stop(f"no status of the robot for {1e3 * missed * self.period:.0f} ms")
-        self._tell(state, status.torque)
+        self._set_inputs(state, status.torque)
         q = state[: self._n]
         self._q = np.where(np.isfinite(q), q, self._q)
-        # the answer first, and what is to be remembered and logged afterwards
+        # send the command first, update and log afterwards
         before = self.root.get_time()
         self.root.SetTime(self.time)
-        wanted = self._wanted()
-        values, clipped = self._within_limits(wanted)
+        command = self._command()
+        values, clipped = self._within_limits(command)
         if not np.isfinite(values).all():
             self.root.SetTime(before)
-            self.lose("the controller wants what is no finite number")
+            self.lose("the controller's command is not finite")
             return
         faulty = self._station.controller.fault(self._station.blocks, self.root)
         if faulty and self._stopping is None:
@@ -181,21 +181,21 @@ class Drive:
         self.inputs.keep(state, status.torque)
         self._look(status, state)
 
-    def heed(self, request: Request) -> None:
-        """Do what somebody asks for, from the next tick on.
+    def handle_request(self, request: Request) -> None:
+        """Apply a request from the next tick on.
 
         Args:
-            request: What.
+            request: The request.
         """
         if request.override is not None:
-            self.override = min(request.override, self.fastest_pace)
+            self.override = min(request.override, self.largest_scaling)
             self._part.set_override(self.root, self.override)
-        self.inputs.hear_obstacles(request, self.time)
+        self.inputs.receive_obstacles(request, self.time)
         if request.stop:
-            self.stop("asked to stop")
+            self.stop("stop requested")
 
     def progress(self) -> dict[str, float]:
-        """Return how far it is and how well it goes, numbers by name for who watches."""
+        """Return progress and state as numbers by name, for monitoring."""
         last = self.ticks[-1]
         layout, law = self._station.law.layout, self._station.law.linearization
         names = [coordinate.name for coordinate in law.manifold.coordinates]
@@ -214,10 +214,10 @@ class Drive:
         }
 
     def stop(self, why: str) -> None:
-        """Let the controller bring the robot to rest, and end then.
+        """Let the controller bring the robot to rest, then end.
 
         Args:
-            why: What is said of it.
+            why: Reason for messages.
         """
         if self._stopping is None:
             self._begin_stop(why)
@@ -232,7 +232,7 @@ class Drive:
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing more is to be sent: the robot's driver damps then."""
+        """Whether commands have ended, so that the robot's driver damps it."""
         if self.fault is not None:
             return True
         if self._stopping is None:
@@ -241,31 +241,31 @@ class Drive:
         return long or self._resting * self.period > RESTED_FOR
 
     def lose(self, why: str) -> None:
-        """End at once: there is no robot that would hear.
+        """End immediately, without a stop.
 
         Args:
-            why: What is said of it.
+            why: Reason for messages.
         """
         self.fault = why
 
     def result(self, wall: float) -> SimulationResult:
-        """Return what came of it.
+        """Return the result of the run.
 
         Args:
-            wall: How long it took [s].
+            wall: Wall clock time [s].
         """
         found = self._station.found_fault(self.root)
-        said, since = self.fault, None
+        reason, since = self.fault, None
         if found is not None:
-            said, since = found.sentence, found.time
-        if self._stopping is not None and said is not None and self._stopping != _FAULT:
-            said = self._stopping
+            reason, since = found.sentence, found.time
+        if self._stopping is not None and reason is not None and self._stopping != _FAULT:
+            reason = self._stopping
         if self.fault is not None:
-            said = self.fault
-        return SimulationResult(self.root, self.time / max(wall, 1e-9), said, since)
+            reason = self.fault
+        return SimulationResult(self.root, self.time / max(wall, 1e-9), reason, since)
 
     def add_to(self, log: RunLog) -> None:
-        """Add what was noted of the ticks to the log of a run.
+        """Add the records of the ticks to the log of a run.
 
         Args:
             log: The log.
@@ -282,69 +282,69 @@ class Drive:
         """Return ``[q_J, v_J, q_M, v_M]`` of a status, shape (4N,)."""
         return np.concatenate([status.q, status.v, status.q, status.v])
 
-    def _tell(self, state: np.ndarray, torque: np.ndarray) -> None:
-        self.inputs.tell(self.root, self.time, state, torque, self._end.wrench)
+    def _set_inputs(self, state: np.ndarray, torque: np.ndarray) -> None:
+        self.inputs.set_inputs(self.root, self.time, state, torque, self._end.wrench)
 
-    def _wanted(self) -> np.ndarray:
-        """Return what the robot is to be told: torques without the weight, or velocities."""
+    def _command(self) -> np.ndarray:
+        """Return the command to the robot: torques without gravity, or velocities."""
         drive = self._station.controller.drive(self._station.blocks, self.root)
         if self.mode is ControlMode.VELOCITY:
             return drive
         return drive - self._weight(self._q).full().ravel()
 
-    def _within_limits(self, wanted: np.ndarray) -> tuple[np.ndarray, int]:
-        """Return what is sent, and in how many joints that is less."""
+    def _within_limits(self, command: np.ndarray) -> tuple[np.ndarray, int]:
+        """Return the limited command, and the number of limited joints."""
         if self.mode is ControlMode.VELOCITY:
-            return wanted, 0
-        values = np.clip(wanted, -self.limit, self.limit)
+            return command, 0
+        values = np.clip(command, -self.limit, self.limit)
         if self._sent is not None:
             most = self.rate * self.period
             values = self._sent + np.clip(values - self._sent, -most, most)
-        return values, int(np.count_nonzero(np.abs(values - wanted) > 1e-9))
+        return values, int(np.count_nonzero(np.abs(values - command) > 1e-9))
 
     def _bridge(self, state: np.ndarray, missed: int, status: RobotStatus) -> None:
-        """Let the controller see, tick by tick, what the robot may have done in between.
+        """Advance the controller through missed ticks with an interpolated motion of the robot.
 
-        Positions are cubic in time, and velocities their rates: what contradicts itself would be
-        a fault, and a stop would begin where the robot was then.
+        Positions are cubic in time, velocities their rates: inconsistent values would cause a
+        fault, and a stop would begin at a wrong position.
         """
         for k in range(1, missed + 1):
             share, span = k / (missed + 1), (missed + 1) * self.period
-            self._tell(*self.inputs.between(state, status.torque, share, span))
-            held = np.zeros(self._n) if self._sent is None else self._sent
-            self._advance(DrivenTick(np.nan, 1, 0, int(status.robot_mode), held, self.override))
+            self._set_inputs(*self.inputs.between(state, status.torque, share, span))
+            last = np.zeros(self._n) if self._sent is None else self._sent
+            self._advance(DrivenTick(np.nan, 1, 0, int(status.robot_mode), last, self.override))
 
     def _advance(self, tick: DrivenTick) -> None:
         self.ticks.append(tick)
-        # beyond the tick, so that it is logged with what was measured at it
+        # beyond the tick, so that it is logged with its measurements
         self._simulator.AdvanceTo((self._tick + 0.5) * self.period)
         self._tick += 1
-        self.motion_time += self.period * self._pace()
+        self.motion_time += self.period * self._speed_scaling()
 
-    def _pace(self) -> float:
-        """Return the pace of the reference, as its filter has it."""
+    def _speed_scaling(self) -> float:
+        """Return the filtered speed scaling of the reference."""
         if not self.has_motion:
             return 1.0
-        return float(self._station.blocks.state(self.root, PACE)[1])
+        return float(self._station.blocks.state(self.root, SPEED_SCALING)[1])
 
     def _look(self, status: RobotStatus, state: np.ndarray) -> None:
-        """Stop where nobody leads any more, end where the robot does not do what it is told."""
+        """Stop if the leader is lost; end if the robot does not follow commands."""
         leader = self._station.leader
         if leader is not None and leader.is_lost:
-            self.stop(f"no word of the leader for {leader.patience:g} s")
+            self.stop(f"no message of the leader for {leader.patience:g} s")
         if status.robot_mode is not RobotMode.MOVE:
             self.lose(f"the robot went into mode {status.robot_mode.name}")
         speed = np.abs(state[self._n : 2 * self._n]).max()
         if speed > self._stop_speed:
             why = self._stopping if self._stopping != _FAULT else self.result(1.0).fault
-            self.lose(f"{why}; the stop made the robot faster, and was left to its driver")
+            self.lose(f"{why}; the stop accelerated the robot and was left to its driver")
             self._end.send(RobotCommand(status.utime, self.mode, np.zeros(self._n)))
-        # a joint whose speed is no number does not tell that it rests
+        # a joint with NaN velocity does not count as resting
         self._resting = self._resting + 1 if speed <= AT_REST else 0
 
 
 def command_mode(station: Station) -> ControlMode:
-    """Return what a station's law commands a robot by.
+    """Return the kind of a law's commands, torque or velocity.
 
     Args:
         station: The station.

@@ -1,9 +1,9 @@
-"""What a controller that drives a robot receives: joint state, torques, forces, obstacles."""
+"""Inputs of a controller that drives a robot: joint state, torques, forces, obstacles."""
 
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.environment.measured_obstacles import TOLD
+from diagrams.environment.measured_obstacles import REPORTED
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
 from experiments.hardware.check import FASTEST, LEAST_JUMP, TWICE
@@ -11,23 +11,23 @@ from pfsc_drake.drivers.remote_values import Request
 
 
 class DriveInputs:
-    """Inputs of a station whose robot stands elsewhere.
+    """Inputs of a station for a robot in another process.
 
-    As long as no message has told of obstacles, and where the last one is older than the watch
-    reckons with, they are NaN: the motion waits.
+    Obstacles are NaN, so that the motion waits, before their first message, and if the last one is
+    older than the watch's latency.
 
     Args:
         station: The station.
 
     Attributes:
         state: Joint state of the last tick, ``[q, v, q, v]``, shape (4N,).
-        fastest: Speeds that no joint can have [rad/s or m/s], shape (N,).
+        fastest: Speeds beyond any joint's [rad/s or m/s], shape (N,).
     """
 
     def __init__(self, station: Station) -> None:
         assert isinstance(station.part, RemoteArm)
         self._part = station.part
-        robot = station.part.belief.robot
+        robot = station.part.nominal_model.robot
         speed = robot.gather("velocity_limit")
         self.fastest = TWICE * np.where(np.isfinite(speed), speed, FASTEST)
         self.state, self._torque = np.zeros(4 * robot.dimension), np.zeros(robot.dimension)
@@ -35,17 +35,17 @@ class DriveInputs:
         self._obstacles, self._latency, self._until = None, 0.0, -np.inf
         crossing = station.crossing
         if crossing is not None:
-            self._obstacles = station.diagram.GetSubsystemByName(TOLD)
+            self._obstacles = station.diagram.GetSubsystemByName(REPORTED)
             self._latency = crossing.watch.latency
             self._unknown = np.full(6 * len(crossing.moving), np.nan)
             self._values = self._unknown
 
-    def hear_obstacles(self, request: Request, time: float) -> None:
-        """Take over what a message tells of obstacles, if it does.
+    def receive_obstacles(self, request: Request, time: float) -> None:
+        """Update obstacles from a message, if it has any.
 
         Args:
             request: The message.
-            time: When it is heard, as the robot counts it [s].
+            time: Time of arrival by the robot's clock [s].
         """
         if self._obstacles is None or not request.obstacles:
             return
@@ -56,33 +56,33 @@ class DriveInputs:
     def without_jumps(
         self, state: np.ndarray, period: float, ticks: float
     ) -> tuple[np.ndarray, str | None]:
-        """Return a state without positions that have jumped farther than joints can move.
+        """Return a state without positions that jumped farther than joints can move.
 
-        Where one encoder stands for both sides of a joint, nothing else tells whether its position
-        or its velocity is wrong. A joint that has jumped is lost: its positions are NaN from then.
+        With a single encoder per joint, no other measurement shows whether position or velocity is
+        wrong. A joint that jumped is lost: its positions are NaN from then on.
 
         Args:
-            state: Joint state that a status tells, shape (4N,).
+            state: Joint state of a status, shape (4N,).
             period: Sampling time [s].
             ticks: Number of sampling intervals since the last state; infinite if this is the first.
 
         Returns:
-            The state, shape (4N,), and what is said of a joint that has jumped, or None.
+            State, shape (4N,), and a message about a joint that jumped, or None.
         """
         n = len(self._lost)
         with np.errstate(invalid="ignore"):
             step = np.abs(state[:n] - self.state[:n])
             jumped = (step > self.fastest * period * ticks + LEAST_JUMP) & ~self._lost
-        said = None
+        message = None
         if jumped.any():
             joint = int(np.flatnonzero(jumped)[0])
             self._lost |= jumped
-            said = (
+            message = (
                 f"joint {joint + 1} jumped by {np.rad2deg(step[joint]):.3g} deg from one status to "
                 "the next, faster than it can move"
             )
         is_position = np.tile(np.repeat([1, 0], n), 2)
-        return np.where(is_position * np.tile(self._lost, 4), np.nan, state), said
+        return np.where(is_position * np.tile(self._lost, 4), np.nan, state), message
 
     def between(
         self, state: np.ndarray, torque: np.ndarray, share: float, span: float
@@ -99,10 +99,10 @@ class DriveInputs:
         return state_between(self.state, state, share, span), torques
 
     def keep(self, state: np.ndarray, torque: np.ndarray) -> None:
-        """Remember joint state and torques of a tick, shapes (4N,) and (N,)."""
+        """Store joint state and torques of a tick, shapes (4N,) and (N,)."""
         self.state, self._torque = state, torque
 
-    def tell(
+    def set_inputs(
         self,
         root: Context,
         time: float,
@@ -114,12 +114,12 @@ class DriveInputs:
 
         Args:
             root: Context of the diagram.
-            time: Now, as the robot counts it [s].
+            time: Current time by the robot's clock [s].
             state: Joint state, shape (4N,).
             torque: Torques of the joints, shape (N,).
-            wrench: Force and torque on the sensor, shape (6,), if any came.
+            wrench: Force and torque on the sensor, shape (6,), or None.
         """
-        self._part.tell(root, state, torque)
+        self._part.set_measurement(root, state, torque)
         values = {}
         if self._obstacles is not None:
             values[self._obstacles] = self._values if time <= self._until else self._unknown
@@ -134,8 +134,8 @@ def state_between(before: np.ndarray, after: np.ndarray, share: float, span: flo
     """Return the joint state at a share of a span of time, positions being cubic in it.
 
     Args:
-        before: ``[q, v, q, v]`` where it begins, shape (4N,).
-        after: The same where it ends.
+        before: ``[q, v, q, v]`` at its beginning, shape (4N,).
+        after: ``[q, v, q, v]`` at its end, shape (4N,).
         share: 0 to 1.
         span: The time between both [s].
     """
@@ -143,8 +143,8 @@ def state_between(before: np.ndarray, after: np.ndarray, share: float, span: flo
     q_1, v_1 = np.split(after, 4)[:2]
     rest = 1.0 - share
     square = share * share
-    ways = (square * (3.0 - 2.0 * share), span * share * (rest * rest), span * square * rest)
+    weights = (square * (3.0 - 2.0 * share), span * share * (rest * rest), span * square * rest)
     rates = (6.0 * share * rest / span, rest * (1.0 - 3.0 * share), share * (1.0 - 3.0 * rest))
-    q = q_0 + ways[0] * (q_1 - q_0) + ways[1] * v_0 - ways[2] * v_1
+    q = q_0 + weights[0] * (q_1 - q_0) + weights[1] * v_0 - weights[2] * v_1
     v = rates[0] * (q_1 - q_0) + rates[1] * v_0 + rates[2] * v_1
     return np.concatenate([q, v, q, v])

@@ -1,4 +1,4 @@
-"""From a scenario to a robot that is driven by it, and to the page of the run."""
+"""Runs of a robot driven by a scenario, with results."""
 
 import os
 import time
@@ -26,32 +26,32 @@ from experiments.simulation import SimulationResult
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import check_mode
 from pfsc_drake.drivers.layout import UdpmAddress
-from pfsc_drake.drivers.link import ControllerEnd, RequestEnd
+from pfsc_drake.drivers.link import ControllerEndpoint, RequestEndpoint
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.reading import resolve_files
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import check_folder, open_results
-from reporting.interruption import noticed_interruption
+from reporting.interruption import watch_interruption
 from reporting.progress import ProgressListener
 
 _FIRST_STATUS = 5.0  # s
 NATIVE = "native"  # folder of a controller in C, beside the results
 _LEAST_OVERRIDE = 0.01
-# how often who watches is told [s]
-_TOLD = 0.05
-_MEASURED = "all signals, those of the tool and the path too, follow from what the robot measured"
+# period of progress messages [s]
+_REPORT_PERIOD = 0.05
+_MEASURED = "all signals, also of tool and path, are based on the robot's measurements"
 
 
 @dataclass(frozen=True)
 class DriveOptions:
-    """How a robot is driven, and what is drawn of it.
+    """Options of a driven run.
 
     Attributes:
-        duration: How long it is driven [s], instead of the scenario's time.
-        override: Share of its planned pace at which the reference moves at first, 0.01 to 1.5.
-        native: Whether the controller drives in C, compiled with gcc first.
+        duration: Duration [s] instead of the scenario's.
+        override: Initial speed scaling of the reference, 0.01 to 1.5.
+        native: Whether the controller runs as C code, compiled with gcc first.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
     """
@@ -68,11 +68,11 @@ class DriveOptions:
 
 @dataclass(frozen=True)
 class FirstCommand:
-    """What a robot would be told first.
+    """First command to a robot.
 
     Attributes:
-        kind: What it is.
-        values: Of each joint, shape (N,).
+        kind: Kind of the command.
+        values: Value of each joint, shape (N,).
     """
 
     kind: str
@@ -86,21 +86,21 @@ def prepare_driven(
     recording: bool,
     progress: ProgressListener,
 ) -> PreparedRun:
-    """Build a scenario's controller for a robot that stands elsewhere.
+    """Build a scenario's controller for a robot in another process.
 
     Args:
         scenario: The scenario as read.
-        duration: How long it drives [s], instead of the scenario's time.
+        duration: Duration [s] instead of the scenario's.
         recording: Whether the motion will be recorded.
-        progress: Told what goes on.
+        progress: Progress listener.
 
     Raises:
-        InputError: If the scenario is wrong, or is nothing for a robot elsewhere.
+        InputError: If the scenario is wrong, or not possible for a robot in another process.
     """
-    given = load_typed(Scenario, scenario.data, str(scenario.path))
+    parameters = load_typed(Scenario, scenario.data, scenario.source)
     folder = scenario.path.parent
-    with naming(scenario.path):
-        settings, said = driven(given)
+    with naming(scenario.source):
+        settings, messages = driven(parameters)
         progress(0.0, "building the controller")
         station = build_station(settings, folder, remote=True)
         settle(settings, scenario.name, station, duration, recording=recording)
@@ -108,21 +108,23 @@ def prepare_driven(
     resolve_files(settings, folder)
     text = dump_typed(settings)
     by_robot = Integration("none", station.controller.period, "the robot moves by itself")
-    return PreparedRun(settings, text, station, by_robot, drawing, [_MEASURED, *said, *warnings])
+    return PreparedRun(
+        settings, text, station, by_robot, drawing, [_MEASURED, *messages, *warnings]
+    )
 
 
 def _begin(
     scenario: ScenarioFile,
-    end: ControllerEnd,
+    end: ControllerEndpoint,
     out: Path,
     options: DriveOptions,
     progress: ProgressListener,
 ) -> tuple[PreparedRun, Drive, np.ndarray, UdpmAddress | None]:
-    """Prepare a drive, wait for its robot and check both; nothing is sent.
+    """Prepare a controller, wait for its robot and check both; nothing is sent.
 
     Returns:
-        What was prepared; the controller; what the robot is told first, shape (N,); and the address
-        of the bus for a controller in C.
+        The prepared run; the controller; the first command, shape (N,); and the address of the bus
+        for a controller in C.
     """
     address = check_native(end, out / NATIVE) if options.native else None
     prepared = prepare_driven(
@@ -130,11 +132,13 @@ def _begin(
     )
     station, override = prepared.station, options.override
     if options.native and station.leader is not None:
-        raise InputError("--native: a controller in C hears no leader; allowed: a drive without it")
+        raise InputError(
+            "--native: not possible with a leader device; allowed: drive without --native"
+        )
     drive = Drive(station, end, override)
     if drive.override != override:
         prepared.warnings.append(
-            f"the override is {drive.override:.0%}, not {override:.0%}: the drives can do no more"
+            f"the override is limited from {override:.0%} to {drive.override:.0%} by the drives"
         )
     check_mode(drive.mode, end.dialect.modes, end.dialect.name)
     progress(0.0, "waiting for the robot")
@@ -150,19 +154,19 @@ def _begin(
 
 def first_command(
     scenario: ScenarioFile,
-    end: ControllerEnd,
+    end: ControllerEndpoint,
     out: Path,
     options: DriveOptions,
     progress: ProgressListener,
 ) -> FirstCommand:
-    """Return what a robot would be told first; nothing is sent or written.
+    """Return the first command to a robot; nothing is sent or written.
 
     Args:
         scenario: The scenario as read.
         end: The link to the robot.
         out: Folder for the results of a drive.
-        options: How it would be driven.
-        progress: Told what goes on.
+        options: Options of the run.
+        progress: Progress listener.
 
     Raises:
         InputError: If the scenario or the robot is wrong.
@@ -174,21 +178,21 @@ def first_command(
 
 def drive_scenario(
     scenario: ScenarioFile,
-    end: ControllerEnd,
+    end: ControllerEndpoint,
     out: Path,
     options: DriveOptions,
     progress: ProgressListener,
-    asked: Callable[[float], list[Request]] = lambda _: [],
+    requests: Callable[[float], list[Request]] = lambda _: [],
 ) -> RunOutcome:
-    """Drive a robot by a scenario, and write everything that a run leaves into a folder.
+    """Drive a robot by a scenario, and write all results into a folder.
 
     Args:
         scenario: The scenario as read.
         end: The link to the robot.
         out: Folder for the results.
-        options: How it is driven.
-        progress: Told how far it is.
-        asked: Returns what a person has asked for since the last time, given the override.
+        options: Options of the run.
+        progress: Progress listener.
+        requests: Returns the operator's requests since the last call, given the override.
 
     Raises:
         InputError: If the scenario or the robot is wrong; nothing has been sent then.
@@ -204,19 +208,19 @@ def drive_scenario(
         project.compile(progress)
         url = end.lcm.get_lcm_url()
         end.leave()
-    with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
+    with watch_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
         progress.expect(duration)
         by, add_to = f"over LCM, {end.dialect.name}", drive.add_to
         if project is None or address is None:
             with steady_clock(), real_time_priority():
-                result = run_drive(drive, end, duration, interrupted, progress, asked)
+                result = run_drive(drive, end, duration, interrupted, progress, requests)
             if end.foreign:
                 count = f"{end.foreign} commands on {end.dialect.command_channel}"
                 prepared.warnings.append(f"{FOREIGN}: {count} were not sent by this controller")
         else:
             operator = Operator(
-                RequestEnd(DrakeLcm(url)), asked, drive.override, drive.fastest_pace
+                RequestEndpoint(DrakeLcm(url)), requests, drive.override, drive.largest_scaling
             )
             left = run_native(project, address, duration, interrupted, progress, operator)
             repeated = RepeatedDrive(
@@ -227,7 +231,7 @@ def drive_scenario(
             )
             result, add_to = repeated.result, repeated.add_to
             by += ", by the controller in C"
-            prepared.warnings.extend([*left.said, *repeated.warnings])
+            prepared.warnings.extend([*left.messages, *repeated.warnings])
         run = FinishedRun(
             prepared,
             scenario.name,
@@ -248,30 +252,30 @@ def drive_scenario(
 
 def run_drive(
     drive: Drive,
-    end: ControllerEnd,
+    end: ControllerEndpoint,
     duration: float,
     interrupted: Callable[[], bool],
     progress: Callable[[float, str], None],
-    asked: Callable[[float], list[Request]] = lambda _: [],
+    requests: Callable[[float], list[Request]] = lambda _: [],
 ) -> SimulationResult:
-    """Drive a robot until the end, a fault, or an interruption, after each of which it rests.
+    """Drive a robot until the end, a fault or an interruption, each followed by rest.
 
     Args:
         drive: The controller, whose first status has been checked.
         end: The link.
-        duration: How long, in the time of the motion as planned [s]: a pause makes it longer.
+        duration: Duration in the time of the planned motion [s]; a pause extends it.
         interrupted: Whether to stop.
-        progress: Told how far it is.
-        asked: Returns what a person has asked for since the last time, given the override.
+        progress: Progress listener.
+        requests: Returns the operator's requests since the last call, given the override.
     """
-    end.receive(0.0)  # what came while nobody listened
+    end.receive(0.0)  # discard old messages
     begin, last = time.perf_counter(), 0.0
     status = end.receive(SILENCE)
     if status is not None:
         drive.begin(status)
     while drive.motion_time < duration + 0.5 * drive.period and not drive.has_ended:
-        for request in [*end.requests(), *asked(drive.override)]:
-            drive.heed(request)
+        for request in [*end.requests(), *requests(drive.override)]:
+            drive.handle_request(request)
         if interrupted():
             drive.stop("interrupted")
         if end.foreign:
@@ -280,18 +284,18 @@ def run_drive(
             drive.lose(f"no status of the robot for {1e3 * SILENCE:.0f} ms")
             break
         drive.answer(status)
-        if drive.time - last > _TOLD:
+        if drive.time - last > _REPORT_PERIOD:
             last = drive.time
-            end.tell(status.utime, drive.progress())
+            end.publish_progress(status.utime, drive.progress())
             progress(drive.motion_time, f"driving at {drive.override:.0%}")
         status = end.receive(SILENCE)
-    end.tell(0, drive.progress() | {"ended": 1.0})
+    end.publish_progress(0, drive.progress() | {"ended": 1.0})
     return drive.result(time.perf_counter() - begin)
 
 
 @contextmanager
 def real_time_priority() -> Iterator[bool]:
-    """Let this process go before others, where that is allowed; tell whether it is."""
+    """Give this process real-time priority if allowed, and return whether it is."""
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))

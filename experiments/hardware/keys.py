@@ -1,4 +1,4 @@
-"""Keys of a terminal while a robot is driven: slower, faster, pause, stop."""
+"""Terminal keys during a driven run: slower, faster, pause, stop."""
 
 import os
 import select
@@ -10,50 +10,49 @@ from contextlib import contextmanager, suppress
 
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Pause, Request
 
-KEYS = "space pauses and goes on, - and + change the speed, q stops the robot"
+KEYS = "space: pause and resume, - and +: speed, q: stop the robot"
 _STEP, _LEAST = 0.1, 0.1
-_LONGEST = 64  # keys at once
+_LONGEST = 64  # keys per read
 
 
 class DriveKeys:
-    """Makes requests of keys.
+    """Translation of keys to requests.
 
-    Space is a pause, and once more the pace before it; ``-`` and ``+`` change the pace by 10 % of
-    the planned one; ``q`` stops the robot. Other keys do nothing.
+    Space pauses and resumes; ``-`` and ``+`` change the speed scaling by 10 %; ``q`` stops the
+    robot. Other keys are ignored.
     """
 
     def __init__(self) -> None:
         self._pause = Pause()
 
     def requests(self, keys: str, override: float) -> list[Request]:
-        """Return what keys ask for.
+        """Return the requests of pressed keys.
 
         Args:
-            keys: Those that were pressed, the first one first.
-            override: Share of the planned pace that is asked for so far.
+            keys: Pressed keys, the first one first.
+            override: Current requested speed scaling.
         """
-        asked = []
+        requests = []
         for key in keys:
             if key == "q":
-                asked.append(Request(stop=True))
+                requests.append(Request(stop=True))
                 continue
             if key == " ":
-                override = self._pause.toggled(override)
+                override = self._pause.toggle(override)
             elif key in "+-":
                 step = _STEP if key == "+" else -_STEP
                 override = min(max(round(override + step, 6), _LEAST), LARGEST_OVERRIDE)
             else:
                 continue
-            asked.append(Request(override))
-        return asked
+            requests.append(Request(override))
+        return requests
 
 
 @contextmanager
 def pressed_keys() -> Iterator[Callable[[], str]]:
-    """Read keys as they are pressed, where the input is a terminal; elsewhere there are none.
+    """Read keys from a terminal without waiting; without a terminal there are none.
 
-    Yields:
-        Returns the keys that were pressed since the last time, without waiting.
+    The context provides a function that returns the keys pressed since its last call.
     """
     if not sys.stdin.isatty():
         yield lambda: ""
@@ -70,5 +69,5 @@ def pressed_keys() -> Iterator[Callable[[], str]]:
         tty.setcbreak(descriptor)
         yield read
     finally:
-        with suppress(termios.error):  # of a terminal that has closed
+        with suppress(termios.error):  # of a closed terminal
             termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

@@ -1,4 +1,4 @@
-"""The operator's side of a teleoperation, in a process of its own, in real time."""
+"""Leader side of a teleoperation in a separate process, in real time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,30 +18,30 @@ from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.checks import require
 from pfsc_drake.control.teleoperation.port import RECORD
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEndpoint
 from pfsc_drake.systems.fuse import fuse_blocks
 from pfsc_drake.yaml.typed import load_typed
 
-_LOOK = 0.1  # s, between looks at what happens
+_LOOK = 0.1  # s, between checks for messages
 
 
 @dataclass(frozen=True)
-class Led:
-    """What a leader did.
+class LeaderSummary:
+    """Summary of a leader's run.
 
     Attributes:
-        duration: How long [s].
-        received: Messages of the follower that were heard.
+        duration: Duration [s].
+        received: Number of messages received from the follower.
         least_tank: Least energy in its tank [J].
-        largest_force: That the hand felt [N].
-        way: Farthest that the tool was led from where it starts [m].
+        largest_force: Largest force on the operator [N].
+        travel: Largest distance of the commanded point from its start [m].
     """
 
     duration: float
     received: int
     least_tank: float
     largest_force: float
-    way: float
+    travel: float
 
 
 def lead_scenario(
@@ -49,40 +49,40 @@ def lead_scenario(
     lcm: DrakeLcmInterface,
     *,
     duration: float | None,
-    tell: Callable[[str], None],
-) -> Led:
-    """Let a scenario's hand hold a leader, whose follower is elsewhere.
+    notify: Callable[[str], None],
+) -> LeaderSummary:
+    """Simulate the operator and the leader device of a scenario; the follower is another process.
 
     Args:
         scenario: The scenario as read.
         lcm: The bus.
-        duration: How long it lasts [s]; None for the scenario's.
-        tell: Told in words what happens.
+        duration: Duration [s]; None for the scenario's.
+        notify: Receives lines about events.
 
     Raises:
-        InputError: If the scenario is wrong, or nothing is led from afar in it.
+        InputError: If the scenario is wrong, or has no teleoperation.
     """
-    settings = load_typed(Scenario, scenario.data, str(scenario.path))
+    settings = load_typed(Scenario, scenario.data, scenario.source)
     period = settings.controller.sampling_time
     builder = DiagramBuilder()
-    with naming(scenario.path):
-        way = settings.teleoperation
-        require(way is not None, "teleoperation", "null", "given where somebody leads from afar")
-        assert way is not None
+    with naming(scenario.source):
+        coupling = settings.teleoperation
+        require(coupling is not None, "teleoperation", "null", "required for a leader process")
+        assert coupling is not None
         lasts = settings.duration if duration is None else duration
         require(lasts > 0.0, "duration", lasts, "a positive number [s]")
         task = make_task(settings, scenario.path.parent)
         start = task.start(np.zeros(3))
-        side = LeaderSide(way, settings.hand, None, task, start, period)
+        side = LeaderSide(coupling, settings.hand, None, task, start, period)
         port, ports = side.add_leader(builder)
-    end = TeleoperationEnd(lcm, "leader")
+    end = TeleoperationEndpoint(lcm, "leader")
     link = builder.AddNamedSystem("follower_link", ChannelEnd(end, period))
     builder.Connect(port.GetOutputPort("message"), link.GetInputPort("sent"))
     builder.Connect(link.GetOutputPort("arrived"), port.GetInputPort("message"))
     log = add_log(builder, ports, period)
     fuse_blocks(builder)
     simulator = Simulator(builder.Build())
-    tell("leading; waiting for a follower")
+    notify("leader ready; waiting for a follower")
     simulator.Initialize()
     heard = False
     with steady_clock():
@@ -90,10 +90,10 @@ def lead_scenario(
             simulator.AdvanceTo(min(float(time), lasts))
             if end.received and not heard:
                 heard = True
-                tell(f"t = {time:.1f} s: a follower is there")
+                notify(f"t = {time:.1f} s: follower connected")
     _, signals = log.read(simulator.get_context())
     record = signals["leader_record"]
-    return Led(
+    return LeaderSummary(
         lasts,
         end.received,
         float(record[:, RECORD["tank"]].min()),

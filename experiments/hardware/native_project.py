@@ -1,4 +1,4 @@
-"""The controller of a driven scenario in C, with the loop that drives a robot by it."""
+"""Export of a driven scenario's controller as C, with the loop that drives the robot."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,14 +14,14 @@ from diagrams.controller_part import controller_part
 from diagrams.robots.remote_arm import RemoteArm
 from experiments.controller_replay import compile_files, missing_tool
 from experiments.hardware import check
-from experiments.hardware.drive import PACE, Drive
+from experiments.hardware.drive import SPEED_SCALING, Drive
 from experiments.hardware.native_record import RecordFormat
 from experiments.preparation import PreparedRun, naming
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.codegen.c_controller import CController
 from pfsc_drake.compiled.c_source import c_source
 from pfsc_drake.drivers.layout import StatusLayout, UdpmAddress, command_layout, wrench_layout
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEndpoint
 from pfsc_drake.drivers.messages import FORCE_TORQUE_CHANNEL, ControlMode, Dialect, RobotMode
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import gravity_function
@@ -30,15 +30,15 @@ from reporting.progress import ProgressListener
 PROGRAM = "drive_lcm"
 _LOOP = Path(pfsc_drake.codegen.__file__).parent / "harness" / "lcm"
 _SETUP = "drive_setup.h"
-PRIORITY = 50  # of who drives, where real-time priority is allowed
+PRIORITY = 50  # real-time priority of the driving process, if allowed
 _HEAD = 8  # bytes of a packet before its channel
-# of :mod:`experiments.hardware.check`, which the loop has to know
+# constants of :mod:`experiments.hardware.check` for the loop
 _LIMITS = (
     *("AT_REST", "AT_START", "SILENCE", "BRIDGED", "LARGEST_GAP", "LEAST_JUMP"),
     *("LONGEST_STOP", "RESTED_FOR", "STOP_FACTOR", "STOP_SPEED"),
 )
-# where drive_told has the controller's inputs
-_TOLD = {
+# members of drive_told for the controller's inputs
+_SOURCES = {
     "joint_state": "joint_state",
     "joint_torque": "joint_torque",
     "measured_wrench": "wrench",
@@ -49,11 +49,11 @@ _TOLD = {
 
 @dataclass(frozen=True)
 class NativeProject:
-    """A controller with its loop, as C.
+    """Controller and loop as a C project.
 
     Attributes:
-        folder: With its files.
-        record: How its record is written.
+        folder: Folder of the files.
+        record: Format of its record.
     """
 
     folder: Path
@@ -61,32 +61,32 @@ class NativeProject:
 
     @property
     def program(self) -> Path:
-        """The loop, once it is compiled."""
+        """The compiled loop."""
         return self.folder / PROGRAM
 
     def compile(self, progress: ProgressListener, optimization: str = "") -> None:
-        """Compile what has changed since the last time, one file after the other.
+        """Compile the changed files, one after the other.
 
         Args:
-            progress: Told what goes on.
-            optimization: Options of the compiler instead of those of the Makefile.
+            progress: Progress listener.
+            optimization: Compiler options that replace the Makefile's.
 
         Raises:
-            InputError: If there is no compiler, or it says anything.
+            InputError: If there is no compiler, or it prints a message.
         """
         compile_files(sorted(self.folder.glob("*.c")), PROGRAM, progress, optimization)
 
 
-def check_native(end: ControllerEnd, folder: Path) -> UdpmAddress:
-    """Refuse what no controller in C can be made or run with, and return the address of a bus.
+def check_native(end: ControllerEndpoint, folder: Path) -> UdpmAddress:
+    """Check the requirements of a controller in C, and return the address of the bus.
 
     Args:
         end: The link.
-        folder: Where the controller is to go.
+        folder: Folder for the controller.
 
     Raises:
-        InputError: If the bus is of another kind, there is no compiler, or the folder holds what
-            somebody else has written.
+        InputError: If the bus is of another kind, there is no compiler, or the folder holds other
+            files.
     """
     lacking = missing_tool()
     if lacking is not None:
@@ -110,22 +110,22 @@ def write_native(
     dialect: Dialect,
     folder: Path,
 ) -> NativeProject:
-    """Write the controller of a scenario for a robot that stands elsewhere, with its loop.
+    """Write a scenario's controller for a robot in another process as C, with its loop.
 
     Args:
         scenario: The scenario as read.
-        prepared: What was made of it.
-        drive: What the loop is to do.
+        prepared: Its prepared run.
+        drive: Python description of the loop.
         dialect: The robot's messages.
-        folder: Where the files go; what has not changed is left alone.
+        folder: Folder for the files; unchanged files are not rewritten.
 
     Raises:
-        InputError: If something in the controller is no block.
+        InputError: If part of the controller is not a block.
     """
     _check_folder(folder)
     settings = deepcopy(prepared.settings)
     settings.simulation.fused = False
-    with naming(scenario.path):
+    with naming(scenario.source):
         station = build_station(settings, scenario.path.parent, remote=True)
         root = station.diagram.CreateDefaultContext()
         station.set_start(root)
@@ -140,19 +140,19 @@ def write_native(
             turning=tuple(station.robot.gather("is_revolute").tolist()),
         )
         inputs = [port["name"] for port in controller.interface()["inputs"]]
-        unknown = [name for name in inputs if name not in _TOLD]
+        unknown = [name for name in inputs if name not in _SOURCES]
         if unknown:
-            raise InputError(f"--native: nobody tells the controller {', '.join(unknown)}")
+            raise InputError(f"--native: inputs without a source: {', '.join(unknown)}")
         files = controller.files()
     assert isinstance(station.part, RemoteArm)
-    robot = station.part.belief.robot
+    robot = station.part.nominal_model.robot
     files |= c_source({"weight": gravity_function(robot)}, "robot")
     status = StatusLayout.of(dialect, robot.dimension)
     record = RecordFormat(robot.dimension, status.size)
     command = command_layout(dialect, drive.mode, robot.dimension)
-    # where the controller's memory has the pace of the reference
-    pace = controller.program.states[PACE].start + 1 if drive.has_motion else 0
-    files[_SETUP] = _header(drive, dialect, status, command, record, pace)
+    # index of the reference's speed scaling in the controller's state
+    scaling_index = controller.program.states[SPEED_SCALING].start + 1 if drive.has_motion else 0
+    files[_SETUP] = _header(drive, dialect, status, command, record, scaling_index)
     files["drive_setup.c"] = _source(drive, station.start_posture, status, command[0], inputs)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
@@ -173,9 +173,9 @@ def _header(
     status: StatusLayout,
     command: tuple[bytes, int],
     record: RecordFormat,
-    pace: int,
+    scaling_index: int,
 ) -> str:
-    """Return what the loop must know, as macros and declarations."""
+    """Return macros and declarations of the loop's parameters."""
     wrench_size, _ = wrench_layout()
     channel = dialect.command_channel
     constants: dict[str, object] = {
@@ -186,10 +186,10 @@ def _header(
         "DRIVE_PRIORITY": PRIORITY,
         **{f"DRIVE_{name}": getattr(check, name) for name in _LIMITS},
         "DRIVE_HAS_MOTION": int(drive.has_motion),
-        "DRIVE_PACE": pace,
+        "DRIVE_PACE": scaling_index,
         "STATUS_CHANNEL": f'"{dialect.status_channel}"',
         "STATUS_SIZE": status.size,
-        "STATUS_ROOM": record.room,
+        "STATUS_ROOM": record.capacity,
         "STATUS_Q": status.q,
         "STATUS_V": status.v,
         "STATUS_TORQUE": status.torque,
@@ -230,7 +230,7 @@ def _source(
     command: bytes,
     inputs: Sequence[str],
 ) -> str:
-    """Return what the loop must know of numbers, and what leads to the controller's inputs."""
+    """Return definitions of the loop's parameters and the controller's inputs."""
     _, wrench = wrench_layout()
     arrays: Mapping[str, bytes | np.ndarray] = {
         "unsigned char status_fingerprint": status.fingerprint,
@@ -246,7 +246,7 @@ def _source(
         for name, values in arrays.items()
     ]
     moved = "\n".join(
-        f"    memcpy(inputs->{name}, {_member(_TOLD[name])}, sizeof inputs->{name});"
+        f"    memcpy(inputs->{name}, {_member(_SOURCES[name])}, sizeof inputs->{name});"
         for name in inputs
     )
     return f"""\

@@ -1,4 +1,4 @@
-"""The record of a controller in C that drove a robot, and the same run repeated in Python."""
+"""Record of a controller in C that drove a robot, and repetition of the run in Python."""
 
 import enum
 import struct
@@ -12,13 +12,13 @@ from pydrake.lcm import DrakeLcm
 from experiments.hardware.check import FOREIGN, SILENCE
 from experiments.hardware.drive import Drive, DrivenTick
 from experiments.results.run_log import RunLog
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEndpoint
 from pfsc_drake.drivers.messages import Dialect, RobotCommand
 from pfsc_drake.drivers.remote_values import Request
 from pfsc_drake.errors import InputError
 from reporting.progress import ProgressListener
 
-# reasons for which the last status was not answered
+# reasons for an unanswered last status
 _REFUSED, _SILENCE, _UNANSWERED = "refused", "silence", ("clock", "not_finite")
 _MAGIC = b"PFSCDRV1"
 _HEAD = struct.Struct("=8sII")
@@ -26,29 +26,29 @@ _WORD = 8  # bytes
 
 
 class Event(enum.IntFlag):
-    """What happened before a status was answered."""
+    """Events before the answer to a status."""
 
     NONE = 0
     INTERRUPTED = 1
     ALONE = 2
     UNRECORDED = 4
-    ASKED = 8
+    REQUESTED = 8
     FOREIGN = 16
 
 
-# why the controller stops then
+# reasons of the controller's stop
 STOPS = {
     Event.INTERRUPTED: "interrupted",
-    Event.ALONE: "who started the controller is gone",
+    Event.ALONE: "the controller's parent process has ended",
     Event.UNRECORDED: "its record could not be written",
-    Event.ASKED: "asked to stop",
+    Event.REQUESTED: "stop requested",
     Event.FOREIGN: FOREIGN,
 }
 
 
 @dataclass(frozen=True)
 class RecordFormat:
-    """How a record of N joints is written: a head, then one row for each status.
+    """Format of a record of N joints: a head, then one row for each status.
 
     Attributes:
         joints: Number N of joints.
@@ -59,18 +59,17 @@ class RecordFormat:
     message_size: int
 
     @property
-    def room(self) -> int:
-        """Bytes that a row has for its status."""
+    def capacity(self) -> int:
+        """Bytes of a row for its status."""
         return -(-self.message_size // _WORD) * _WORD
 
     @property
     def row(self) -> np.dtype:
         """One row, as ``drive_record`` of ``recorder.h``.
 
-        ``tick`` is its number; ``received`` [s] when its status came, since the loop began, and
-        ``age`` [s] how long it took to answer it; ``override`` what share of the planned pace was
-        asked for; ``event`` is an :class:`Event`; ``message`` the
-        status as it came.
+        ``tick`` is its number; ``received`` [s] the arrival of its status since the beginning of
+        the loop; ``age`` [s] the time to its answer; ``override`` the requested speed scaling;
+        ``event`` an :class:`Event`; ``message`` the received status.
         """
         return np.dtype(
             [
@@ -86,18 +85,18 @@ class RecordFormat:
                 ("fault", np.int32),
                 ("event", np.int32),
                 ("size", np.int32),
-                ("message", np.uint8, self.room),
+                ("message", np.uint8, self.capacity),
             ]
         )
 
     def read(self, file: Path) -> np.ndarray:
-        """Return the rows of a file; one that is not whole is left out.
+        """Return the complete rows of a file.
 
         Args:
             file: The file.
 
         Raises:
-            InputError: If it is no such record.
+            InputError: If it is not such a record.
         """
         data = file.read_bytes()
         if data[: _HEAD.size] != self._head:
@@ -121,34 +120,33 @@ class RecordFormat:
 
 @dataclass(frozen=True)
 class NativeRun:
-    """What a controller in C has left.
+    """Result of a controller in C.
 
     Attributes:
         rows: Its record, see :class:`RecordFormat`.
-        reason: Why it ended, in a word; None if it broke off.
-        said: What else it said, one line each.
+        reason: Reason of its end, one word; None after an abnormal end.
+        messages: Its other messages, one line each.
     """
 
     rows: np.ndarray
     reason: str | None
-    said: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
 
 
 class RepeatedDrive:
-    """A run of the loop in C, repeated by its description, status by status.
+    """Repetition of a run of the loop in C by its Python description, status by status.
 
     Args:
-        run: What the loop has left.
-        make_drive: Makes its description, which has not begun.
+        run: Result of the loop.
+        make_drive: Returns a new Python description.
         dialect: The robot's messages.
-        progress: Told how far it is.
+        progress: Progress listener.
 
     Attributes:
-        drive: What has repeated it, with the loop's record as its own.
-        result: What came of it.
-        first: Time of the first tick at which the two were not the same to the last bit [s], None
-            if all were.
-        ticks: How many were not.
+        drive: The description after the repetition, with the loop's record.
+        result: Result of the run.
+        first: Time of the first tick that is not bit-identical [s], None if all are identical.
+        ticks: Number of ticks that are not bit-identical.
 
     Raises:
         InputError: If there was no robot, or not the scenario's at rest at its start.
@@ -157,7 +155,7 @@ class RepeatedDrive:
     def __init__(
         self,
         run: NativeRun,
-        make_drive: Callable[[ControllerEnd], Drive],
+        make_drive: Callable[[ControllerEndpoint], Drive],
         dialect: Dialect,
         progress: ProgressListener,
     ) -> None:
@@ -165,58 +163,62 @@ class RepeatedDrive:
             raise InputError(f"no status of the robot for {1e3 * SILENCE:.0f} ms")
         end = _RepeatedEnd(DrakeLcm("memq://"), dialect)
         self.drive = drive = make_drive(end)
-        # largest difference of what was sent at each tick, over the joints; zero where nothing was
+        # largest difference of the commands at each tick, over the joints; zero without command
         self._difference = list[float]()
         self.first: float | None = None
         self.ticks = 0
-        held = np.zeros(run.rows.dtype["sent"].shape)
+        last = np.zeros(run.rows.dtype["sent"].shape)
         for k, row in enumerate(run.rows):
             status = dialect.decode_status(row["message"][: row["size"]].tobytes())
             end.wrench = row["wrench"]
-            drive.heed(Request(float(row["override"])))
+            drive.handle_request(Request(float(row["override"])))
             if k == 0:
                 drive.begin(status)
                 if run.reason == _REFUSED:
-                    raise InputError("--native: the loop in C refused the robot, for no reason")
+                    raise InputError("--native: the loop in C rejected the robot without reason")
             stops = [why for event, why in STOPS.items() if row["event"] & event]
             if stops:
                 drive.stop(stops[0])
             known = len(drive.ticks)
             drive.answer(status)
-            made = drive.ticks[known:]
-            if not made or np.isnan(made[-1].age):
+            added = drive.ticks[known:]
+            if not added or np.isnan(added[-1].age):
                 self._count(run.rows[k + (run.reason in _UNANSWERED) :])
                 break
-            self._compare(row, made)
-            for tick in made[:-1]:
-                tick.sent = held
-            made[-1].age, made[-1].sent, made[-1].clipped = row["age"], row["sent"], row["clipped"]
-            held = row["sent"]
+            self._compare(row, added)
+            for tick in added[:-1]:
+                tick.sent = last
+            added[-1].age, added[-1].sent, added[-1].clipped = (
+                row["age"],
+                row["sent"],
+                row["clipped"],
+            )
+            last = row["sent"]
             if k % 200 == 0:
                 progress(drive.time, "repeating the run")
         if run.reason == _SILENCE:
             drive.lose(f"no status of the robot for {1e3 * SILENCE:.0f} ms")
         elif run.reason is None:
-            drive.lose(run.said[-1])
+            drive.lose(run.messages[-1])
         self.result = drive.result(float(run.rows[-1]["received"] - run.rows[0]["received"]))
 
-    def _compare(self, row: np.void, made: Sequence[DrivenTick]) -> None:
-        """Compare a row with the ticks that were missing, and that of its status."""
-        largest = float(np.abs(made[-1].sent - row["sent"]).max())
-        self._difference += [0.0] * (len(made) - 1) + [largest]
-        told = (len(made) - 1, made[-1].clipped) == (row["missed"], row["clipped"])
-        if not told or largest != 0.0:
+    def _compare(self, row: np.void, added: Sequence[DrivenTick]) -> None:
+        """Compare a row with the missed ticks and the tick of its status."""
+        largest = float(np.abs(added[-1].sent - row["sent"]).max())
+        self._difference += [0.0] * (len(added) - 1) + [largest]
+        agrees = (len(added) - 1, added[-1].clipped) == (row["missed"], row["clipped"])
+        if not agrees or largest != 0.0:
             self._count([row])
 
     def _count(self, rows: Sequence[np.void] | np.ndarray) -> None:
-        """Count rows that are not what the description does."""
+        """Count rows that differ from the description."""
         if len(rows):
             self.ticks += len(rows)
             self.first = rows[0]["tick"] * self.drive.period if self.first is None else self.first
 
     @property
     def warnings(self) -> list[str]:
-        """What is to be said of the difference, one sentence each."""
+        """Warnings about differences, one sentence each."""
         if self.first is None:
             return []
         return [
@@ -225,7 +227,7 @@ class RepeatedDrive:
         ]
 
     def add_to(self, log: RunLog) -> None:
-        """Add what happened on the link, and the difference of what was sent, to a run's log.
+        """Add signals of the link, and the difference of commands, to a run's log.
 
         Args:
             log: The log.
@@ -235,8 +237,8 @@ class RepeatedDrive:
         log.add("sent_difference", [*noted, *[0.0] * (len(log.time) - len(noted))])
 
 
-class _RepeatedEnd(ControllerEnd):
-    """The end of a link that was: what is sent goes nowhere."""
+class _RepeatedEnd(ControllerEndpoint):
+    """Link end of a repetition, which sends nothing."""
 
     def send(self, command: RobotCommand) -> None:
         """Send nothing."""

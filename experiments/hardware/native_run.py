@@ -1,4 +1,4 @@
-"""The process of a controller in C that drives a robot, and what people ask it for."""
+"""Process of a controller in C that drives a robot, and requests to it."""
 
 import selectors
 import signal
@@ -9,7 +9,7 @@ from contextlib import suppress
 from experiments.hardware.native_project import NativeProject
 from experiments.hardware.native_record import NativeRun
 from pfsc_drake.drivers.layout import UdpmAddress
-from pfsc_drake.drivers.link import RequestEnd
+from pfsc_drake.drivers.link import RequestEndpoint
 from pfsc_drake.drivers.remote_values import Request
 from pfsc_drake.errors import InputError
 from reporting.progress import ProgressListener
@@ -19,18 +19,18 @@ _LOOKED_AT = 0.1  # s
 
 
 class Operator:
-    """Tells the loop in C what people ask for, by keys and by messages, and them how far it is.
+    """Requests of the operator to the loop in C, by keys and messages, and progress reports.
 
     Args:
-        end: Where messages come from.
-        keys: Returns what was asked for by keys since the last time, given the override.
-        override: Share of the planned pace at which the reference moves at first.
-        fastest: Largest share of it.
+        end: Receiver of request messages.
+        keys: Returns requests by keys since the last call, given the override.
+        override: Initial speed scaling of the reference.
+        fastest: Largest speed scaling.
     """
 
     def __init__(
         self,
-        end: RequestEnd,
+        end: RequestEndpoint,
         keys: Callable[[float], list[Request]],
         override: float,
         fastest: float,
@@ -39,20 +39,20 @@ class Operator:
         self._is_stopping = False
 
     def lines(self) -> str:
-        """Return what the loop is to be told, line by line."""
+        """Return the requests as input lines of the loop."""
         self._end.listen()
-        told = ""
+        text = ""
         for request in [*self._end.requests(), *self._keys(self.override)]:
             if request.override is not None:
                 self.override = min(request.override, self._fastest)
-                told += f"o {self.override!r}\n"
+                text += f"o {self.override!r}\n"
             if request.stop:
                 self._is_stopping = True
-                told += "s\n"
-        return told
+                text += "s\n"
+        return text
 
     def tell(self, time: float) -> None:
-        """Tell who watches how far it is.
+        """Send the progress for monitoring.
 
         Args:
             time: Time since the first status [s].
@@ -64,7 +64,7 @@ class Operator:
             "ended": 0.0,
             "missed": 0.0,
         }
-        self._end.tell(0, values)
+        self._end.publish_progress(0, values)
 
 
 def run_native(
@@ -75,18 +75,18 @@ def run_native(
     progress: ProgressListener,
     operator: Operator,
 ) -> NativeRun:
-    """Let a compiled controller drive a robot until it ends.
+    """Run a compiled controller until it ends.
 
     Args:
         project: The controller.
         address: The robot's bus.
-        duration: How long, in the time of the motion as planned [s].
-        interrupted: Whether it is to stop.
-        progress: Told how far it is.
-        operator: What people ask for.
+        duration: Duration in the time of the planned motion [s].
+        interrupted: Whether to stop.
+        progress: Progress listener.
+        operator: Source of requests.
 
     Raises:
-        InputError: If it did not begin.
+        InputError: If it did not start.
     """
     record = project.folder / RECORD
     record.unlink(missing_ok=True)
@@ -103,16 +103,20 @@ def run_native(
         process_group=0,
     ) as loop:
         try:
-            said = _watch(loop, interrupted, progress, operator)
+            messages = _watch(loop, interrupted, progress, operator)
         except BaseException:
             loop.kill()  # the robot's driver damps
             raise
-    reason = said.pop().removeprefix("end ") if said and said[-1].startswith("end ") else None
+    reason = (
+        messages.pop().removeprefix("end ")
+        if messages and messages[-1].startswith("end ")
+        else None
+    )
     if reason is None:
-        said.append(f"the loop in C broke off with status {loop.returncode}")
+        messages.append(f"the loop in C ended abnormally with status {loop.returncode}")
     if not record.is_file():
-        raise InputError(f"--native: {'; '.join(said)}")
-    return NativeRun(project.record.read(record), reason, said)
+        raise InputError(f"--native: {'; '.join(messages)}")
+    return NativeRun(project.record.read(record), reason, messages)
 
 
 def _watch(
@@ -121,30 +125,30 @@ def _watch(
     progress: ProgressListener,
     operator: Operator,
 ) -> list[str]:
-    """Return what the loop has said beside how far it is."""
+    """Return the loop's messages other than progress."""
     assert loop.stdout is not None
     assert loop.stdin is not None
-    told, left = False, b""
-    said: list[str] = []
+    is_interrupted, left = False, b""
+    messages: list[str] = []
     with selectors.DefaultSelector() as selector:
         selector.register(loop.stdout, selectors.EVENT_READ)
         while True:
-            if interrupted() and not told:
-                told = True
+            if interrupted() and not is_interrupted:
+                is_interrupted = True
                 loop.send_signal(signal.SIGTERM)
-            asked = operator.lines()
-            if asked:
+            requests = operator.lines()
+            if requests:
                 with suppress(BrokenPipeError):
-                    loop.stdin.write(asked.encode())
+                    loop.stdin.write(requests.encode())
             if not selector.select(_LOOKED_AT):
                 continue
             data = loop.stdout.read(4096)
             if not data:
-                return said
+                return messages
             *lines, left = (left + data).split(b"\n")
             for line in map(bytes.decode, lines):
                 if line.startswith("t "):
                     progress(float(line[2:]), f"driving at {operator.override:.0%}")
                     operator.tell(float(line[2:]))
                 else:
-                    said.append(line)
+                    messages.append(line)

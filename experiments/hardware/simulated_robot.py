@@ -1,4 +1,4 @@
-"""A simulated robot behind the messages of a driver, in a process of its own."""
+"""Simulated robot with the messages of a driver, in a separate process."""
 
 import time
 from collections import deque
@@ -23,30 +23,30 @@ from experiments.scenario_file import ScenarioFile
 from experiments.simulation import configure
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import DriverOptions, DriverRules, check_mode
-from pfsc_drake.drivers.link import RobotEnd
+from pfsc_drake.drivers.link import RobotEndpoint
 from pfsc_drake.drivers.messages import ControlMode, Dialect, RobotCommand, RobotStatus
 from pfsc_drake.physics.velocity_servo import joint_inertia
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
 from pfsc_drake.yaml.typed import load_typed
-from reporting.interruption import noticed_interruption
+from reporting.interruption import watch_interruption
 
 _US = 1e6
 _REHEARSED = 20  # ticks
-_MOST_LATE = 10_000  # ticks by which commands come later
-# for a plant that is to keep up with the clock
+_MOST_LATE = 10_000  # ticks, largest delay of commands
+# for simulation in real time
 _SCHEME = "runge_kutta3"
 
 
 @dataclass(frozen=True)
 class Transport:
-    """What happens to commands on their way.
+    """Packet loss and delay of messages.
 
     Attributes:
-        lose: Share of packets that are lost, in both directions.
-        delay: Ticks by which a command comes later.
-        seed: Seed of which ones are lost.
+        lose: Share of lost packets, in both directions.
+        delay: Delay of commands in ticks.
+        seed: Seed of the losses.
     """
 
     lose: float = 0.0
@@ -59,28 +59,28 @@ class Transport:
 
 
 class SimulatedRobot:
-    """A robot that moves as it is commanded, tick by tick.
+    """Robot that executes commands, tick by tick.
 
-    At each tick it tells its status first, then hears commands, as drivers do. Its interface adds
-    the weight that its own model tells to commanded torques.
+    At each tick it sends its status first, then receives commands, as drivers do. Its interface
+    adds gravity torques of its own model to commanded torques.
 
     Args:
         station: The robot.
         settings: Its scenario.
         end: The link.
-        options: How the driver treats commands.
-        transport: What happens to messages.
+        options: Options of the driver.
+        transport: Packet loss and delay.
 
     Attributes:
-        tick: Number of the tick to come.
-        heard: How many commands have been heard.
+        tick: Number of the next tick.
+        heard: Number of received commands.
     """
 
     def __init__(
         self,
         station: RobotStation,
         settings: Scenario,
-        end: RobotEnd,
+        end: RobotEndpoint,
         options: DriverOptions,
         transport: Transport,
     ) -> None:
@@ -109,25 +109,25 @@ class SimulatedRobot:
 
     @property
     def utime(self) -> int:
-        """The robot's clock [us]."""
+        """Time of the robot's clock [us]."""
         return round(self.tick * self.period * _US)
 
     def status(self) -> RobotStatus:
-        """Return what it tells of itself now: its motors' positions, and torques in its joints."""
+        """Return the current status: motor positions and velocities, and joint torques."""
         _, _, q_M, v_M = np.split(self.station.joint_state(self.root), 4)
         springs = self.station.joint_torque(self.root)
         torque = np.where(self.station.part.robot.elastic_joints, springs, self._torque)
         return RobotStatus(self.utime, q_M, v_M, torque, self.rules.robot_mode, self.station.mode)
 
     def tell(self) -> None:
-        """Send the status, unless it is lost on the way."""
-        status, wrench = self.status(), self.station.sensed(self.root)
+        """Send the status, unless the packet is lost."""
+        status, wrench = self.status(), self.station.measured_wrench(self.root)
         if not self._is_lost():
-            self._end.tell(status, wrench)
+            self._end.send_status(status, wrench)
 
     def advance(self) -> None:
-        """Hear what has come, and move by one tick."""
-        command = self._end.hear()
+        """Receive commands, and advance by one tick."""
+        command = self._end.receive_command()
         if command is not None:
             self.heard += 1
         self._late.append(None if command is None or self._is_lost() else command)
@@ -138,7 +138,7 @@ class SimulatedRobot:
         if self.station.mode is ControlMode.TORQUE:
             acting = acting + self._weight(q_M).full().ravel()
             acting = self._torque = np.clip(acting, -self._limit, self._limit)
-        self.station.tell(self.root, acting)
+        self.station.set_command(self.root, acting)
         self.tick += 1
         self._simulator.AdvanceTo(self.tick * self.period)
 
@@ -149,15 +149,15 @@ class SimulatedRobot:
 def rehearse(
     station: RobotStation, settings: Scenario, dialect: Dialect, options: DriverOptions
 ) -> None:
-    """Make the first ticks of a robot while nobody waits: they take longer than its period.
+    """Simulate the first ticks of a robot beforehand, since they take longer than its period.
 
     Args:
         station: The robot.
         settings: Its scenario.
-        dialect: Its messages, which go nowhere.
-        options: How the driver treats commands.
+        dialect: Its messages, which are not sent.
+        options: Options of the driver.
     """
-    end = RobotEnd(DrakeLcm("memq://"), dialect)
+    end = RobotEndpoint(DrakeLcm("memq://"), dialect)
     robot = SimulatedRobot(station, settings, end, options, Transport())
     for _ in range(_REHEARSED):
         robot.tell()
@@ -167,19 +167,19 @@ def rehearse(
 def run_robot(
     robot: SimulatedRobot,
     interrupted: Callable[[], bool],
-    tell: Callable[[float], None],
+    notify: Callable[[float], None],
     duration: float = np.inf,
 ) -> float:
-    """Let a robot move in real time until it is interrupted.
+    """Simulate a robot in real time until an interruption.
 
     Args:
         robot: The robot.
         interrupted: Whether to end.
-        tell: Told the robot's time, ten times a second [s].
-        duration: How long it lasts at most [s].
+        notify: Receives the robot's time ten times a second [s].
+        duration: Longest duration [s].
 
     Returns:
-        Share of the ticks that began within one period of their time.
+        Share of ticks that began within one period of their time.
     """
     begin, late, every = time.monotonic(), 0, max(1, round(0.1 / robot.period))
     while not interrupted() and robot.tick * robot.period < duration:
@@ -189,50 +189,50 @@ def run_robot(
             time.sleep(wait)
         elif wait < -robot.period:
             late += 1
-            if wait < -0.1:  # time is not caught up after a long halt
+            if wait < -0.1:  # lost time is not caught up after a long halt
                 begin -= wait
         robot.tell()
-        # whoever is quick answers within the same tick
+        # a fast controller answers within the same tick
         robot.advance()
         if robot.tick % every == 0:
-            tell(robot.tick * robot.period)
+            notify(robot.tick * robot.period)
     return 1.0 - late / max(robot.tick, 1)
 
 
 def run_robot_scenario(
     scenario: ScenarioFile,
-    end: RobotEnd,
+    end: RobotEndpoint,
     options: DriverOptions,
     transport: Transport,
     *,
     duration: float,
     drawn: bool,
-    tell: Callable[[str], None],
+    notify: Callable[[str], None],
 ) -> None:
-    """Let a scenario's robot wait for commands until it is interrupted.
+    """Simulate a scenario's robot in real time until an interruption.
 
     Args:
         scenario: The scenario as read.
         end: The link to its controller.
-        options: How the driver treats commands.
-        transport: What happens to messages.
-        duration: How long it lasts at most [s].
+        options: Options of the driver.
+        transport: Packet loss and delay.
+        duration: Longest duration [s].
         drawn: Whether to draw it in Meshcat.
-        tell: Told in words what happens.
+        notify: Receives lines about events.
 
     Raises:
         InputError: If the scenario is wrong.
     """
-    settings = load_typed(Scenario, scenario.data, str(scenario.path))
+    settings = load_typed(Scenario, scenario.data, scenario.source)
     folder = scenario.path.parent
-    with naming(scenario.path):
+    with naming(scenario.source):
         if settings.simulation.integrator == AUTO:
             settings.simulation.integrator = _SCHEME
         station = build_robot_station(settings, folder)
     check_mode(station.mode, end.dialect.modes, end.dialect.name)
     rehearse(station, settings, end.dialect, options)
     robot = SimulatedRobot(station, settings, end, options, transport)
-    view = _View(station, settings.robot, folder, tell) if drawn else None
+    view = _View(station, settings.robot, folder, notify) if drawn else None
     q = np.rad2deg(robot.status().q)
     ended = None
 
@@ -242,38 +242,38 @@ def run_robot_scenario(
             view.draw(robot)
         if robot.rules.ended != ended:
             ended = robot.rules.ended
-            tell(f"t = {time:.1f} s: the driver has ended: {ended}; the joints are damped")
+            notify(f"t = {time:.1f} s: the driver has ended: {ended}; the joints are damped")
 
-    with steady_clock(), noticed_interruption() as interrupted, real_time_priority() as allowed:
-        tell(f"{len(q)} joints at {np.round(q, 2).tolist()} deg, {station.mode.name} mode")
+    with steady_clock(), watch_interruption() as interrupted, real_time_priority() as allowed:
+        notify(f"{len(q)} joints at {np.round(q, 2).tolist()} deg, {station.mode.name} mode")
         if not allowed:
-            tell("warning: no real-time priority here; ticks may be late")
+            notify("warning: no real-time priority here; ticks may be late")
         share = run_robot(robot, interrupted, watch, duration)
-    tell(
+    notify(
         f"{robot.tick} ticks, {share:.1%} on time; {robot.heard} commands, "
         f"{robot.rules.rejected} of them too old"
     )
 
 
 class _View:
-    """Draws the robot in Meshcat while it moves."""
+    """Drawing of the moving robot in Meshcat."""
 
     def __init__(
         self,
         station: RobotStation,
         parameters: RobotParameters,
         folder: Path,
-        tell: Callable[[str], None],
+        notify: Callable[[str], None],
     ) -> None:
         assert isinstance(station.part, Arm)
         meshcat = hidden_meshcat()
         drawing = draw_robot(station.part.model, station.part.tool, parameters, folder)
         self._robot = RobotVisualizer(drawing.plant, drawing.parts, meshcat, 1.0)
         self._context = self._robot.CreateDefaultContext()
-        tell(f"open {meshcat.web_url()}")
+        notify(f"open {meshcat.web_url()}")
 
     def draw(self, robot: SimulatedRobot) -> None:
-        """Draw the robot as it is."""
+        """Draw the robot's current posture."""
         coordinates = robot.station.part.coordinates
         state = coordinates.plant_state(robot.station.joint_state(robot.root))
         positions = state[: coordinates.num_states // 2]

@@ -1,4 +1,4 @@
-"""What the torques of a robot, at rest or in slow motion, say of its signs, zeros and loads."""
+"""Diagnosis of signs, zeros and loads from torques of a robot at rest or in slow motion."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -11,11 +11,11 @@ from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import tool_jacobian
 
-# of the largest weight in a joint: differences that friction and sensors leave
+# of the largest gravity torque: differences due to friction and sensors
 _NOTHING = 0.02
-# share of the difference that a single cause must explain
+# least explained share of the difference by a single cause
 _EXPLAINED = 0.9
-# by which one number must do worse than several before these are the cause
+# penalty for causes with several parameters
 _FEWER = 0.01
 _ITERATIONS = 5
 _LARGEST_ZERO = 45.0  # deg
@@ -23,12 +23,12 @@ _LARGEST_ZERO = 45.0  # deg
 
 @dataclass(frozen=True)
 class Cause:
-    """Something that may be wrong.
+    """Possible cause of a difference.
 
     Attributes:
-        words: What.
-        left: Share of the difference that it leaves, 0 to 1.
-        unknowns: How many numbers were chosen for it.
+        words: Description.
+        left: Unexplained share of the difference, 0 to 1.
+        unknowns: Number of fitted parameters.
     """
 
     words: str
@@ -37,20 +37,20 @@ class Cause:
 
     @property
     def doubt(self) -> float:
-        """What it leaves, with an allowance for numbers beyond one: more numbers explain more."""
+        """Unexplained share with a penalty for several parameters."""
         return self.left if self.unknowns == 1 else self.unknowns * self.left + _FEWER
 
 
 @dataclass(frozen=True)
 class StaticCheck:
-    """Torques of a robot in M postures, in which it rests or hardly moves.
+    """Comparison of torques in M postures, at rest or in slow motion.
 
     Attributes:
-        q: The postures [rad or m], shape (M, N); the first one is that at rest.
-        measured: What it measures [Nm or N], shape (M, N).
-        expected: What the model says, shape (M, N).
-        causes: What may be wrong, the likeliest first; none if nothing is.
-        complaint: What ended the motion, or was wrong in it, in words, or None.
+        q: Postures [rad or m], shape (M, N); the first one is at rest.
+        measured: Measured torques [Nm or N], shape (M, N).
+        expected: Torques of the model, shape (M, N).
+        causes: Possible causes of a difference, the most likely first.
+        complaint: Message about an error of the motion, or None.
     """
 
     q: np.ndarray
@@ -61,12 +61,12 @@ class StaticCheck:
 
     @property
     def is_good(self) -> bool:
-        """Whether both agree."""
+        """Whether measurement and model agree."""
         return not self.causes and self.complaint is None
 
     @property
     def verdict(self) -> str:
-        """One sentence."""
+        """Result in one sentence."""
         if self.complaint is not None:
             also = f"; {self._of_torques}" if self.causes else ""
             return f"{self.complaint}{also}"
@@ -76,25 +76,25 @@ class StaticCheck:
     def _of_torques(self) -> str:
         where = "at rest" if len(self.q) == 1 else "at rest and along the motion"
         if not self.causes:
-            return f"the robot's torques {where} are those of the model"
+            return f"the robot's torques {where} agree with the model"
         likely = [cause for cause in self.causes if cause.left < 1.0 - _EXPLAINED]
         if not likely:
-            return "no single cause explains the difference; look at friction, and at the model"
+            return "no single cause explains the difference; check friction and the model"
         best = likely[0]
         others = [cause.words for cause in likely[1:3] if cause.left < 2.0 * best.left + 1e-3]
-        also = f"; as well may be: {', or '.join(others)}" if others else ""
+        also = f"; also possible: {', or '.join(others)}" if others else ""
         return (
             f"most likely {best.words}: it explains {1.0 - best.left:.1%} of the difference{also}"
         )
 
 
 def check_statics(robot: SerialChain, q: np.ndarray, torque: np.ndarray) -> StaticCheck:
-    """Compare what a robot measures with what is believed of its weight.
+    """Compare measured torques of a robot with gravity torques of its nominal model.
 
     Args:
-        robot: The robot as it is believed, N joints.
-        q: Postures that it tells, shape (M, N) [rad or m].
-        torque: Torques that it measures there, shape (M, N) [Nm or N]; NaN where they say nothing.
+        robot: Nominal model, N joints.
+        q: Measured postures, shape (M, N) [rad or m].
+        torque: Torques measured there, shape (M, N) [Nm or N]; NaN if unknown.
 
     Raises:
         InputError: If it has another number of joints.
@@ -110,14 +110,14 @@ def check_statics(robot: SerialChain, q: np.ndarray, torque: np.ndarray) -> Stat
 
 
 def _weights(robot: SerialChain, q: np.ndarray) -> np.ndarray:
-    """Return the torques that hold the robot in postures, both (M, N)."""
+    """Return gravity torques in postures, both (M, N)."""
     return np.asarray(gravity_function(robot).map(len(q))(q.T)).T
 
 
 def _causes(
     robot: SerialChain, q: np.ndarray, torque: np.ndarray, expected: np.ndarray
 ) -> Iterator[Cause]:
-    """Return all that may be wrong, each with what it leaves unexplained."""
+    """Iterate over possible causes, each with its unexplained share."""
     known, n = np.isfinite(torque), robot.dimension
     torque = np.where(known, torque, 0.0)
     missing = known * (torque - expected)
@@ -134,7 +134,7 @@ def _causes(
     weight = gravity_function(robot)(x)
     slopes = ca.Function("slopes", [x], [ca.jacobian(weight, x)]).map(len(q))
     for i in range(n):
-        # the joint is where the weight says, not where it tells
+        # fit the joint's position to the gravity torques
         there = q.copy()
         for _ in range(_ITERATIONS):
             column = known * np.asarray(slopes(there.T)).reshape(n, len(q), n)[:, :, i].T
@@ -151,7 +151,7 @@ def _causes(
     if np.any(column):
         mass = float((column * missing).sum() / (column * column).sum())
         kind = "more" if mass > 0.0 else "less"
-        words = f"the tool weighs {abs(mass):.2f} kg {kind} than is told"
+        words = f"the tool weighs {abs(mass):.2f} kg {kind} than in the model"
         yield Cause(words, left(missing - mass * column), 1)
     axes = [(known * _weights(replace(robot, gravity=axis), q)).ravel() for axis in np.eye(3)]
     columns = np.column_stack(axes)

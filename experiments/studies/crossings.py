@@ -1,4 +1,4 @@
-"""Many persons who walk across a path at random, and how near they come to the arm."""
+"""Study of random persons crossing a path: distance from the arm, time lost."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,7 @@ from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import COMPLETED, RunRow
 from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
-from pfsc_drake.physics.moving_obstacle import ObstacleParameters, Stride
+from pfsc_drake.physics.moving_obstacle import ObstacleParameters, ObstacleWaypoint
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import open_results
 from reporting.metrics import Metrics
@@ -27,44 +27,43 @@ from reporting.style import COLOURS, INK, STYLE, WIDTH, Drawing, Figure, render
 SCENARIO = "pfc_crossing_6r"
 COUNT, SEED = 300, 1
 _DESCRIPTION = (
-    "Persons walk across the path of pfc_crossing_6r at random: where they cross it, in which "
-    "direction, how fast, when, whether they slow down, hurry or stand still on the way for a "
-    "while; they walk when the run begins. Robot, model errors, friction, encoders, noise and "
-    "delay of the obstacle's sensor are those of the scenario; the seed of the sensor is another "
-    "one each time. Left out are only those who would walk into the arm where it stands at the "
-    "start, who would run, or whose changes of speed are hastier than is reckoned with. Distances "
-    "are the true ones, between the surfaces of person and arm."
+    "Persons cross the path of pfc_crossing_6r with random position, direction, speed and time; "
+    "they may slow down, accelerate or pause, and walk when the run begins. Robot, model errors, "
+    "friction, encoders, noise and delay of the obstacle sensor are as in the scenario; the seed "
+    "of the sensor differs in each run. Excluded are persons who would collide with the arm at its "
+    "start, run, or exceed the assumed acceleration. Distances are actual ones between the "
+    "surfaces of person and arm."
 )
-# of what is random: place on the path [m], direction [deg], speed [m/s], when [s]
-_PLACES, _DIRECTIONS, _SPEEDS, _TIMES = (-0.2, 0.6), (35.0, 80.0), (0.4, 1.4), (0.8, 3.4)
-# m, of the way around the path on which the speed changes, and after the path
+# random ranges: position on the path [m], direction [deg], speed [m/s], time [s]
+_POSITIONS, _DIRECTIONS, _SPEEDS, _TIMES = (-0.2, 0.6), (35.0, 80.0), (0.4, 1.4), (0.8, 3.4)
+# m, of the walk: before and after the path with changed speed, and beyond the path
 _AROUND, _AFTER = 0.4, 1.6
-# s, for which some stand still; the share of these
+# s, duration of pauses; share of persons with a pause
 _STILL, _STANDING = (0.3, 1.2), 0.25
-# times the mean speed, on each of the three parts of a way
+# factor of the mean speed, on each of the three parts of a walk
 _CHANGES = (0.75, 1.15)
-# least distance from the arm at the start [m], and where that is in the plane
+# least distance from the arm at the start [m], and the arm's line in the plane
 _FREE = 0.3
 _START = np.array([[0.1, -0.11], [0.8, -0.7]])
-# s; since when they walk; and how long they stand in the end
+# s; duration, begin of the walk, and final rest
 _DURATION, _BEGIN, _STOOD = 6.0, -0.2, 1.0
 
 
-def random_way(
+def random_walk(
     rng: np.random.Generator, radius: float, watch: WatchParameters
 ) -> list[dict[str, Any]]:
-    """Return a way across the path that does not come near the arm at the start.
+    """Return a walk across the path that avoids the arm at the start.
 
     Args:
         rng: Source of random numbers.
-        radius: Of the person [m].
-        watch: What nobody exceeds, and the radius of the arm.
+        radius: Radius of the person [m].
+        watch: Largest speed and acceleration, and the radius of the arm.
 
     Returns:
-        Places as a scenario has them.
+        Positions over time as in a scenario.
     """
     while True:
-        across = np.array([0.8, rng.uniform(*_PLACES)])
+        across = np.array([0.8, rng.uniform(*_POSITIONS)])
         angle = np.deg2rad(rng.uniform(*_DIRECTIONS))
         ahead = np.array([-np.cos(angle), np.sin(angle)])
         ahead *= rng.choice([-1.0, 1.0])
@@ -74,30 +73,30 @@ def random_way(
             pauses[rng.integers(2)] = rng.uniform(*_STILL)
         near = rng.uniform(*_TIMES) - _AROUND / speeds[1] - pauses[0]
         before = _AROUND + max(near - _BEGIN, 0.5) * speeds[0]
-        stops = [across + way * ahead for way in (-before, -_AROUND, _AROUND, _AFTER)]
+        stops = [across + distance * ahead for distance in (-before, -_AROUND, _AROUND, _AFTER)]
         if _distance(stops[0], stops[-1], *_START) < radius + watch.arm_radius + _FREE:
             continue
-        way = _timed(stops, speeds, pauses, near)
-        walk = ObstacleParameters(way=[Stride(x["time"], x["position"]) for x in way])
+        walk = _timed(stops, speeds, pauses, near)
+        person = ObstacleParameters(way=[ObstacleWaypoint(x["time"], x["position"]) for x in walk])
         hastiest = watch.largest_acceleration or np.inf
-        if walk.largest_speed <= watch.largest_speed and walk.largest_acceleration <= hastiest:
-            return way
+        if person.largest_speed <= watch.largest_speed and person.largest_acceleration <= hastiest:
+            return walk
 
 
 def _timed(
     stops: Sequence[np.ndarray], speeds: np.ndarray, pauses: np.ndarray, near: float
 ) -> list[dict[str, Any]]:
-    """Return places with times, of which the one at the second place is given."""
-    ways = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(stops)]
-    lasts = np.array(ways) / speeds
-    times, time = [], near - lasts[0]
+    """Return timed positions, with given time at the second one."""
+    lengths = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(stops)]
+    durations = np.array(lengths) / speeds
+    times, time = [], near - durations[0]
     for k, stop in enumerate(stops):
         times.append((time, stop))
         if k in (1, 2) and pauses[k - 1] > 0.0:
             time += pauses[k - 1]
             times.append((time, stop))
-        time += lasts[k] if k < len(lasts) else _STOOD
-    # he stands where his way ends
+        time += durations[k] if k < len(durations) else _STOOD
+    # the person rests at the end
     times.append((time, stops[-1]))
     return [
         {"time": round(float(t), 4), "position": [*(round(float(c), 4) for c in p), 0.0]}
@@ -106,7 +105,7 @@ def _timed(
 
 
 def _distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
-    """Return the distance of two lines in the plane, by many points of both."""
+    """Return the distance of two lines in the plane, from samples of both."""
     shares = np.linspace(0.0, 1.0, 200)[:, None]
     one, other = a + shares * (b - a), c + shares * (d - c)
     return float(np.linalg.norm(one[:, None] - other[None], axis=2).min())
@@ -116,18 +115,18 @@ def random_crossings(count: int = COUNT, seed: int = SEED) -> dict[int, Scenario
     """Return scenarios with a random crossing each, by number.
 
     Args:
-        count: How many.
-        seed: Of all of them.
+        count: Number of crossings.
+        seed: Seed of all crossings.
     """
     plain = read_scenario(SCENARIO, ["targets={}", f"duration={_DURATION}"])
     settings = load_typed(Scenario, plain.data, SCENARIO)
-    assert settings.obstacles is not None  # that is what it is for
+    assert settings.obstacles is not None  # the scenario has obstacles
     radius, watch = settings.obstacles.moving[0].radius, settings.obstacles.watch
     scenarios = {}
     for k in range(count):
         data = deepcopy(plain.data)
-        way = random_way(np.random.default_rng((seed, k)), radius, watch)
-        data["obstacles"]["moving"][0]["way"] = way
+        walk = random_walk(np.random.default_rng((seed, k)), radius, watch)
+        data["obstacles"]["moving"][0]["way"] = walk
         data["obstacles"].setdefault("sensor", {})["seed"] = k + 1
         scenarios[k] = replace(plain, data=data)
     return scenarios
@@ -140,9 +139,9 @@ def write_crossings(
 
     Args:
         out: Folder for the page.
-        progress: Told one line per run, in the order in which they end.
-        count: How many.
-        seed: Of all of them.
+        progress: Receives one line per run, in the order in which they end.
+        count: Number of crossings.
+        seed: Seed of all crossings.
 
     Returns:
         The page.
@@ -153,21 +152,21 @@ def write_crossings(
     with open_results(out, "study") as results:
         scenarios = random_crossings(count, seed)
 
-        def tell(number: int, row: RunRow) -> None:
-            progress(f"{number:4d} {_said(row)}")
+        def report(number: int, row: RunRow) -> None:
+            progress(f"{number:4d} {_row_text(row)}")
 
-        rows = run_side_by_side(scenarios, tell)
+        rows = run_side_by_side(scenarios, report)
         return write_study_page(
             results,
             title="Random crossings",
             description=_DESCRIPTION,
-            overrides=[f"{SCENARIO}, {count} ways, seed {seed}"],
+            overrides=[f"{SCENARIO}, {count} crossings, seed {seed}"],
             metrics=summary(rows),
             figures=[_picture(rows)],
         )
 
 
-def _said(row: RunRow) -> str:
+def _row_text(row: RunRow) -> str:
     if row.status != COMPLETED:
         return f"{row.status}: {row.reason}"
     least, moving = row.value("least_distance"), row.value("least_distance_while_moving")
@@ -176,10 +175,10 @@ def _said(row: RunRow) -> str:
 
 
 def summary(rows: Mapping[int, RunRow]) -> Metrics:
-    """Return what came of all crossings.
+    """Return the metrics of all crossings.
 
     Args:
-        rows: By number.
+        rows: Results by number.
     """
     metrics = Metrics()
     good = {k: row for k, row in rows.items() if row.status == COMPLETED}
@@ -195,7 +194,7 @@ def summary(rows: Mapping[int, RunRow]) -> Metrics:
     for name, (unit, worst) in columns.items():
         values = np.array([row.value(name) for row in good.values()])
         if np.isfinite(values).any():
-            # one who never lets the tool move has no distance while it moves
+            # without motion of the tool there is no distance during motion
             values = values[np.isfinite(values)]
             metrics.add(f"worst {name}", float(worst(values)), unit)
             metrics.add(f"median {name}", float(np.median(values)), unit)
@@ -228,7 +227,7 @@ def _picture(rows: Mapping[int, RunRow]) -> Figure:
         right.axhline(0.15, color=INK, linestyle="--", linewidth=1.1)
         right.set(xlabel="time lost in s", ylabel="least distance in m", ylim=(0.0, None))
         caption = (
-            f"{len(rows)} random crossings: least true distance between person and arm, and the "
-            "time that the tool is late in the end."
+            f"{len(rows)} random crossings: least actual distance between person and arm, and the "
+            "final delay of the tool."
         )
         return render(Drawing("crossings", "Random crossings", caption, canvas))

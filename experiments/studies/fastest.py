@@ -1,4 +1,4 @@
-"""The fastest motion on ten paths: against motions that are slowed down, and a finer grid."""
+"""Study of time-optimal motions on ten paths: comparison with slowed motions and a finer grid."""
 
 import time
 from collections import defaultdict
@@ -20,7 +20,7 @@ from experiments.scenario_file import find_scenario, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import RunRow
-from pfsc_drake.control.planning.joint_course import CourseStart
+from pfsc_drake.control.planning.joint_trajectory import TrajectoryStart
 from pfsc_drake.controller.planning.drive_plan import DrivePlan
 from pfsc_drake.controller.planning.fastest_motion import FastestPlanner
 from pfsc_drake.geometry import FourierCurve
@@ -32,57 +32,57 @@ from reporting.processes import side_by_side
 from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
 
 _LEMNISCATE = "pfc_elastic_6r"
-# the lemniscate bent at random: seeds, and how far its waypoints are moved [m]
+# randomly deformed lemniscate: seeds, largest displacement [m] and number of waypoints
 _SEEDS, _BENT, _WAYPOINTS = (1, 2, 3), 0.06, 14
-# of rigid joints, as the elastic laws do it anyway
-_LED = ("controller.torque_lead=true",)
+# for rigid joints, as in the elastic laws
+_TORQUE_LEAD = ("controller.torque_lead=true",)
 PATHS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "lemniscate, six elastic axes": (_LEMNISCATE, ("reference.points=[0.96, 0.31, 1.99]",)),
     "tilted circle, seven elastic axes": ("pfc_elastic_7r", ("reference.points=[0.0, 1.25]",)),
-    "circle, seven rigid axes": ("pfc_panda_7r", ("reference.points=[0.0, 1.0]", *_LED)),
+    "circle, seven rigid axes": ("pfc_panda_7r", ("reference.points=[0.0, 1.0]", *_TORQUE_LEAD)),
     "lemniscate, visco-elastic": ("pfc_viscoelastic_3r", ()),
-    # friction of its drives is nothing that is believed; bodies that are tied move in steps of 1 ms
-    "DELTA": ("pfc_delta", ("drive_friction=false", "robot.plant=analytic", *_LED)),
-    "SCARA": ("pfc_scara_4r", _LED),
+    # its drive friction is not modelled; constrained bodies have time steps of 1 ms
+    "DELTA": ("pfc_delta", ("drive_friction=false", "robot.plant=analytic", *_TORQUE_LEAD)),
+    "SCARA": ("pfc_scara_4r", _TORQUE_LEAD),
     "line on a surface": ("pfc_on_surface_6r", ()),
 }
-# on the path from the start, and nothing but the motion to be told of
+# start on the path, without further targets
 _COMMON = (
     *("reference.speed=fastest", "reference.velocity=null", "reference.dwell=0.2"),
     *("start.offset=[0, 0]", "start.rotation_deg=[0, 0, 0]", "start.transition=0", "targets={}"),
 )
-_AS_BELIEVED = "as believed"
+_NOMINAL = "nominal model"
 _ROBOTS: Mapping[str, tuple[str, ...]] = {
-    _AS_BELIEVED: ("encoders={}", "friction={}", "model_error={}", "driver={}"),
-    "masses believed 5 % too low": (
+    _NOMINAL: ("encoders={}", "friction={}", "model_error={}", "driver={}"),
+    "nominal masses 5 % too low": (
         *("encoders={}", "friction={}", "driver={}"),
         "model_error={mass: 0.95}",
     ),
 }
-# what a motion that is slowed down was asked for [m/s, m/s^2]
-_ASKED = ((0.5, 5.0), (1.0, 10.0), (2.0, 20.0), (4.0, 40.0))
+# requested speeds and accelerations of slowed motions [m/s, m/s^2]
+_REQUESTED = ((0.5, 5.0), (1.0, 10.0), (2.0, 20.0), (4.0, 40.0))
 _FINER = 4
 _GOAL = "the study's goal"
 _DESCRIPTION = (
-    "Paths of shipped scenarios and the lemniscate bent at random, gone along from rest to rest in "
-    "the least time that 70 % of the believed drives' torques and of their rates allow. Beside "
-    "it: the shortest of the motions that are slowed down where they do not fit, asked for at "
-    "0.5 to 4 m/s, which know no rates; the fastest when rates are left alone; and the fastest on "
-    "a grid four times as fine. Then the closed loop: distance from the path, and the largest "
-    "torque by the largest that was planned, on the robot that is believed and a heavier one."
+    "Paths of shipped scenarios and the randomly deformed lemniscate, travelled from rest to rest "
+    "in minimum time within 70 % of the nominal drives' torques and torque rates. For comparison: "
+    "the shortest motion with slow-down at drive limits, requested at 0.5 to 4 m/s, without rate "
+    "limits; the fastest motion without rate limits; and the fastest motion on a grid four times "
+    "as fine. In closed loop: distance from the path, and largest torque relative to the largest "
+    "planned one, on the nominal robot and a heavier one."
 )
 
 
 @dataclass(frozen=True)
 class Times:
-    """How long motions along one path take [s].
+    """Durations of motions along one path [s].
 
     Attributes:
-        fastest: The fastest.
-        any_rate: The fastest if rates of torques are not limited.
-        finer: The fastest on a finer grid.
-        slowed: The shortest that is slowed down where it does not fit.
-        preparation: What building and planning took of a processor [s].
+        fastest: Fastest motion.
+        any_rate: Fastest motion without limits of torque rates.
+        finer: Fastest motion on a finer grid.
+        slowed: Shortest motion with slow-down at drive limits.
+        preparation: Processor time for building and planning [s].
     """
 
     fastest: float
@@ -94,14 +94,14 @@ class Times:
 
 @dataclass(frozen=True)
 class Planned:
-    """A motion that is to be planned.
+    """Motion to be planned.
 
     Attributes:
         path: Name of its path.
-        kind: What its duration is of :class:`Times`.
+        kind: Attribute of :class:`Times` for its duration.
         scenario: Name of the scenario.
-        overrides: What of it is different.
-        finer: By how much the grid is finer.
+        overrides: Overrides of the scenario.
+        finer: Refinement factor of the grid.
     """
 
     path: str
@@ -116,7 +116,7 @@ def write_fastest(out: Path, progress: Callable[[str], None]) -> Report:
 
     Args:
         out: Folder for the page.
-        progress: Told one line for each path and run.
+        progress: Receives one line for each path and run.
 
     Returns:
         The page.
@@ -133,10 +133,10 @@ def write_fastest(out: Path, progress: Callable[[str], None]) -> Report:
             for name, (scenario, overrides) in paths.items()
             for robot, changes in _ROBOTS.items()
         }
-        rows = run_side_by_side(cases, lambda case, row: progress(_said(case, row)))
+        rows = run_side_by_side(cases, lambda case, row: progress(_row_text(case, row)))
         return write_study_page(
             results,
-            title="As fast as the drives allow",
+            title="Time-optimal motions within drive limits",
             description=_DESCRIPTION,
             overrides=[" ".join(_COMMON), *(" ".join(changes) for changes in _ROBOTS.values())],
             metrics=_metrics(times, rows),
@@ -145,7 +145,7 @@ def write_fastest(out: Path, progress: Callable[[str], None]) -> Report:
 
 
 def _random_paths(folder: Path) -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Return the lemniscate bent at random."""
+    """Return randomly deformed lemniscates."""
     curve = FourierCurve.bent_lemniscate()
     found: dict[str, tuple[str, tuple[str, ...]]] = {}
     theta = np.linspace(*curve.domain, _WAYPOINTS + 1)[:-1]
@@ -155,7 +155,7 @@ def _random_paths(folder: Path) -> dict[str, tuple[str, tuple[str, ...]]]:
         points = curve.derivatives(theta, 0)[:, 0] + moved
         np.savetxt(file, points, delimiter=",", header="x,y,z", comments="")
         shape = f"path.shape=!Waypoints {{file: {file}, closed: true}}"
-        found[f"lemniscate bent at random, {seed}"] = (
+        found[f"randomly deformed lemniscate, {seed}"] = (
             _LEMNISCATE,
             (shape, "reference.points=[0.2, 1.4]"),
         )
@@ -165,7 +165,7 @@ def _random_paths(folder: Path) -> dict[str, tuple[str, tuple[str, ...]]]:
 def _all_times(
     paths: Mapping[str, tuple[str, tuple[str, ...]]], progress: Callable[[str], None]
 ) -> dict[str, Times]:
-    """Return how long motions along paths take, planned on all cores."""
+    """Return the durations of motions along paths, planned on all cores."""
     motions = [motion for name, path in paths.items() for motion in _motions(name, *path)]
     # what is timed comes first, before anything of it is known; then long ones, so that all
     # processes end together
@@ -174,7 +174,7 @@ def _all_times(
     with side_by_side(None, len(motions)) as run:
         for motion, seconds, preparation in run(plan_motion, None, motions):
             of_path = found[motion.path]
-            # one that could not be planned is as it was asked for
+            # a motion that could not be planned has its requested duration
             of_path[motion.kind] = np.fmin(of_path.get(motion.kind, np.nan), seconds)
             if motion.kind == "fastest":
                 of_path["preparation"] = preparation
@@ -189,7 +189,7 @@ def _motions(name: str, scenario: str, overrides: tuple[str, ...]) -> list[Plann
             *("reference.speed=asked", f"reference.velocity={velocity}"),
             f"reference.acceleration={acceleration}",
         )
-        for velocity, acceleration in _ASKED
+        for velocity, acceleration in _REQUESTED
     ]
     return [
         Planned(name, "finer", scenario, overrides, _FINER),
@@ -200,10 +200,10 @@ def _motions(name: str, scenario: str, overrides: tuple[str, ...]) -> list[Plann
 
 
 def plan_motion(_: None, motion: Planned) -> tuple[Planned, float, float]:
-    """Return a motion, how long it takes [s], NaN if it does not fit, and its preparation [s].
+    """Plan a motion; return it, its duration [s], NaN if infeasible, and its preparation [s].
 
     Args:
-        motion: What to plan.
+        motion: The motion.
     """
     begin = time.process_time()
     settings, station = _built(motion.scenario, *motion.overrides)
@@ -218,22 +218,22 @@ def plan_motion(_: None, motion: Planned) -> tuple[Planned, float, float]:
 
 def _built(scenario: str, *overrides: str) -> tuple[Scenario, Station]:
     """Return the settings of a scenario, and its station."""
-    found = read_scenario(scenario, [*_COMMON, *overrides, *_ROBOTS[_AS_BELIEVED]])
-    settings = load_typed(Scenario, found.data, str(found.path))
+    found = read_scenario(scenario, [*_COMMON, *overrides, *_ROBOTS[_NOMINAL]])
+    settings = load_typed(Scenario, found.data, found.source)
     return settings, build_station(settings, found.path.parent)
 
 
 def _planner(settings: Scenario, station: Station, folder: Path) -> FastestPlanner:
-    """Return what plans the motion of a station anew."""
+    """Return a planner for the motion of a station."""
     task = make_task(settings, folder)
-    start = CourseStart(station.start_posture, station.start.place)
+    start = TrajectoryStart(station.start_posture, station.start.projection)
     options = StationOptions(settings, folder).follower
     return FastestPlanner(options, task, station.law, start, None)
 
 
 def _moving(plan: DrivePlan | None) -> float:
-    """Return how long a planned reference moves [s]."""
-    assert plan is not None  # no hand leads here
+    """Return the duration of motion of a planned reference [s]."""
+    assert plan is not None  # without hand guiding
     times = plan.times
     moves = np.abs(plan.motion.derivatives(times, 1)[:, 1]).max(axis=1) > 0.0
     return float(np.diff(times, append=times[-1])[moves].sum())
@@ -241,11 +241,11 @@ def _moving(plan: DrivePlan | None) -> float:
 
 def _fits(plan: DrivePlan | None) -> bool:
     """Return whether the drives can follow a plan."""
-    assert plan is not None  # no hand leads here
-    return len(plan.times) > 0 and (plan.is_slowed or not plan.said)
+    assert plan is not None  # without hand guiding
+    return len(plan.times) > 0 and (plan.is_slowed or not plan.messages)
 
 
-def _said(case: tuple[str, str], row: RunRow) -> str:
+def _row_text(case: tuple[str, str], row: RunRow) -> str:
     result = row.reason or f"{row.value('max_path_deviation') * 1e6:8.1f} um"
     return f"{case[0]:34s} {case[1]:30s} {result}"
 
@@ -254,23 +254,23 @@ def _metrics(times: Mapping[str, Times], rows: Mapping[tuple[str, str], RunRow])
     metrics = Metrics()
     for name, found in times.items():
         metrics.add(f"{name}: time", found.fastest, "s")
-        metrics.add(f"{name}: time, rates left alone", found.any_rate, "s")
-        metrics.add(f"{name}: time, slowed", found.slowed, "s")
+        metrics.add(f"{name}: time without rate limits", found.any_rate, "s")
+        metrics.add(f"{name}: time, slowed down", found.slowed, "s")
         metrics.add(f"{name}: time, finer grid", found.finer, "s")
         for what, value, unit, target in (
-            ("time by that of slowed", found.fastest / found.slowed, "1", "< 0.9"),
-            ("time by that of the finer grid", found.fastest / found.finer, "1", "< 1.02"),
+            ("time relative to slowed motion", found.fastest / found.slowed, "1", "< 0.9"),
+            ("time relative to finer grid", found.fastest / found.finer, "1", "< 1.02"),
             ("preparation", found.preparation, "s", "< 20"),
         ):
             metrics.add(f"{name}: {what}", value, unit, target, source=_GOAL)
     for (name, robot), row in rows.items():
         key, failed = f"{name}, {robot}", row.reason or None
         metrics.add(f"{key}: deviation", row.value("max_path_deviation"), "m", source=failed)
-        given = row.value("given_torque_share") / row.value("planned_torque_share")
-        metrics.add(f"{key}: torque by plan", given, "1", source=failed)
-        if robot == _AS_BELIEVED:
+        applied = row.value("given_torque_share") / row.value("planned_torque_share")
+        metrics.add(f"{key}: torque relative to plan", applied, "1", source=failed)
+        if robot == _NOMINAL:
             metrics.set_target(f"{key}: deviation", "< 5e-5", failed or _GOAL)
-            metrics.set_target(f"{key}: torque by plan", "< 1.01", failed or _GOAL)
+            metrics.set_target(f"{key}: torque relative to plan", "< 1.01", failed or _GOAL)
     return metrics
 
 
@@ -278,20 +278,20 @@ def _picture(times: Mapping[str, Times]) -> Figure:
     with plt.rc_context(STYLE):
         canvas = Canvas(figsize=(WIDTH, 5.0))
         panel = canvas.subplots()
-        places = np.arange(len(times))[::-1].astype(float)
+        heights = np.arange(len(times))[::-1].astype(float)
         columns = {
-            "slowed down where it does not fit": "slowed",
+            "slowed down at drive limits": "slowed",
             "fastest": "fastest",
             "fastest, grid four times as fine": "finer",
-            "fastest, rates of torques left alone": "any_rate",
+            "fastest, without rate limits": "any_rate",
         }
         for k, (label, key) in enumerate(columns.items()):
             values = [getattr(found, key) for found in times.values()]
-            at = places + 0.2 * (1.5 - k)
+            at = heights + 0.2 * (1.5 - k)
             panel.barh(at, values, height=0.18, color=COLOURS[k], label=label)
-        panel.set_yticks(places, list(times))
+        panel.set_yticks(heights, list(times))
         panel.set(xlabel="time from rest to rest in s")
         handles, labels = panel.get_legend_handles_labels()
         canvas.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
-        caption = "Time of all moves together, at 70 % of the drives' torques."
-        return render(Drawing("fastest", "Times of motions along ten paths", caption, canvas))
+        caption = "Total time of all moves, at 70 % of the drives' torques."
+        return render(Drawing("fastest", "Durations of motions along ten paths", caption, canvas))

@@ -1,4 +1,4 @@
-"""The circle of an identification: excite, measure, estimate, believe the result, and drive."""
+"""Identification study: excitation, measurement, estimation, and control with the result."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ from reporting.page import Report, Table
 from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
 
 TRUE, WRONG, IDENTIFIED = "true", "wrong by Tab. C.3", "identified"
-BELIEFS = (TRUE, WRONG, IDENTIFIED)
+MODELS = (TRUE, WRONG, IDENTIFIED)
 MOST = 1.5  # of the deviation with the true model
 _ENCODERS = (
     "encoders={motor_increments: [4000000], link_increments: [4000000], difference_quotient: true}"
@@ -45,23 +45,23 @@ _ERROR = "model_error={random: {seed: 1, mass: 0.056, inertia: 0.056, friction: 
 _DEVIATION, _FROM_REFERENCE = "max_path_deviation", "max_error_from_compliant_reference"
 _SEED = 1
 _DESCRIPTION = (
-    "Each robot is excited, its experiment simulated with friction, noise, encoders and a coloured "
-    "disturbance; from what was measured come its base parameters, the nearest consistent model, "
-    "and files. Then scenarios are driven three times: with a law that believes the true model, "
-    "one wrong by the deviations of Tab. C.3, and the identified one."
+    "For each robot an experiment is simulated with friction, noise, encoders and a coloured "
+    "disturbance. Base parameters, the nearest consistent model and its files are estimated from "
+    "the measurements. Then scenarios run with three models of the controller: the true one, one "
+    "with the deviations of Tab. C.3, and the identified one."
 )
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A scenario that is driven with what was identified.
+    """Scenario of a run with the identified model.
 
     Attributes:
         scenario: Its name.
-        model: Which of the written models it believes.
-        metric: What it is judged by.
-        overrides: Overrides of the scenario, for all beliefs.
-        friction: Whether it believes a friction.
+        model: Model file of the controller.
+        metric: Metric of the comparison.
+        overrides: Overrides of the scenario, for all models.
+        friction: Whether the controller has a friction model.
     """
 
     scenario: str
@@ -73,16 +73,16 @@ class Drive:
 
 @dataclass(frozen=True)
 class CircularRun:
-    """The identification of a robot, and what is driven with it.
+    """Identification of a robot, and runs with the result.
 
     Attributes:
-        robot: Name of a shipped one.
-        drives: By what they are called on the page.
+        robot: Name of a shipped robot.
+        drives: Scenarios by their labels on the page.
         starts: Starts of the search for an excitation.
-        runs: How often the experiment is made.
-        limits: Limits of the joints where not those of the model, see
+        runs: Number of experiments.
+        limits: Limits of the joints that replace the model's, see
             :func:`~identification.excitation.limits.chosen_limits`.
-        validation: Name of another shipped motion; searched for without.
+        validation: Name of another shipped motion; empty to search one.
     """
 
     robot: str
@@ -137,13 +137,13 @@ CIRCLES = (
 def write_identification(
     out: Path, progress: Callable[[str], None], circles: Sequence[CircularRun] = CIRCLES
 ) -> Report:
-    """Identify robots, drive with the results, and write a page for each robot.
+    """Identify robots, run scenarios with the results, and write a page for each robot.
 
     Args:
         out: Folder for the first robot, with a folder for the files of each step; further robots
             have folders in it.
-        progress: Told one line per step.
-        circles: What to identify and to drive.
+        progress: Receives one line per step.
+        circles: Identifications and their scenarios.
 
     Returns:
         The page of the first robot.
@@ -182,25 +182,25 @@ def _identify(circle: CircularRun, out: Path, progress: Callable[[str], None]) -
         consistent = consistent_set(findings, bounds_of(subject, None), direct=False)
         model = write_consistent(subject, consistent, out / "model")
         progress(f"{circle.robot}: model written, {len(model.files)} files")
-        rows = run_side_by_side(_scenarios(circle, out / "model"), _said(circle, progress))
+        rows = run_side_by_side(_scenarios(circle, out / "model"), _row_listener(circle, progress))
         results.write(RECORDING, page)
-        assert motion is not None  # there is one that was not used
+        assert motion is not None  # the validation motion
         content = _content(circle, subject, findings, motion.t, consistent, rows)
         return write_page(results, content)
 
 
 def _stepwise(robot: str, progress: Callable[[str], None]) -> Callable[[float, str], None]:
-    """Return what tells a line at the beginning of each step."""
-    said = ""
+    """Return a progress listener that reports a line at the beginning of each step."""
+    last = ""
 
-    def tell(fraction: float, phase: str) -> None:
-        nonlocal said
-        words = phase.split(",", maxsplit=1)[0]
-        if words != said:
-            said = words
+    def report(fraction: float, phase: str) -> None:
+        nonlocal last
+        step = phase.split(",", maxsplit=1)[0]
+        if step != last:
+            last = step
             progress(f"{robot}: {phase}")
 
-    return tell
+    return report
 
 
 def _other_motion(
@@ -221,23 +221,23 @@ def _scenarios(circle: CircularRun, model: Path) -> dict[tuple[str, str], Scenar
     folder = model.resolve()
     found = {}
     for name, drive in circle.drives.items():
-        believed = [f"controller.model={folder / drive.model}", "model_error={}"]
+        identified = [f"controller.model={folder / drive.model}", "model_error={}"]
         if drive.friction:
-            believed.append(f"controller.friction.believed.file={folder / 'parameters.yaml'}")
-        beliefs = {TRUE: ["model_error={}"], WRONG: [_ERROR], IDENTIFIED: believed}
-        for belief, changes in beliefs.items():
-            found[name, belief] = read_scenario(drive.scenario, [*drive.overrides, *changes])
+            identified.append(f"controller.friction.believed.file={folder / 'parameters.yaml'}")
+        models = {TRUE: ["model_error={}"], WRONG: [_ERROR], IDENTIFIED: identified}
+        for kind, changes in models.items():
+            found[name, kind] = read_scenario(drive.scenario, [*drive.overrides, *changes])
     return found
 
 
-def _said(
+def _row_listener(
     circle: CircularRun, progress: Callable[[str], None]
 ) -> Callable[[tuple[str, str], RunRow], None]:
-    def tell(case: tuple[str, str], row: RunRow) -> None:
+    def report(case: tuple[str, str], row: RunRow) -> None:
         value = row.value(circle.drives[case[0]].metric)
         progress(f"{case[0]:38s} {case[1]:20s} {row.reason or f'{value * 1e3:.4f} mm'}")
 
-    return tell
+    return report
 
 
 def _content(
@@ -251,7 +251,7 @@ def _content(
     metrics, table = Metrics(), []
     deviations = np.array(
         [
-            [rows[name, belief].value(drive.metric) for belief in BELIEFS]
+            [rows[name, kind].value(drive.metric) for kind in MODELS]
             for name, drive in circle.drives.items()
         ]
     )
@@ -261,8 +261,8 @@ def _content(
         key = name.replace(",", "").replace(" ", "_")
         metrics.add(f"{key}_ratio", ratio, "1", f"<= {MOST}", source)
         table.append([name, drive.metric, *(1e3 * values).tolist(), ratio])
-    head = ["scenario", "metric", *(f"{belief} in mm" for belief in BELIEFS), "ratio"]
-    caption = "Largest deviations with laws that believe these models; identified by true."
+    head = ["scenario", "metric", *(f"{kind} in mm" for kind in MODELS), "ratio"]
+    caption = "Largest deviations by model of the controller; ratio of identified to true model."
     picture = _picture(list(circle.drives), deviations)
     return PageContent(
         subject,
@@ -272,7 +272,7 @@ def _content(
         recording=RECORDING,
         metrics=metrics,
         figures=[picture],
-        tables=[Table("Driven with what was identified", caption, head, table)],
+        tables=[Table("Control with the identified model", caption, head, table)],
         attributes={"circle": _DESCRIPTION},
     )
 
@@ -281,17 +281,17 @@ def _picture(names: Sequence[str], deviations: np.ndarray) -> Figure:
     with plt.rc_context(STYLE):
         canvas = Canvas(figsize=(WIDTH, 0.9 * len(names) + 1.2))
         panel = canvas.subplots()
-        places = np.arange(len(names))[::-1].astype(float)
-        for i, belief in enumerate(BELIEFS):
+        heights = np.arange(len(names))[::-1].astype(float)
+        for i, kind in enumerate(MODELS):
             panel.barh(
-                places + 0.27 * (1 - i),
+                heights + 0.27 * (1 - i),
                 1e3 * deviations[:, i],
                 height=0.25,
                 color=COLOURS[i],
-                label=belief,
+                label=kind,
             )
         panel.set(xscale="log", xlabel="largest deviation in mm")
-        panel.set_yticks(places, names)
+        panel.set_yticks(heights, names)
         canvas.legend(loc="outside lower center", ncols=3, frameon=False)
-        caption = "Laws that believe the true, a wrong and the identified model of the same robot."
-        return render(Drawing("circle", "Driven with what was identified", caption, canvas))
+        caption = "Control with the true, a wrong and the identified model of the same robot."
+        return render(Drawing("circle", "Control with the identified model", caption, canvas))

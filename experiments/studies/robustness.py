@@ -1,4 +1,4 @@
-"""What robots that are not their models do to every law, before and after the cures."""
+"""Robustness study: all laws under model errors and disturbances, before and after measures."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ from reporting.metrics import Metrics
 from reporting.page import Report
 from reporting.style import ALERT, COLOURS, STYLE, WIDTH, Drawing, Figure, render
 
-# nothing but the law between the plant and its model
+# exact model and measurement as the base
 _BARE = ("model_error={}", "encoders={}")
 _OBSERVED = ("controller.friction.source=observer",)
-# what links and tool do that the model does not tell, of robots that nothing pushes
+# unmodelled torques of links and tool, for robots without external forces
 _TORQUE_OBSERVED = "controller.external_torque={source: observed, bandwidth: 60}"
 _UNOBSERVED = ("controller.friction.source=none",)
-_FRICTION = "friction"  # as each subject says it
+_FRICTION = "friction"  # overrides of each subject
 _ENCODERS = (
     "encoders={motor_increments: [4000000], link_increments: [4000000], difference_quotient: true}"
 )
@@ -34,7 +34,7 @@ DISTURBANCES: Mapping[str, tuple[str, ...]] = {
     "K_s 10 % too high": ("model_error.stiffness=1.1",),
     "tool 0.5 kg too light": ("model_error.tool_mass=-0.5",),
     "friction": (_FRICTION,),
-    "all at once": (
+    "all combined": (
         _FRICTION,
         "model_error.mass=0.95",
         "model_error.stiffness=1.05",
@@ -44,30 +44,29 @@ DISTURBANCES: Mapping[str, tuple[str, ...]] = {
 _SHOWN = (2e-5, 1e3)  # mm
 BEFORE, AFTER = "before", "after"
 _DESCRIPTION = (
-    "Every row believes its robot to be what the disturbance says, while the plant stays as it "
-    "is; friction is that of Tab. C.3 (of the drives on the DELTA robot, the identified one on "
-    "seven axes). Before: gains with equal poles, nothing known of friction. After: the scenario's "
-    "gains, and an observer of the drives' disturbance torque (300 1/s), on three elastic axes of "
-    "the external torque too "
-    "(60 1/s). 'All at once' is friction, masses 5 % too low, K_s 5 % too high, and encoders of 4 "
+    "In each row the nominal model has the stated error, with the same plant; friction is taken "
+    "from Tab. C.3 (drives of the DELTA robot, identified friction for seven axes). Before: gains "
+    "with equal poles, no friction compensation. After: the scenario's gains, and an observer of "
+    "the drives' disturbance torque (300 1/s), for three elastic axes also of the external torque "
+    "(60 1/s). 'All combined': friction, masses 5 % too low, K_s 5 % too high, and encoders of 4 "
     "million increments with difference quotients. Largest distances after the transition from "
-    "the start to the path; of pfc_compliant_6r from the reference that yields."
+    "the start to the path; for pfc_compliant_6r from the compliant reference."
 )
-# what one run is called by: scenario, disturbance, before or after
+# key of a run: scenario, disturbance, before or after
 Case = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
 class StudiedLaw:
-    """A scenario whose law is to bear disturbances.
+    """Scenario of the study, with its measures against disturbances.
 
     Attributes:
         scenario: Its name.
-        before: What it was before the cures, as overrides.
-        after: The cures beyond those that the scenario has.
+        before: Overrides before the measures.
+        after: Measures in addition to those of the scenario.
         elastic: Whether its joints have a stiffness.
-        friction: Overrides without friction, and the one that gives it.
-        metric: What is to stay small.
+        friction: Overrides without and with friction.
+        metric: Name of the compared metric.
     """
 
     scenario: str
@@ -102,7 +101,7 @@ SUBJECTS = (
     StudiedLaw("pfc_elastic_3r", after=(_TORQUE_OBSERVED,)),
     StudiedLaw("pfc_viscoelastic_3r", after=(_TORQUE_OBSERVED,)),
     StudiedLaw("pfc_comau_6r"),
-    # a DELTA robot brings its own friction
+    # a DELTA robot has its own friction model
     StudiedLaw(
         "pfc_delta", elastic=False, friction=("drive_friction=false", "drive_friction=true")
     ),
@@ -120,7 +119,7 @@ def write_robustness(
 
     Args:
         out: Folder for the page.
-        progress: Told one line per run, in the order in which they end.
+        progress: Receives one line per run, in the order in which they end.
         subjects: Scenarios.
         disturbances: Overrides by name.
 
@@ -134,17 +133,17 @@ def write_robustness(
     with open_results(out, "study") as results:
         metric = {subject.scenario: subject.metric for subject in subjects}
 
-        def tell(case: Case, row: RunRow) -> None:
-            progress(f"{case[0]:22s} {case[1]:22s} {case[2]:7s} {_said(row, metric[case[0]])}")
+        def report(case: Case, row: RunRow) -> None:
+            progress(f"{case[0]:22s} {case[1]:22s} {case[2]:7s} {_row_text(row, metric[case[0]])}")
 
-        rows = run_side_by_side(_scenarios(subjects, disturbances), tell)
+        rows = run_side_by_side(_scenarios(subjects, disturbances), report)
         metrics = Metrics()
         for (scenario, disturbance, when), row in rows.items():
             key, value = f"{scenario}, {disturbance}, {when}", row.value(metric[scenario])
             metrics.add(key, value, "m", source=row.reason or None)
         return write_study_page(
             results,
-            title="Robots that are not their models",
+            title="Robustness to model errors",
             description=_DESCRIPTION,
             overrides=_listing(subjects, disturbances),
             metrics=metrics,
@@ -171,7 +170,7 @@ def _scenarios(
     return scenarios
 
 
-def _said(row: RunRow, metric: str) -> str:
+def _row_text(row: RunRow, metric: str) -> str:
     if row.status != COMPLETED:
         return row.reason
     return f"{row.value(metric) * 1e3:8.3f} mm"
@@ -223,5 +222,5 @@ def _picture(rows: Mapping[Case, RunRow], metric: Mapping[str, str]) -> Figure:
         ]
         labels = ["before", "after", "stopped by a fault"]
         canvas.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-        caption = "By how much the tool leaves the path, by what is believed of the robot."
+        caption = "Largest deviation of the tool from the path, by error of the nominal model."
         return render(Drawing("robustness", "Deviation under disturbances", caption, canvas))

@@ -1,4 +1,4 @@
-"""The page of a study."""
+"""Report page of a study."""
 
 from collections.abc import Sequence
 
@@ -21,12 +21,12 @@ def write_study_page(
     """Write metrics and page of a study, and return the page.
 
     Args:
-        results: Folder for them.
-        title: A few words.
-        description: What was run, and what to see in it.
-        overrides: What was changed in scenarios, one line each.
+        results: Folder of the results.
+        title: Title of the page.
+        description: Description of runs and results.
+        overrides: Changes of scenarios, one line each.
         metrics: Results of all runs.
-        figures: Pictures.
+        figures: Figures.
     """
     results.write("metrics.json", metrics.to_json())
     return Page(

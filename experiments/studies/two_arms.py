@@ -1,4 +1,4 @@
-"""What must be known of a workpiece's motion: two arms, over their speed, in four worlds."""
+"""Study of two arms: required knowledge of the workpiece's motion over speed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -17,15 +17,15 @@ from reporting.page import Report
 from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
 
 _SCENARIO, _METRIC = "pfc_two_arms", "max_path_deviation"
-# of the tool on the workpiece, and the others of the shipped scenario at that speed
+# speed and acceleration of the tool on the workpiece, and of the workpiece robot at that speed
 _SPEED, _ACCELERATION, _HOLDER_SPEED, _HOLDER_ACCELERATION = 0.3, 0.8, 0.144853, 0.386275
 SPEEDS = (0.1, 0.2, 0.3, 0.4)
 SOURCES: Mapping[str, tuple[str, ...]] = {
-    "jets of the holder as it moves": (),
-    "pose, and jets of its plan": ("holder.derivatives=planned",),
-    "two differences of poses": ("holder.derivatives=differenced", "holder.highest=2"),
-    "one difference": ("holder.derivatives=differenced", "holder.highest=1"),
-    "the pose alone": ("holder.derivatives=none",),
+    "actual derivatives": (),
+    "measured pose, planned derivatives": ("holder.derivatives=planned",),
+    "second difference of poses": ("holder.derivatives=differenced", "holder.highest=2"),
+    "first difference of poses": ("holder.derivatives=differenced", "holder.highest=1"),
+    "pose only": ("holder.derivatives=none",),
 }
 _EXACT = tuple(
     f"{robot}{key}={{}}"
@@ -39,20 +39,20 @@ _COARSE = tuple(
 )
 _OBSERVED = "controller.external_torque={source: observed, bandwidth: 100}"
 WORLDS: Mapping[str, tuple[str, ...]] = {
-    "nothing wrong": _EXACT,
+    "exact models and sensors": _EXACT,
     "errors, friction, encoders": (),
     "encoders ten times coarser": _COARSE,
-    "holder pushed off its plan by 60 N": (
+    "workpiece robot with force of 60 N": (
         "forces=[{begin: 0.5, end: 1000, ramp: 0.2, force: [0, 0, 60]}]",
         _OBSERVED,
     ),
 }
 _DESCRIPTION = (
-    "One elastic arm turns a pipe, the other goes along the seam of its branch, both faster and "
-    "faster. Its law is told the pipe's pose as it is measured, and the derivatives of the pose "
-    "from five sources. Models and sensors are right, or wrong as in pfc_two_arms, or its encoders "
-    "have a tenth of the increments, or the process pushes on the pipe and the holder's law does "
-    "not know of it. Crosses are runs that a fault stopped."
+    "One elastic arm turns a pipe, the other follows the seam of its branch, at increasing speed. "
+    "Its law receives the measured pose of the pipe, and derivatives of the pose from five "
+    "sources. Models and sensors are exact, or have the errors of pfc_two_arms, or encoders with a "
+    "tenth of the increments, or there is an unmodelled process force on the pipe. Crosses are "
+    "runs stopped by a fault."
 )
 # world, source, speed [m/s]
 Case = tuple[str, str, float]
@@ -69,10 +69,10 @@ def write_two_arms(
 
     Args:
         out: Folder for the page.
-        progress: Told one line per run, in the order in which they end.
+        progress: Receives one line per run, in the order in which they end.
         worlds: Overrides by name.
         sources: Overrides by name.
-        speeds: Of the tool on the workpiece [m/s].
+        speeds: Speeds of the tool on the workpiece [m/s].
 
     Returns:
         The page.
@@ -82,13 +82,13 @@ def write_two_arms(
             :func:`reporting.folder.open_results`); nothing has been run then.
     """
     scenarios = {
-        (world, source, speed): read_scenario(_SCENARIO, [*at_speed(speed), *changes, *told])
+        (world, source, speed): read_scenario(_SCENARIO, [*at_speed(speed), *changes, *own])
         for world, changes in worlds.items()
-        for source, told in sources.items()
+        for source, own in sources.items()
         for speed in speeds
     }
     with open_results(out, "study") as results:
-        rows = run_side_by_side(scenarios, lambda case, row: progress(_said(case, row)))
+        rows = run_side_by_side(scenarios, lambda case, row: progress(_row_text(case, row)))
         metrics = Metrics()
         for (world, source, speed), row in rows.items():
             key = f"{world}, {source}, {speed:g} m/s"
@@ -96,7 +96,7 @@ def write_two_arms(
         changes = [" ".join(x) for x in (*worlds.values(), *sources.values()) if x]
         return write_study_page(
             results,
-            title="What must be known of a workpiece's motion",
+            title="Required knowledge of a workpiece's motion",
             description=_DESCRIPTION,
             overrides=changes,
             metrics=metrics,
@@ -105,22 +105,22 @@ def write_two_arms(
 
 
 def at_speed(speed: float) -> list[str]:
-    """Return the overrides by which both arms move as in the shipped scenario, at another speed.
+    """Return the overrides for the motion of the shipped scenario at another speed.
 
     Args:
-        speed: Of the tool on the workpiece [m/s].
+        speed: Speed of the tool on the workpiece [m/s].
     """
-    pace = speed / _SPEED
+    scaling = speed / _SPEED
     return [
         f"reference.velocity={speed!r}",
-        f"reference.acceleration={_ACCELERATION * pace**2!r}",
-        f"holder.reference.velocity={_HOLDER_SPEED * pace!r}",
-        f"holder.reference.acceleration={_HOLDER_ACCELERATION * pace**2!r}",
+        f"reference.acceleration={_ACCELERATION * scaling**2!r}",
+        f"holder.reference.velocity={_HOLDER_SPEED * scaling!r}",
+        f"holder.reference.acceleration={_HOLDER_ACCELERATION * scaling**2!r}",
         "targets={}",
     ]
 
 
-def _said(case: Case, row: RunRow) -> str:
+def _row_text(case: Case, row: RunRow) -> str:
     world, source, speed = case
     result = row.reason or f"{row.value(_METRIC) * 1e3:9.5f} mm"
     return f"{world:36s} {source:32s} {speed:4.2f} m/s {result}"
@@ -152,6 +152,8 @@ def _picture(rows: Mapping[Case, RunRow]) -> Figure:
             panel.set(ylabel="largest deviation in mm")
         handles, labels = panels[0].get_legend_handles_labels()
         canvas.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
-        caption = "The largest distance of the tool from the seam, from the true joints of both."
-        drawing = Drawing("two_arms_study", "What is known of the workpiece", caption, canvas)
+        caption = "Largest distance of the tool from the seam, from actual joint positions."
+        drawing = Drawing(
+            "two_arms_study", "Deviation by knowledge of the workpiece's motion", caption, canvas
+        )
         return render(drawing)

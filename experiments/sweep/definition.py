@@ -1,4 +1,4 @@
-"""What makes a sweep the sweep it is: its samples, and the file that keeps it with its rows."""
+"""Definition of a sweep: variations, samples, and the file with definition and rows."""
 
 import dataclasses
 import itertools
@@ -15,14 +15,14 @@ import numpy as np
 
 from experiments.sweep.values import Random, column_value, parse_values, split_values
 from experiments.sweep.worker import RunRow
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 from pfsc_drake.yaml.reading import read_text
 from reporting.folder import ResultsFolder
 
 RECORD = "sweep.json"
 
 _PROGRAM = ("python", "-m", "experiments")
-# no row is older than this when the process is killed [s], or than so many times what writing takes
+# largest age of unsaved rows [s], or multiple of the time for writing
 _OLDEST, _SHARE = 2.0, 20.0
 _SPOKEN = {
     "vary": "--vary {}",
@@ -36,7 +36,7 @@ _SPOKEN = {
 
 @dataclass(frozen=True)
 class SweepDefinition:
-    """All that decides what the runs of a sweep are.
+    """Definition of the runs of a sweep.
 
     Attributes:
         scenario: As given on the command line.
@@ -57,11 +57,11 @@ class SweepDefinition:
     content: str
 
     def to_data(self) -> dict[str, Any]:
-        """Returns the definition as data for JSON."""
+        """Return the definition as data for JSON."""
         return json.loads(json.dumps(dataclasses.asdict(self)))
 
     def command(self) -> str:
-        """Returns the command line of the sweep."""
+        """Return the command line of the sweep."""
         words = [*_PROGRAM, "sweep", self.scenario]
         for option in self.vary:
             words += ["--vary", option]
@@ -71,7 +71,7 @@ class SweepDefinition:
         return shlex.join(words)
 
     def run_command(self, overrides: tuple[str, ...]) -> str:
-        """Returns the command line that repeats one run.
+        """Return the command line that repeats one run.
 
         Args:
             overrides: Overrides of its sample.
@@ -79,7 +79,7 @@ class SweepDefinition:
         return shlex.join([*_PROGRAM, "run", self.scenario, *self._common(overrides)])
 
     def difference(self, other: dict[str, Any]) -> str | None:
-        """Returns what another sweep has otherwise, e.g. ``--seed 1``; None if it is the same.
+        """Return the first difference of another sweep, e.g. ``--seed 1``; None if it is the same.
 
         Args:
             other: From :meth:`to_data`.
@@ -100,14 +100,14 @@ class SweepDefinition:
 
 
 class SweepRecord:
-    """Definition and rows of a sweep, kept in a folder while the rows come in.
+    """Definition and rows of a sweep, saved in a folder as runs end.
 
     Attributes:
-        rows: By number of the sample.
+        rows: Rows by number of the sample.
     """
 
     def __init__(self, results: ResultsFolder, definition: SweepDefinition) -> None:
-        """Takes up what the folder holds of the same sweep.
+        """Read the rows of the same sweep in the folder.
 
         Raises:
             InputError: If the folder holds rows of another sweep, or its record cannot be read.
@@ -119,11 +119,11 @@ class SweepRecord:
         self.save()
 
     def missing(self, count: int) -> list[int]:
-        """Returns the numbers of the samples that have no final row yet, of ``count``."""
+        """Return the numbers of the samples that have no final row yet, of ``count``."""
         return [i for i in range(count) if i not in self.rows or not self.rows[i].is_final]
 
     def take(self, number: int, row: RunRow) -> None:
-        """Takes a row; writes all of them if that was last done some time ago."""
+        """Add a row, and write all rows after some time."""
         self.rows[number] = row
         begin = time.monotonic()
         if begin - self._written >= self._pause:
@@ -140,7 +140,7 @@ class SweepRecord:
 
 
 def _read(path: Path, folder: Path, definition: SweepDefinition) -> dict[int, RunRow]:
-    """Rows of an earlier session."""
+    """Return the rows of an earlier session."""
     try:
         content = json.loads(read_text(path))
         difference = definition.difference(content["sweep"])
@@ -160,7 +160,7 @@ def _read(path: Path, folder: Path, definition: SweepDefinition) -> dict[int, Ru
 
 
 def _words(value: Any) -> str:
-    """A value as it stood on the command line."""
+    """Return a value as on the command line."""
     if isinstance(value, list):
         return " ".join(str(entry) for entry in value) or "none"
     return "none" if value is None else str(value)
@@ -178,7 +178,7 @@ class Variation:
     Attributes:
         name: The keys as given, which names the columns of the table.
         keys: Dotted paths in the scenario, all of which get the same value.
-        values: What they get.
+        values: Their values.
     """
 
     name: str
@@ -191,9 +191,9 @@ class Sample:
     """One run of a sweep.
 
     Attributes:
-        index: Its place in the sweep, from 0.
+        index: Its index in the sweep, from 0.
         overrides: ``key.path=value`` each, as ``--set`` takes them.
-        varied: What the table shows of it, by column; numbers or texts.
+        varied: Varied values by column of the table; numbers or texts.
     """
 
     index: int
@@ -202,7 +202,7 @@ class Sample:
 
 
 def parse_variation(option: str) -> Variation:
-    """Reads one ``--vary KEY=VALUES``.
+    """Read one ``--vary KEY=VALUES``.
 
     Args:
         option: ``KEY`` is a dotted path, with ``.2`` or ``[2]`` for the third element of a list;
@@ -212,7 +212,7 @@ def parse_variation(option: str) -> Variation:
     Raises:
         InputError: If it is malformed.
     """
-    source = f"--vary {shortened(option, 100)}"
+    source = f"--vary {shorten(option, 100)}"
     name, separator, text = option.partition("=")
     name = name.strip()
     keys = tuple(_INDEX.sub(r".\1", key.strip()) for key in name.split("+"))
@@ -222,7 +222,7 @@ def parse_variation(option: str) -> Variation:
 
 
 def parse_variations(options: Sequence[str]) -> list[Variation]:
-    """Reads all ``--vary`` of a sweep.
+    """Read all ``--vary`` of a sweep.
 
     Raises:
         InputError: If there is none, one is malformed, or a key is varied twice.
@@ -230,32 +230,32 @@ def parse_variations(options: Sequence[str]) -> list[Variation]:
     if not options:
         raise InputError("--vary: missing; allowed: one or more of --vary key.path=values")
     variations = [parse_variation(option) for option in options]
-    seen: set[str] = set()
+    known: set[str] = set()
     for key in (key for variation in variations for key in variation.keys):
-        if key in seen:
-            raise InputError(f"--vary {shortened(key)}: varied twice; allowed: once")
-        seen.add(key)
+        if key in known:
+            raise InputError(f"--vary {shorten(key)}: varied twice; allowed: once")
+        known.add(key)
     return variations
 
 
 def draw_samples(variations: Sequence[Variation], count: int | None, seed: int) -> list[Sample]:
-    """Returns the samples: every combination of the grids, with every random draw.
+    """Return the samples: every combination of the grids, with every random draw.
 
-    Every random key has a generator of its own, made from the seed and the key's place: the first
-    samples are the same however many there are, and all combinations of the grids share them.
+    Each random key has its own generator, from the seed and the key's position: the first samples
+    are independent of the number of samples, and all combinations of the grids share them.
 
     Args:
-        variations: What varies.
+        variations: The variations.
         count: Number of random draws; None if nothing is random.
         seed: Seed of the draws, 0 or more.
 
     Raises:
-        InputError: If ``count`` is missing, or there for nothing, or there are more than MAX_RUNS.
+        InputError: If ``count`` is missing or useless, or there are more than MAX_RUNS runs.
     """
     grids = [None if isinstance(v.values, Random) else v.values for v in variations]
     randoms = [variation for variation in variations if isinstance(variation.values, Random)]
     if randoms and count is None:
-        raise InputError(f"--samples: missing; {shortened(randoms[0].name)} is random")
+        raise InputError(f"--samples: missing; {shorten(randoms[0].name)} is random")
     if not randoms and count is not None:
         raise InputError(f"--samples {count}: nothing is random; allowed: no --samples")
     if seed < 0:
@@ -269,8 +269,8 @@ def draw_samples(variations: Sequence[Variation], count: int | None, seed: int) 
     if draws * combinations > MAX_RUNS:
         raise InputError(f"{draws * combinations} runs; allowed: up to {MAX_RUNS}")
     generators = [
-        np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(place,))))
-        for place in range(len(variations))
+        np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(k,))))
+        for k in range(len(variations))
     ]
     samples: list[Sample] = []
     for _ in range(draws):
@@ -298,7 +298,7 @@ def _sample(index: int, variations: Sequence[Variation], texts: Sequence[str]) -
 
 
 def _columns(variation: Variation, text: str) -> dict[str, Any]:
-    """Columns of one variation; of a list one each, if its elements are drawn apart."""
+    """Return the columns of one variation, one per element of a list of independent draws."""
     values = variation.values
     if not (isinstance(values, Random) and values.length is not None):
         return {variation.name: column_value(text)}

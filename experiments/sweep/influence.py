@@ -1,4 +1,4 @@
-"""How a metric depends on a parameter: it rises, it falls, or it has its least value in between."""
+"""Dependence of a metric on a parameter: monotonic, or with an extremum in between."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,23 +7,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata, spearmanr, t
 
-# values of the parameter on each side of a bend, and share of the runs
+# values of the parameter on each side of an extremum, and share of the runs
 _STEPS, _LEAST_SIDE = 2, 0.1
 _MOST_BENDS = 60
-# probability of each branch by chance; bends are looked for at many places
+# probability of each branch by chance; extrema are searched at many values
 _CHANCE = 1e-3
 _EXACT = 1e-12  # of the sum of squares
 
 
 @dataclass(frozen=True)
 class Influence:
-    """How a metric depends on a parameter.
+    """Dependence of a metric on a parameter.
 
     Attributes:
         rank: Spearman's rank correlation; 0 where there is none.
-        bend: Value of the parameter at which the metric is least, or largest, and on both sides of
-            which it goes the other way; None if it has no such.
-        is_least: Whether it is least there.
+        bend: Value of the parameter at an extremum of the metric; None without one.
+        is_least: Whether it is a minimum.
         bend_rank: Correlation of the ranks with the two branches that meet there, 0 to 1.
     """
 
@@ -34,7 +33,7 @@ class Influence:
 
     @property
     def strength(self) -> float:
-        """How much of the metric the parameter explains, 0 to 1."""
+        """Share of the metric explained by the parameter, 0 to 1."""
         return max(abs(self.rank), self.bend_rank)
 
     def __str__(self) -> str:
@@ -44,12 +43,12 @@ class Influence:
 
 
 def find_influence(parameter: list[Any], values: NDArray[Any]) -> Influence:
-    """Return how a metric depends on a parameter, none on one that is no number.
+    """Return the dependence of a metric on a numeric parameter, none for others.
 
     Two branches that meet at one of the parameter's values are fitted to the ranks of the metric
-    over those of the parameter, so that neither scale matters. They count if both are steeper than
-    chance makes them, or the metric's mean goes down and up again, or up and down, without
-    exception; and if they explain more than one line.
+    over those of the parameter, so that neither scale matters. They count if both slopes are
+    significant, or the metric's mean is unimodal without exception; and if they explain more than
+    one line.
 
     Args:
         parameter: Values of the parameter, one a run.
@@ -82,7 +81,7 @@ def find_influence(parameter: list[Any], values: NDArray[Any]) -> Influence:
 
 
 def _turns_at(means: NDArray[Any], k: int) -> bool:
-    """Return whether values go one way up to the k-th, and the other way from there on."""
+    """Return whether values are monotonic up to the k-th, and reversed from there on."""
     steps = np.sign(np.diff(means))
     return bool(steps[0] != 0 and np.all(steps[:k] == steps[0]) and np.all(steps[k:] == -steps[0]))
 
@@ -91,8 +90,8 @@ def _branches(x: NDArray[Any], y: NDArray[Any]) -> tuple[float, bool, bool]:
     """Fit two lines that meet at x = 0.
 
     Returns:
-        The sum of squares that they leave, a share of that without them; whether both rise, or both
-        fall, away from where they meet, and not by chance; and whether the left one rises.
+        Residual sum of squares relative to the total one; whether both rise, or both fall,
+        significantly away from the common point; and whether the left one rises.
     """
     A = np.column_stack([np.ones_like(x), np.maximum(-x, 0.0), np.maximum(x, 0.0)])
     found = np.linalg.lstsq(A, y, rcond=None)[0]

@@ -1,4 +1,4 @@
-"""Many runs on many processes: those of this machine, or those behind an address."""
+"""Many runs on processes of this machine or of a Dask scheduler."""
 
 import contextlib
 import importlib.util
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 from experiments.scenario_file import ScenarioFile
 from experiments.sweep.worker import DIED, FAILED, RunRow, RunTask, program_revision, run_task
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 from reporting import processes
-from reporting.interruption import noticed_interruption
+from reporting.interruption import watch_interruption
 from reporting.processes import local_cluster
 from reporting.terminal import one_line
 
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 
 Key = TypeVar("Key", bound=Hashable)
 
-_LOOK = 0.2  # s, how often Ctrl-C is noticed
-_ASK = 1.0  # s, how often new workers are; asking takes time from those of this machine
-# of a process [bytes], from which on it is replaced: every diagram leaves some megabytes behind
+_LOOK = 0.2  # s, interval of checks for Ctrl-C
+_ASK = 1.0  # s, interval of checks for new workers, which take time from local ones
+# memory of a process at which it is replaced [bytes]: each diagram leaks some megabytes
 _MOST_MEMORY = 1.5e9
 _RESTART_SECONDS = 120
 _CONNECT_SECONDS = 10
 
 _SETTINGS = {
-    # a run whose process died is a row; trying it again would take the next process too
+    # a run whose process died is a row; a retry could kill the next process, too
     "distributed.scheduler.allowed-failures": 0,
-    # what takes all memory dies, nothing is paused or put on disk before
+    # a process out of memory is killed, without pausing or spilling before
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
@@ -53,18 +53,18 @@ def run_many(
     workers: int | None = None,
     idle: Callable[[int], None] = lambda workers: None,
 ) -> str | None:
-    """Runs scenarios side by side; every process has one run at a time.
+    """Run scenarios side by side; every process has one run at a time.
 
     Args:
-        tasks: The runs by any number.
-        take: Told number and row of each run, in the order in which they end.
+        tasks: Runs by number.
+        take: Receives number and row of each run, in the order in which they end.
         interrupted: Whether to stop; runs that have not ended then are lost.
         scheduler: Address of a Dask scheduler; None for processes of this machine.
         workers: Number of processes of this machine; None for all its cores.
-        idle: Told now and then how many processes there are.
+        idle: Receives the number of processes from time to time.
 
     Returns:
-        Why not all runs were made; None if all were, or on interruption.
+        Why runs are missing; None if all were performed, or after an interruption.
 
     Raises:
         InputError: If no scheduler answers, or Dask is not installed.
@@ -78,11 +78,11 @@ def run_many(
 def run_side_by_side(
     scenarios: Mapping[Key, ScenarioFile], take: Callable[[Key, RunRow], None]
 ) -> dict[Key, RunRow]:
-    """Run scenarios on all cores, and return what came of each in their order.
+    """Run scenarios on all cores, and return their rows in order.
 
     Args:
-        scenarios: By any name.
-        take: Told name and outcome of each run, in the order in which they end.
+        scenarios: Scenarios by any name.
+        take: Receives name and row of each run, in the order in which they end.
 
     Raises:
         KeyboardInterrupt: At Ctrl-C.
@@ -94,7 +94,7 @@ def run_side_by_side(
         take(keys[number], row)
 
     tasks = {number: RunTask.of(scenarios[key]) for number, key in enumerate(keys)}
-    with noticed_interruption() as interrupted:
+    with watch_interruption() as interrupted:
         run_many(tasks, keep, interrupted=interrupted)
         if interrupted():
             raise KeyboardInterrupt
@@ -105,7 +105,7 @@ def count_cores() -> int:
     """Return the number of cores that this process may use.
 
     Raises:
-        InputError: If Dask or what keeps its tables is not installed.
+        InputError: If Dask or pyarrow is not installed.
     """
     cores = processes.count_cores()
     if importlib.util.find_spec("pyarrow") is None:
@@ -115,7 +115,7 @@ def count_cores() -> int:
 
 @contextmanager
 def open_cluster(address: str | None, workers: int) -> Iterator["Client"]:
-    """Connects to processes that take runs, until the end of the context.
+    """Connect to processes for runs, until the end of the context.
 
     Args:
         address: Address of a Dask scheduler, e.g. ``tcp://10.0.0.1:8786``; None for processes of
@@ -146,35 +146,35 @@ def _connect(address: str) -> "Client":
         parse_host_port(parse_address(address)[1])  # a Client that fails at this leaves a mess
         return Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
-        reason = shortened(" ".join(str(error).split()) or type(error).__name__, 200)
+        reason = shorten(" ".join(str(error).split()) or type(error).__name__, 200)
         raise InputError(
-            f"--scheduler {shortened(address)}: no Dask scheduler answers: {reason}; "
+            f"--scheduler {shorten(address)}: no Dask scheduler answers: {reason}; "
             "allowed: an address such as tcp://127.0.0.1:8786"
         ) from None
 
 
 def _check_program(client: "Client", address: str) -> None:
-    """Refuses a scheduler or workers that cannot run the program; who comes later, is not asked."""
+    """Reject a scheduler or workers that cannot run the program; later workers are not checked."""
     if not client.nthreads():
         return
     try:
         client.submit(program_revision, pure=False).result()
     except Exception as error:  # whatever they raise, they cannot
-        reason = shortened(" ".join(str(error).split()) or type(error).__name__, 200)
+        reason = shorten(" ".join(str(error).split()) or type(error).__name__, 200)
         raise InputError(
-            f"--scheduler {shortened(address)}: it has not this program: {reason}; allowed: in a "
+            f"--scheduler {shorten(address)}: it lacks this program: {reason}; allowed: in a "
             "clone of this revision python -m dask scheduler, python -m dask worker ADDRESS"
         ) from None
 
 
 @dataclass(frozen=True)
 class _Run:
-    """A run that was handed out.
+    """Submitted run.
 
     Attributes:
         future: Future of its row.
-        address: Address of the process that it was meant for.
-        begin: When [s].
+        address: Address of its intended process.
+        begin: Time of submission [s].
     """
 
     future: "Future"
@@ -183,9 +183,9 @@ class _Run:
 
 
 class _Dispatcher:
-    """Hands out runs, as many as there are processes.
+    """Submission of runs, one per process.
 
-    One that waited in the queue of a process would die with the run before it.
+    A run in the queue of a process would be lost together with the run before it.
     """
 
     def __init__(
@@ -218,7 +218,7 @@ class _Dispatcher:
         return None
 
     def _hand_out(self) -> str | None:
-        """Hands out runs to processes that have none; returns why that is impossible."""
+        """Submit runs to idle processes; return why that is impossible, or None."""
         if time.monotonic() - self._asked >= _ASK:
             try:
                 self._processes = list(self._client.nthreads())
@@ -259,12 +259,12 @@ class _Dispatcher:
             row = RunRow(DIED, reason, seconds=seconds)
         except Exception as error:  # e.g. a worker without this program; the other runs go on
             reason = one_line(f"{type(error).__name__}: {error}")
-            row = RunRow(FAILED, shortened(reason, 500))
+            row = RunRow(FAILED, shorten(reason, 500))
         self._take(number, row)
 
     def _restart(self, address: str) -> None:
-        """Replaces a process that has nothing to do, while the others go on."""
-        # one without nanny cannot be replaced; it goes on as it is
+        """Replace an idle process while the others continue."""
+        # a process without nanny cannot be replaced and continues
         with contextlib.suppress(Exception):
             self._client.restart_workers([address], timeout=_RESTART_SECONDS)
         self._restarting.discard(address)

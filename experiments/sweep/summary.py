@@ -1,4 +1,4 @@
-"""What a sweep says as a whole: ends, quantiles, the worst run, and a table of all runs."""
+"""Summary of a sweep: outcomes, quantiles, the worst run, and a table of all runs."""
 
 import csv
 import io
@@ -13,7 +13,7 @@ from experiments.sweep.definition import Sample
 from experiments.sweep.worker import COMPLETED, DIED, FAILED, FAULT, REFUSED, RunRow
 from reporting.metrics import Metric, Metrics, format_quantity
 
-# of the machine and what else it does, not of the robot
+# metrics of the machine and its load, not of the robot
 MACHINE_METRICS = ("real_time_factor", "controller_tick_us", "controller_tick_us_p99")
 _FAVOURITE = "max_path_deviation"
 _SPOKEN = {
@@ -30,7 +30,7 @@ _ABOUT = ("run", "status", "reason", "warnings", "simulated_time", "seconds", "h
 
 
 class Spread:
-    """How one metric is spread over the runs that completed.
+    """Distribution of a metric over the completed runs.
 
     Args:
         name: Name of the metric.
@@ -40,7 +40,7 @@ class Spread:
         name: See above.
         unit: SI.
         runs: Number of the samples with a value.
-        values: Theirs.
+        values: Their values.
         is_better_large: Whether the worst is the smallest.
         target: Target of the metric, if there is one.
         source: Source of the target.
@@ -49,7 +49,7 @@ class Spread:
     def __init__(self, name: str, metrics: Mapping[int, Metric]) -> None:
         self.name, self.runs, all_of = name, tuple(metrics), list(metrics.values())
         self.values, self.unit = np.array([metric.value for metric in all_of]), all_of[0].unit
-        # a target that not all runs share is none of the sweep; no target of the machine either
+        # only targets shared by all runs count, and none of machine metrics
         targets = {(metric.target, metric.source) for metric in all_of}
         is_shared = len(targets) == 1 and name not in MACHINE_METRICS
         self.target, self.source = targets.pop() if is_shared else (None, None)
@@ -64,39 +64,39 @@ class Spread:
 
     @property
     def worst(self) -> float:
-        """The worst value."""
+        """Worst value."""
         return float(self.values.min() if self.is_better_large else self.values.max())
 
     def quantile(self, share: float) -> float:
-        """Value that a share of the runs is not worse than."""
+        """Return the value that a share of the runs is not worse than."""
         at = 1.0 - share if self.is_better_large else share
         return float(np.quantile(self.values, at))
 
 
 def count_ends(rows: Mapping[int, RunRow]) -> dict[str, int]:
-    """Returns how many runs ended in which way, in words."""
+    """Return the number of runs by outcome."""
     counts = Counter(row.status for row in rows.values())
     return {spoken: counts[status] for status, spoken in _SPOKEN.items() if counts[status]}
 
 
-def choose_metric(spreads: Mapping[str, Spread], wanted: str | None) -> str | None:
-    """Returns the metric to draw: the one asked for if a run has it, else the usual one.
+def choose_metric(spreads: Mapping[str, Spread], requested: str | None) -> str | None:
+    """Return the metric to draw: the requested one if a run has it, else the default.
 
     Args:
         spreads: Spreads of the sweep's metrics.
-        wanted: Name of a metric; None for the usual one.
+        requested: Name of a metric; None for the default.
 
     Returns:
         None if no run completed.
     """
-    for name in (wanted, _FAVOURITE):
+    for name in (requested, _FAVOURITE):
         if name in spreads:
             return name
     return next(iter(spreads), None)
 
 
 def measure_spreads(rows: Mapping[int, RunRow]) -> dict[str, Spread]:
-    """Returns how each metric is spread over the runs that completed and have a value of it."""
+    """Return the distribution of each metric over the completed runs with a value."""
     completed = {i: rows[i] for i in sorted(rows) if rows[i].status == COMPLETED}
     spreads = {}
     for name in dict.fromkeys(name for row in completed.values() for name in row.metrics):
@@ -108,7 +108,7 @@ def measure_spreads(rows: Mapping[int, RunRow]) -> dict[str, Spread]:
 
 
 def summary_metrics(rows: Mapping[int, RunRow], chosen: str | None) -> Metrics:
-    """Returns how many runs ended in which way, then the worst value of each metric.
+    """Return the number of runs by outcome, then the worst value of each metric.
 
     Args:
         rows: Rows of the sweep.
@@ -133,7 +133,7 @@ def summary_metrics(rows: Mapping[int, RunRow], chosen: str | None) -> Metrics:
 
 
 def key_metrics(metrics: Metrics, chosen: str | None) -> list[str]:
-    """Returns the names of the metrics to look at first.
+    """Return the names of the metrics to look at first.
 
     Args:
         metrics: From :func:`summary_metrics`.
@@ -149,13 +149,13 @@ def key_metrics(metrics: Metrics, chosen: str | None) -> list[str]:
 
 
 def _described(spread: Spread) -> str:
-    """Where the worst value is, and what is usual."""
+    """Return a text with the worst run, median and 99 % quantile."""
     median, share = (format_quantity(spread.quantile(q), spread.unit) for q in (0.5, 0.99))
     return f"run {spread.worst_run}; median {median}, 99 % quantile {share}"
 
 
 def striking_runs(rows: Mapping[int, RunRow], chosen: str | None, most: int) -> dict[str, int]:
-    """Returns the runs that one wants to look at, by what strikes in them.
+    """Return the runs to inspect, by their descriptions.
 
     Args:
         rows: Rows of the sweep.
@@ -175,14 +175,14 @@ def striking_runs(rows: Mapping[int, RunRow], chosen: str | None, most: int) -> 
 
 
 def table_columns(samples: Sequence[Sample], rows: Mapping[int, RunRow]) -> Columns:
-    """Returns the columns of the table, in the order of the samples.
+    """Return the columns of the table, in the order of the samples.
 
     Args:
-        samples: All of the sweep; those without row are left out.
-        rows: By number of the sample.
+        samples: All samples of the sweep; those without row are skipped.
+        rows: Rows by number of the sample.
 
     Returns:
-        What varied, how the run ended (``status``, ``reason``, number of ``warnings``,
+        Varied values, outcome of the run (``status``, ``reason``, number of ``warnings``,
         ``simulated_time`` [s], ``seconds`` of wall clock time, ``host``, ``revision``) and every
         metric in SI units; None where a run has no value.
     """
@@ -209,13 +209,13 @@ def table_columns(samples: Sequence[Sample], rows: Mapping[int, RunRow]) -> Colu
 
 
 def units_of(rows: Mapping[int, RunRow]) -> dict[str, str]:
-    """Returns the unit of each metric, and of the times."""
+    """Return the unit of each metric, and of the times."""
     metrics = {name: metric.unit for row in rows.values() for name, metric in row.metrics.items()}
     return {"simulated_time": "s", "seconds": "s", **metrics}
 
 
 def to_csv(columns: Columns) -> str:
-    """Returns the table as CSV with a line of names; numbers keep all their digits."""
+    """Return the table as CSV with a line of names; numbers keep all their digits."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -224,11 +224,11 @@ def to_csv(columns: Columns) -> str:
 
 
 def to_parquet(columns: Columns, units: Mapping[str, str]) -> bytes:
-    """Returns the table as Parquet.
+    """Return the table as Parquet.
 
     Args:
         columns: The table.
-        units: Units of its columns; kept as ``unit`` in the metadata of the column.
+        units: Units of its columns; stored as ``unit`` in the metadata of the column.
     """
     import pyarrow
     from pyarrow import parquet
@@ -244,7 +244,7 @@ def to_parquet(columns: Columns, units: Mapping[str, str]) -> bytes:
 
 
 def _free(name: str, columns: Columns) -> str:
-    """A name that no other column has."""
+    """Return a unique name for a column."""
     while name in columns or name in _ABOUT:
         name += "_"
     return name
@@ -255,7 +255,7 @@ def _is_numeric(values: Sequence[Any]) -> bool:
 
 
 def _typed(values: list[Any]) -> list[Any]:
-    """Numbers of one type, nothing else changed."""
+    """Return numbers of one type, otherwise unchanged values."""
     if any(isinstance(value, float) for value in values):
         return [None if value is None else float(value) for value in values]
     return values

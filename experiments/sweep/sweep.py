@@ -1,4 +1,4 @@
-"""A sweep: many runs of one scenario into a folder, with table, pictures and page."""
+"""Sweep: many runs of one scenario, with table, figures and report page."""
 
 import copy
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from diagrams.scenario import Scenario
-from experiments.scenario_file import ScenarioFile, apply_override, read_scenario
+from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.sweep.definition import (
     Sample,
     SweepDefinition,
@@ -33,27 +33,28 @@ from experiments.sweep.sweep_figures import draw_sweep
 from experiments.sweep.worker import COMPLETED, REFUSED, RunRow, RunTask, program_revision
 from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.yaml.reading import dump_yaml
+from pfsc_drake.yaml.source import Source
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import ResultsFolder, check_folder, open_results
-from reporting.interruption import noticed_interruption
+from reporting.interruption import watch_interruption
 from reporting.metrics import Metric
 from reporting.page import Page
 from reporting.progress import CountDisplay
 from reporting.provenance import standard_attributes
 
 _KIND = "sweep"
-# samples that are tried against the schema before anything runs
+# number of samples that are checked against the schema before the runs
 _TRIED = 10
 _MOST_STRIKING = 3
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep that can start.
+    """Sweep that is ready to start.
 
     Attributes:
-        definition: What makes it the sweep it is.
-        scenario: The scenario with what is the same in all runs.
+        definition: Its definition.
+        scenario: The scenario with common overrides.
         samples: Samples of all runs.
         tasks: The runs, in the same order.
     """
@@ -66,18 +67,18 @@ class Sweep:
 
 @dataclass(frozen=True)
 class SweepOutcome:
-    """What a sweep left.
+    """Outcome of a sweep.
 
     Attributes:
-        report: The page to open; None if it could not be written.
-        rows: What is there, by number of the sample.
+        report: The report page; None if it could not be written.
+        rows: Rows by number of the sample.
         total: Number of all runs.
-        commands: Command lines of runs to look at, by what strikes in them.
-        metrics: What it says as a whole, as far as one looks at it first.
-        warnings: What may not have gone as well as hoped, one sentence each.
+        commands: Command lines of runs to inspect, by their descriptions.
+        metrics: The most important metrics of the whole sweep.
+        warnings: Warnings, one sentence each.
         interrupted: Whether the user stopped it.
-        stopped: Why not all runs were made; or None.
-        problem: Which results could not be written, why, and where they are instead; or None.
+        stopped: Why runs are missing; or None.
+        problem: Results that could not be written, with reason and substitute; or None.
     """
 
     report: Path | None
@@ -92,7 +93,7 @@ class SweepOutcome:
 
     @property
     def refusal(self) -> str | None:
-        """Why the first run was refused, if all of them were."""
+        """Reason of the first run's rejection, if all were rejected."""
         if not self.rows or any(row.status != REFUSED for row in self.rows.values()):
             return None
         return self.rows[min(self.rows)].reason
@@ -107,7 +108,7 @@ def define_sweep(
     samples: int | None = None,
     seed: int = 0,
 ) -> Sweep:
-    """Reads a scenario and what varies, and checks both before anything runs.
+    """Read and check a scenario and its variations before any run.
 
     Args:
         scenario: Name of a shipped scenario, or path of a YAML file.
@@ -145,15 +146,15 @@ def run_sweep(
     workers: int | None = None,
     metric: str | None = None,
 ) -> SweepOutcome:
-    """Makes the runs of a sweep that a folder does not have yet, and writes what they say.
+    """Perform the missing runs of a sweep in a folder, and write the results.
 
     Args:
         sweep: From :func:`define_sweep`.
-        out: Folder for the results; one with a part of the same sweep is gone on with.
-        console: Where progress is shown.
+        out: Folder for the results; a part of the same sweep is continued.
+        console: Console for progress.
         scheduler: Address of a Dask scheduler; None for processes of this machine.
         workers: Number of processes of this machine; None for all its cores.
-        metric: Metric to draw; None for the usual one.
+        metric: Metric to draw; None for the default.
 
     Raises:
         InputError: If the folder cannot be used, ``workers`` go with ``scheduler``, no scheduler
@@ -163,9 +164,9 @@ def run_sweep(
         raise InputError(f"--workers {workers}: --scheduler brings its own; allowed: one of both")
     inputs = sweep.scenario.inputs()
     check_folder(out, _KIND, inputs)
-    count_cores()  # without Dask the folder stays as it is
+    count_cores()  # without Dask the folder remains unchanged
     with (
-        noticed_interruption() as interrupted,
+        watch_interruption() as interrupted,
         open_results(out, _KIND, inputs, resume=True) as results,
     ):
         record = SweepRecord(results, sweep.definition)
@@ -195,17 +196,17 @@ def _conclude(
     sweep: Sweep,
     rows: dict[int, RunRow],
     results: ResultsFolder,
-    wanted: str | None,
+    requested: str | None,
     interrupted: bool,
     stopped: str | None,
 ) -> SweepOutcome:
-    """Writes table, metrics, pictures and page of what is there."""
+    """Write table, metrics, figures and page."""
     columns = table_columns(sweep.samples, rows)
     results.write("scenario.yaml", dump_yaml(sweep.scenario.data))
     results.write("sweep.csv", to_csv(columns))
     results.write("sweep.parquet", to_parquet(columns, units_of(rows)))
     spreads = measure_spreads(rows)
-    chosen = choose_metric(spreads, wanted)
+    chosen = choose_metric(spreads, requested)
     metrics = summary_metrics(rows, chosen)
     results.write("metrics.json", metrics.to_json())
     commands = {
@@ -217,9 +218,9 @@ def _conclude(
         varied = dict.fromkeys(name for sample in sweep.samples for name in sample.varied)
         figures = draw_sweep(spreads[chosen], columns, list(varied))
     warnings = _warnings(rows)
-    if wanted not in (None, chosen) and chosen is not None:
-        there = f"{', '.join(spreads)}{suggestion(wanted, spreads)}"
-        warnings.append(f"--metric {wanted}: no run has it; there are {there}")
+    if requested not in (None, chosen) and chosen is not None:
+        available = f"{', '.join(spreads)}{suggestion(requested, spreads)}"
+        warnings.append(f"--metric {requested}: no run has it; available: {available}")
     report = Page(
         kind="Sweep",
         title=sweep.scenario.name,
@@ -249,22 +250,22 @@ def _conclude(
 
 
 def _varied(scenario: ScenarioFile, sample: Sample) -> ScenarioFile:
-    """The scenario of one sample."""
-    data = copy.deepcopy(scenario.data)
+    """Return the scenario of one sample."""
+    varied = copy.deepcopy(scenario)
     for override in sample.overrides:
-        apply_override(data, override, "--vary")
-    return ScenarioFile(scenario.path, data)
+        varied.override(override, "--vary")
+    return varied
 
 
 def _check_keys(scenario: ScenarioFile, tasks: Sequence[RunTask]) -> None:
-    """Refuses what the schema takes in no sample: a key that is not there, a text for a number.
+    """Reject a sweep whose samples all violate the schema, e.g. by an unknown key.
 
-    A value that is wrong in one sample is the business of its row.
+    A wrong value in a single sample is reported in its row.
     """
     first = None
     for task in tasks[:: -(-len(tasks) // _TRIED)]:
         try:
-            load_typed(Scenario, task.data, str(scenario.path))
+            load_typed(Scenario, task.data, Source(str(scenario.path), task.locations))
             return
         except InputError as error:
             first = first or error
@@ -273,7 +274,7 @@ def _check_keys(scenario: ScenarioFile, tasks: Sequence[RunTask]) -> None:
 
 
 def _warnings(rows: dict[int, RunRow]) -> list[str]:
-    """What may not have gone as well as hoped."""
+    """Return warnings about a sweep."""
     warnings = []
     warned = [i for i in sorted(rows) if rows[i].warnings]
     if warned:
@@ -287,7 +288,7 @@ def _warnings(rows: dict[int, RunRow]) -> list[str]:
 
 
 def _description(sweep: Sweep, rows: dict[int, RunRow]) -> str:
-    """What was run, for the head of the page."""
+    """Return the description for the page."""
     ends = ", ".join(f"{count} {spoken}" for spoken, count in count_ends(rows).items())
     lines = [
         str(sweep.scenario.data.get("description", "")),

@@ -1,4 +1,4 @@
-"""Pictures of a sweep: the metric over each varied parameter, and its histogram."""
+"""Figures of a sweep: the metric over each varied parameter, and its histogram."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -20,10 +20,10 @@ from reporting.style import ALERT, COLOURS, INK, REFERENCE, STYLE, WIDTH, Drawin
 MAX_PANELS = 12
 
 _COLUMNS, _PANEL_HEIGHT = 3, 2.7
-# values of one parameter up to which they stand side by side
+# largest number of values with a tick each
 _FEW = 8
-_WIDE = 30.0  # ratio of largest and smallest value, from which on the scale is logarithmic
-# median of a parameter against its largest value, from which on its scale is logarithmic
+_WIDE = 30.0  # ratio of largest and smallest value, above which the scale is logarithmic
+# ratio of largest value and median of a parameter, above which its scale is logarithmic
 _CROWDED = 5.0
 _SCALES = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "s": (1.0, "s")}
 _MICRO = 1e-4  # m or rad
@@ -31,12 +31,12 @@ _CROSS_HEIGHT = 0.97  # of a panel
 
 
 def draw_sweep(spread: Spread, columns: Columns, varied: Sequence[str]) -> list[Figure]:
-    """Draws the pictures of a sweep.
+    """Draw the figures of a sweep.
 
     Args:
         spread: Spread of the metric to draw.
         columns: The table.
-        varied: Columns of what was varied.
+        varied: Columns of varied parameters.
     """
     ended_otherwise = sum(status != COMPLETED for status in columns["status"])
     return [
@@ -83,12 +83,12 @@ def _over_parameters(
         if _is_wide(spread):
             panels[0, 0].set_yscale("log")
         caption = (
-            f"{_spoken(spread)} of every run over what was varied; what shows most comes first."
+            f"{_spoken(spread)} of every run over varied parameters, the most influential first."
         )
         if bends := [
             f"{influence[n]} of {_short(n)}" for n in chosen if influence[n].bend is not None
         ]:
-            caption += f" It turns (dashed): {'; '.join(bends)}."
+            caption += f" Extrema (dashed): {'; '.join(bends)}."
         if groups:
             marks = [Line2D([], [], color=colour, marker="o", linestyle="") for colour in COLOURS]
             labels = [_short(group) for group in groups]
@@ -173,7 +173,7 @@ def _histogram(spread: Spread, ended_otherwise: int) -> Figure:
 
 
 def _positions(parameter: list[Any]) -> NDArray[Any]:
-    """Where the values of a parameter stand on its axis."""
+    """Return the positions of a parameter's values on its axis."""
     if _is_numeric(parameter):
         return np.array(parameter, dtype=float)
     kinds = _kinds(parameter)
@@ -185,7 +185,7 @@ def _kinds(parameter: list[Any]) -> list[str]:
 
 
 def _is_kind(parameter: list[Any]) -> bool:
-    """Whether a parameter divides the runs into a few kinds, told apart by colour."""
+    """Return whether a parameter divides the runs into a few kinds, distinguished by colour."""
     return not _is_numeric(parameter) and 1 < len(_kinds(parameter)) <= len(COLOURS)
 
 
@@ -194,13 +194,13 @@ def _is_numeric(parameter: list[Any]) -> bool:
 
 
 def _is_wide(spread: Spread) -> bool:
-    """Whether the values span so much that only a logarithm shows them."""
+    """Return whether the values need a logarithmic scale."""
     low, high = float(spread.values.min()), float(spread.values.max())
     return low > 0.0 and high > _WIDE * low
 
 
 def _axis(spread: Spread) -> tuple[float, str]:
-    """Factor to the unit of the axis, and its label."""
+    """Return the factor to the unit of the axis, and its label."""
     scale, unit = _SCALES.get(spread.unit, (1.0, spread.unit))
     if scale == 1e3 and 0.0 < np.abs(spread.values).max() < _MICRO:
         scale, unit = 1e6, f"µ{spread.unit}"
@@ -214,5 +214,5 @@ def _spoken(spread: Spread) -> str:
 
 
 def _short(text: str, length: int = 38) -> str:
-    """A text with its end, which says more than its beginning."""
+    """Return a text shortened at its beginning, since its end is more specific."""
     return text if len(text) <= length else f"...{text[3 - length :]}"

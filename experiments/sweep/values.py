@@ -1,4 +1,4 @@
-"""What stands behind ``--vary KEY=``: values one after the other, or a random distribution.
+"""Values of ``--vary KEY=``: a list, a grid, or a random distribution.
 
 ===========================  ==================================================================
 ``0.9,1,1.1``                these values (YAML; commas inside brackets and quotes divide nothing)
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from pfsc_drake.checks import is_number
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 from pfsc_drake.yaml.reading import parse_yaml
 
 MAX_VALUES = 100_000  # of one key
@@ -56,21 +56,21 @@ class Random:
     length: int | None = None
 
     def sample(self, generator: np.random.Generator) -> str:
-        """Returns the YAML text of one draw."""
+        """Return the YAML text of one draw."""
         if self.length is None:
             return self.draw(generator)
         return "[" + ", ".join(self.draw(generator) for _ in range(self.length)) + "]"
 
 
 def parse_values(text: str, source: str) -> tuple[str, ...] | Random:
-    """Reads what stands behind ``--vary KEY=``.
+    """Read the values of ``--vary KEY=``.
 
     Args:
-        text: Values in the words of the command line.
+        text: Values as on the command line.
         source: The option as given, for messages.
 
     Returns:
-        YAML texts of values one after the other, or a distribution.
+        YAML texts of values, or a distribution.
 
     Raises:
         InputError: If the text is none of these; names the piece.
@@ -88,24 +88,24 @@ def parse_values(text: str, source: str) -> tuple[str, ...] | Random:
     if call:
         name, pieces = call[1], split_values(call[2], source)
         if name not in _GRIDS:
-            raise InputError(f"{source}: unknown {shortened(name)}(...); {ALLOWED}")
+            raise InputError(f"{source}: unknown {shorten(name)}(...); {ALLOWED}")
         return _GRIDS[name](name, pieces, source)
     values = tuple(split_values(text, source))
     if len(values) < 2:
         raise InputError(
-            f"{source}: one value varies nothing; {ALLOWED} (--set for what is the same in all)"
+            f"{source}: one value varies nothing; {ALLOWED} (--set for constant values)"
         )
     _check_number(len(values), source)
     for value in values:
-        parse_yaml(value, f"{source}: {shortened(value)}")
+        parse_yaml(value, f"{source}: {shorten(value)}")
     return values
 
 
 def split_values(text: str, source: str) -> list[str]:
-    """Returns the pieces between the commas that stand outside of brackets and quotes.
+    """Return the pieces between commas outside of brackets and quotes.
 
     Args:
-        text: To divide.
+        text: Text to split.
         source: The option as given, for messages.
 
     Raises:
@@ -137,14 +137,14 @@ def split_values(text: str, source: str) -> list[str]:
 
 
 def number_text(value: float) -> str:
-    """Returns a number as YAML, which gives back the same bits."""
+    """Return a number as YAML text without loss of digits."""
     text = repr(float(value))
     # YAML 1.1 takes 1e-05 for a text
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
 
 def _is_random(text: str) -> bool:
-    """Whether a text is a random distribution, well formed or not."""
+    """Return whether a text is a random distribution, well formed or not."""
     call = _CALL.fullmatch(text)
     if call:
         return call[1] in _DISTRIBUTIONS
@@ -159,14 +159,14 @@ def _parse_single(text: str, source: str) -> Random:
     return Random(_uniform("", text.split(":"), source))
 
 
-def _numbers(name: str, pieces: Sequence[str], source: str, *wanted: str) -> list[float]:
-    """The arguments of a function that wants finite numbers of these names."""
-    call = f"{name}({', '.join(wanted)})" if name else ":".join(wanted)
-    if len(pieces) != len(wanted):
+def _numbers(name: str, pieces: Sequence[str], source: str, *names: str) -> list[float]:
+    """Return the finite arguments of a function with named parameters."""
+    call = f"{name}({', '.join(names)})" if name else ":".join(names)
+    if len(pieces) != len(names):
         raise InputError(f"{source}: {len(pieces)} numbers; allowed: {call}")
     for piece in pieces:
         if not (is_number(piece) and math.isfinite(float(piece))):
-            raise InputError(f"{source}: {shortened(piece)} is no number; allowed: {call}")
+            raise InputError(f"{source}: {shorten(piece)} is not a finite number; allowed: {call}")
     return [float(piece) for piece in pieces]
 
 
@@ -212,7 +212,7 @@ def _choice(name: str, pieces: Sequence[str], source: str) -> Draw:
     if len(pieces) < 2:
         raise InputError(f"{source}: one value varies nothing; allowed: {name}(a, b, c)")
     for piece in pieces:
-        parse_yaml(piece, f"{source}: {shortened(piece)}")
+        parse_yaml(piece, f"{source}: {shorten(piece)}")
     return lambda generator: pieces[int(generator.integers(len(pieces)))]
 
 
@@ -237,8 +237,8 @@ def _space(name: str, pieces: Sequence[str], source: str) -> tuple[str, ...]:
 
 
 def _counted(name: str, pieces: Sequence[str], source: str) -> tuple[str, ...]:
-    wanted = ("n",) if len(pieces) == 1 else ("first", "after")
-    bounds = [_whole(value, source) for value in _numbers(name, pieces, source, *wanted)]
+    names = ("n",) if len(pieces) == 1 else ("first", "after")
+    bounds = [_whole(value, source) for value in _numbers(name, pieces, source, *names)]
     counted = range(*bounds)
     if len(counted) < 2:
         raise InputError(f"{source}: {len(counted)} values; allowed: two or more")
@@ -261,7 +261,7 @@ _DISTRIBUTIONS: dict[str, Callable[[str, Sequence[str], str], Draw]] = {
 
 
 def column_value(text: str) -> Any:
-    """Returns what a table shows of a YAML value: a number, or else its text.
+    """Return a YAML value for a table: a number, or else its text.
 
     Args:
         text: One YAML value.

@@ -1,4 +1,4 @@
-"""One run of many: the task that is sent to a process, and the row that is kept of it."""
+"""One of many runs: the task for a process, and the row of its results."""
 
 import logging
 import math
@@ -12,7 +12,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from experiments.scenario_file import SCENARIO_DIRECTORY, ScenarioFile
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
+from pfsc_drake.yaml.source import Locations
 from reporting import processes
 from reporting.metrics import Metrics
 from reporting.provenance import git_revision
@@ -31,18 +32,18 @@ _ONE_AT_A_TIME = threading.Lock()
 
 @dataclass
 class RunRow:
-    """What is kept of one run.
+    """Row of one run.
 
     Attributes:
         status: One of STATUSES.
         reason: Why it did not complete; empty if it did.
         metrics: Its metrics; none if it never started.
-        warnings: What may not have gone as well as hoped, one sentence each.
+        warnings: Warnings, one sentence each.
         end: Simulated time at the end [s].
         seconds: Wall clock time [s].
         host: Machine that ran it.
         revision: Revision of the program there.
-        memory: Memory of its process after the run [bytes]; not kept in files.
+        memory: Memory of its process after the run [bytes]; not saved.
     """
 
     status: str
@@ -57,83 +58,92 @@ class RunRow:
 
     @property
     def is_final(self) -> bool:
-        """Whether the same run would end in the same way; not if the machine is to blame."""
+        """Whether a repetition would have the same outcome; not after errors of the machine."""
         return self.status not in (FAILED, DIED)
 
     def value(self, metric: str) -> float:
-        """Returns the value of a metric; NaN if the run did not complete."""
+        """Return the value of a metric; NaN if the run did not complete."""
         return self.metrics[metric].value if self.status == COMPLETED else math.nan
 
     def to_data(self) -> dict[str, Any]:
-        """Returns the row as data for JSON; NaN is null."""
-        kept = {field.name: getattr(self, field.name) for field in fields(self)}
-        del kept["memory"]
-        kept["metrics"] = self.metrics.to_data()
-        return kept | {name: None for name in _TIMES if not math.isfinite(kept[name])}
+        """Return the row as data for JSON; NaN is null."""
+        data = {field.name: getattr(self, field.name) for field in fields(self)}
+        del data["memory"]
+        data["metrics"] = self.metrics.to_data()
+        return data | {name: None for name in _TIMES if not math.isfinite(data[name])}
 
     @classmethod
     def from_data(cls, data: dict[str, Any]) -> "RunRow":
-        """Returns the row of what :meth:`to_data` gave.
+        """Return the row from data of :meth:`to_data`.
 
         Raises:
             KeyError, TypeError, ValueError, AttributeError: If it is something else.
         """
         if data["status"] not in STATUSES:
             raise ValueError(data["status"])
-        kept: dict[str, Any] = {name: str(data[name]) for name in _TEXTS}
-        kept |= {name: math.nan if data[name] is None else float(data[name]) for name in _TIMES}
-        kept["metrics"] = Metrics.from_data(data["metrics"])
-        kept["warnings"] = [str(warning) for warning in data["warnings"]]
-        return cls(**kept)
+        values: dict[str, Any] = {name: str(data[name]) for name in _TEXTS}
+        values |= {name: math.nan if data[name] is None else float(data[name]) for name in _TIMES}
+        values["metrics"] = Metrics.from_data(data["metrics"])
+        values["warnings"] = [str(warning) for warning in data["warnings"]]
+        return cls(**values)
 
 
 @dataclass(frozen=True)
 class RunTask:
-    """One run, as it is sent to a worker.
+    """Run as a task for a worker.
 
     Attributes:
         file: Name of the scenario's file.
         folder: Its folder, which names in it are relative to; None for a shipped scenario, which
-            every machine has in a folder of its own.
-        data: Its content with everything set.
+            every machine has in its own folder.
+        data: Its content with all overrides.
         duration: Simulated time [s] instead of the scenario's; or None.
+        locations: Locations of its keys, for messages.
     """
 
     file: str
     folder: Path | None
     data: dict[str, Any]
     duration: float | None
+    locations: Locations = field(default_factory=dict)
 
     @classmethod
     def of(cls, scenario: ScenarioFile, duration: float | None = None) -> "RunTask":
-        """Returns the task to run a scenario."""
+        """Return the task to run a scenario."""
         folder = scenario.path.parent.resolve()
         is_shipped = folder == SCENARIO_DIRECTORY
-        return cls(scenario.path.name, None if is_shipped else folder, scenario.data, duration)
+        return cls(
+            scenario.path.name,
+            None if is_shipped else folder,
+            scenario.data,
+            duration,
+            scenario.locations,
+        )
 
     def scenario(self) -> ScenarioFile:
-        """Returns the scenario as this machine has it."""
-        return ScenarioFile((self.folder or SCENARIO_DIRECTORY) / self.file, self.data)
+        """Return the scenario on this machine."""
+        path = (self.folder or SCENARIO_DIRECTORY) / self.file
+        return ScenarioFile(path, self.data, self.locations)
 
 
 class _Clock:
-    """Remembers how far a run is."""
+    """Progress listener that stores the simulated time."""
 
     def __init__(self) -> None:
         self.simulated_time = 0.0
 
     def expect(self, duration: float) -> None:
-        """Ignores the length."""
+        """Ignore the duration."""
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """Takes the time [s]."""
+        """Take the time [s]."""
         self.simulated_time = max(self.simulated_time, simulated_time)
 
 
 def run_task(task: RunTask) -> RunRow:
-    """Runs a scenario as ``run`` does, without figures and recording; keeps its row alone.
+    """Run a scenario without figures and recording, and return its row.
 
-    Whatever is wrong with the run is said in its row.
+    Errors of the run are reported in its row.
     """
     import psutil  # comes with Dask
 
@@ -165,19 +175,19 @@ def _run(task: RunTask, clock: _Clock) -> RunRow:
         return RunRow(REFUSED, one_line(str(error)))
     except Exception as error:  # whatever it is, the other runs go on
         reason = one_line(f"{type(error).__name__}: {error}")
-        return RunRow(FAILED, shortened(reason, 500))
+        return RunRow(FAILED, shorten(reason, 500))
     status = FAULT if outcome.fault else COMPLETED
     return RunRow(status, outcome.fault or "", outcome.metrics, outcome.warnings)
 
 
 @cache
 def program_revision() -> str:
-    """Returns the revision of the program in this process."""
+    """Return the revision of the program in this process."""
     return git_revision()
 
 
 def dask_setup(worker: Any) -> None:
-    """Prepares a process on this machine before it takes runs; called by Dask."""
+    """Prepare a process on this machine for runs; called by Dask."""
     processes.dask_setup(worker)
     silence_libraries()
     import experiments.simulated_run  # noqa: F401  # before the first run rather than in it

@@ -1,1 +1,1 @@
-"""Teaching by hand: from a run in which a hand led the tool to a path that is followed."""
+"""Teaching of paths by hand guiding, and following of taught paths."""

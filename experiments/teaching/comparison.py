@@ -1,4 +1,4 @@
-"""The taught path, the one that fits it, and the one that was followed, in numbers."""
+"""Metrics of a taught path: its fit to waypoints, and the run that follows it."""
 
 from contextlib import suppress
 
@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from experiments.results.run_log import FloatArray, RunLog
-from experiments.teaching.taught_path import DWELL, Taught, seen_tool, true_tool
+from experiments.teaching.taught_path import DWELL, Taught, actual_tool, measured_tool
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, path_from_waypoints, quaternion_to_matrix, shape_report
 from reporting.metrics import Metrics
@@ -16,7 +16,7 @@ _LINE_STEP = 2e-4  # m, between the samples of a path
 
 
 class Fit:
-    """How a path fits the waypoints that it was fitted to.
+    """Fit of a path to its waypoints.
 
     Args:
         taught: The path.
@@ -25,9 +25,9 @@ class Fit:
         eta: Arc length of the closest point of each waypoint [m], shape (n,).
         distances: Distances of the waypoints from the path [m], shape (n,).
         turns: Angle between their orientations and the path's [rad], shape (n,); zero without.
-        motion: Distance of everything that was seen between the first and the last waypoint from
-            the path [m], shape (samples,).
-        through: The path through all waypoints, None if there is no such path.
+        motion: Distance of all samples between the first and the last waypoint from the path [m],
+            shape (samples,).
+        through: Path through all waypoints, or None.
     """
 
     def __init__(self, taught: Taught) -> None:
@@ -39,10 +39,10 @@ class Fit:
         self.distances = np.linalg.norm(closest - table.positions, axis=1)
         self.turns = np.zeros(len(theta))
         if table.quaternions is not None and path.orientation is not None:
-            wanted = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[:, 0])
-            self.turns = _angles(quaternion_to_matrix(table.quaternions), wanted)
+            desired = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[:, 0])
+            self.turns = _angles(quaternion_to_matrix(table.quaternions), desired)
         between = slice(int(taught.rows[0]), int(taught.rows[-1]) + 1)
-        motion = seen_tool(taught.log)[0][between]
+        motion = measured_tool(taught.log)[0][between]
         motion = motion[np.isfinite(motion).all(axis=1)]
         self.motion = NearestOnLine(motion, line_of(path)).distances
         self.through: Path | None = None
@@ -53,21 +53,21 @@ class Fit:
         self._path, self._is_oriented = path, table.quaternions is not None
 
     def add_to(self, metrics: Metrics, velocity: float) -> None:
-        """Add the numbers of a page.
+        """Add the metrics of the fit.
 
         Args:
-            metrics: Where to.
-            velocity: Along the path [m/s].
+            metrics: Metrics of the page.
+            velocity: Velocity along the path [m/s].
         """
         metrics.add("waypoints", len(self.eta), "1")
         metrics.add("path_length", self._path.length, "m")
         metrics.add("fit_distance_max", self.distances.max(), "m", source="waypoints from the path")
-        metrics.add("fit_distance_rms", _rms(self.distances), "m", source="the same")
+        metrics.add("fit_distance_rms", _rms(self.distances), "m", source="waypoints from the path")
         source = "all samples between the waypoints"
         metrics.add("fit_distance_of_motion", self.motion.max(), "m", source=source)
         if self._is_oriented:
             metrics.add("fit_turn_max", self.turns.max(), "rad", source="waypoints from the path")
-        # how sharply a path bends, and how jerky a motion of this velocity along it is
+        # smallest radius of a path, and jerk of a motion along it with this velocity
         for name, path in {"through_all": self.through, "fitted": self._path}.items():
             missing, radius, rate = "no path goes through all waypoints", np.nan, np.nan
             if path is not None:
@@ -79,35 +79,34 @@ class Fit:
 
 
 class FollowedShape:
-    """How a taught path was followed, from when the tool had come to it.
+    """Comparison of a run along a taught path with the path and with teaching.
 
     Args:
         taught: The path.
         log: Log of the run along it.
 
     Attributes:
-        eta: Where the tool was [m], shape (samples,).
-        seen: Distance from the path as the controller saw it [m], shape (samples,).
-        true: Distance of the tool from the path [m], shape (samples,).
-        repeated: Distance of the tool from where it was while it was taught [m], (samples,).
-        turns: Angle from how it was turned there [rad], shape (samples,).
-        error: How far the tool was from where the controller took it to be [m], (samples,).
-        error_change: By how much that is not the error at the same point while it was taught [m],
-            shape (samples,).
-        y_t: Where the tool was [m], shape (samples, 3).
+        eta: Position of the tool along the path [m], shape (samples,).
+        measured: Measured distance from the path [m], shape (samples,).
+        actual: Actual distance from the path [m], shape (samples,).
+        repeated: Distance of the tool from its motion during teaching [m], shape (samples,).
+        turns: Angle from its orientation there [rad], shape (samples,).
+        error: Distance of the actual from the measured tool point [m], shape (samples,).
+        error_change: Change of this error since teaching, at the same point [m], shape (samples,).
+        y_t: Actual tool point [m], shape (samples, 3).
     """
 
     def __init__(self, taught: Taught, log: RunLog) -> None:
-        y_taught, R_taught, error_taught = _led_tool(taught)
-        y_t, R_e = true_tool(log)
-        seen, _ = seen_tool(log)
+        y_taught, R_taught, error_taught = _guided_tool(taught)
+        y_t, R_e = actual_tool(log)
+        measured, _ = measured_tool(log)
         xi = log["xi_measured" if "xi_measured" in log else "xi"].values
-        rows = (log.time >= DWELL) & np.isfinite(np.hstack([y_t, seen, xi])).all(axis=1)
+        rows = (log.time >= DWELL) & np.isfinite(np.hstack([y_t, measured, xi])).all(axis=1)
         self.y_t = y_t[rows]
-        nearest, error = NearestOnLine(self.y_t, y_taught), self.y_t - seen[rows]
+        nearest, error = NearestOnLine(self.y_t, y_taught), self.y_t - measured[rows]
         self.eta = log["eta"].values[rows, 0]
-        self.seen = np.linalg.norm(xi[rows], axis=1)
-        self.true = np.linalg.norm(log["xi"].values[rows], axis=1)
+        self.measured = np.linalg.norm(xi[rows], axis=1)
+        self.actual = np.linalg.norm(log["xi"].values[rows], axis=1)
         self.repeated = nearest.distances
         self.turns = _angles(R_e[rows], R_taught[nearest.samples])
         self.error = np.linalg.norm(error, axis=1)
@@ -115,21 +114,21 @@ class FollowedShape:
         self._is_oriented = taught.table.quaternions is not None
 
     def add_to(self, metrics: Metrics) -> None:
-        """Add the numbers of a page.
+        """Add the metrics of the run.
 
         Args:
-            metrics: Where to.
+            metrics: Metrics of the page.
         """
-        metrics.add("follow_deviation_seen", self.seen.max(), "m", source="xi as measured")
-        metrics.add("follow_deviation_true", self.true.max(), "m", source="xi of the tool itself")
-        source = "tool itself, from where it was while it was taught"
+        metrics.add("follow_deviation_seen", self.measured.max(), "m", source="measured xi")
+        metrics.add("follow_deviation_true", self.actual.max(), "m", source="actual xi")
+        source = "actual tool, from its position during teaching"
         metrics.add("follow_from_taught_max", self.repeated.max(), "m", source=source)
-        metrics.add("follow_from_taught_rms", _rms(self.repeated), "m", source="the same")
+        metrics.add("follow_from_taught_rms", _rms(self.repeated), "m", source=source)
         if self._is_oriented:
-            metrics.add("follow_turn_from_taught", self.turns.max(), "rad", source="the same")
-        source = "tool itself from where the controller takes it to be"
+            metrics.add("follow_turn_from_taught", self.turns.max(), "rad", source=source)
+        source = "actual from measured tool point"
         metrics.add("model_error_of_place", self.error.max(), "m", source=source)
-        source = "by how much that differs between teaching and following"
+        source = "change of this error between teaching and following"
         metrics.add("model_error_left", self.error_change.max(), "m", source=source)
 
 
@@ -141,13 +140,13 @@ def line_of(path: Path) -> FloatArray:
     return line
 
 
-def _led_tool(taught: Taught) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return where the tool was between first and last waypoint, how turned, and how far off.
+def _guided_tool(taught: Taught) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return actual positions, orientations and errors of the tool between first and last waypoint.
 
-    From the last waypoint of a closed path it goes straight to the first.
+    A closed path is completed by a straight line from the last to the first.
     """
-    y_seen, (y_t, R_e) = seen_tool(taught.log)[0], true_tool(taught.log)
-    error = y_t - y_seen
+    y_measured, (y_t, R_e) = measured_tool(taught.log)[0], actual_tool(taught.log)
+    error = y_t - y_measured
     rows = np.arange(int(taught.rows[0]), int(taught.rows[-1]) + 1)
     rows = rows[np.isfinite(error[rows]).all(axis=1)]
     if not taught.path.closed:
@@ -177,18 +176,18 @@ def _rms(values: FloatArray) -> float:
 
 
 class NearestOnLine:
-    """Where points are nearest to a line of samples.
+    """Projection of points on a line of samples.
 
-    It is on one of the two sides that meet in the nearest sample, which it is wherever the sides
-    are short beside the line's bends.
+    The closest point is searched on the two segments at the nearest sample, which is exact for
+    segments shorter than the line's radius of curvature.
 
     Args:
-        points: Finite [m], shape (n, 3).
-        line: Finite [m], shape (k, 3), k > 0; neighbours may coincide.
+        points: Finite points [m], shape (n, 3).
+        line: Finite samples [m], shape (k, 3), k > 0; neighbours may coincide.
 
     Attributes:
-        distances: From the line [m], shape (n,).
-        samples: The sample before the nearest point, shape (n,).
+        distances: Distances from the line [m], shape (n,).
+        samples: Index of the sample before the closest point, shape (n,).
     """
 
     def __init__(self, points: FloatArray, line: FloatArray) -> None:
@@ -200,11 +199,11 @@ class NearestOnLine:
         self.distances = np.linalg.norm(points - line[corner], axis=1)
         for shift in (-1, 0):
             side = np.clip(corner + shift, 0, max(len(line) - 2, 0))
-            way = line[np.minimum(side + 1, len(line) - 1)] - line[side]
-            square = np.sum(way**2, axis=1)
-            along = np.sum((points - line[side]) * way, axis=1) / np.where(square, square, 1.0)
+            segment = line[np.minimum(side + 1, len(line) - 1)] - line[side]
+            square = np.sum(segment**2, axis=1)
+            along = np.sum((points - line[side]) * segment, axis=1) / np.where(square, square, 1.0)
             share = np.clip(along, 0.0, 1.0)
-            distance = np.linalg.norm(points - line[side] - share[:, None] * way, axis=1)
+            distance = np.linalg.norm(points - line[side] - share[:, None] * segment, axis=1)
             closer = distance < self.distances
             self.distances = np.where(closer, distance, self.distances)
             samples = np.where(closer, side, samples)
@@ -212,7 +211,7 @@ class NearestOnLine:
         self.samples = apart[samples]
 
     def at(self, values: FloatArray) -> FloatArray:
-        """Return values at the samples, interpolated at the nearest points, shape (n, ..)."""
+        """Return values at the samples, interpolated at the closest points, shape (n, ..)."""
         shares = self._shares.reshape(-1, *[1] * (values.ndim - 1))
         after = np.minimum(self.samples + 1, len(values) - 1)
         return values[self.samples] + shares * (values[after] - values[self.samples])

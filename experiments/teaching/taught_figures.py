@@ -1,4 +1,4 @@
-"""Pictures of a taught path."""
+"""Figures of a taught path."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,9 +17,9 @@ from reporting.style import (
     WIDTH,
     Drawing,
     Figure,
+    add_legend,
     draw_components,
     make_panels,
-    place_legend,
     render,
 )
 
@@ -28,12 +28,12 @@ _AXES = ["x", "y", "z"]
 
 
 def draw_pictures(taught: Taught, fit: Fit, followed: FollowedShape | None) -> list[Figure]:
-    """Return the pictures of a page.
+    """Return the figures of a page.
 
     Args:
         taught: The path.
-        fit: How it fits.
-        followed: How it was followed, if it was.
+        fit: Its fit.
+        followed: The run along it, or None.
     """
     with plt.rc_context(STYLE):
         drawings = [_draw_paths(taught, followed), _draw_distances(fit, followed)]
@@ -42,7 +42,7 @@ def draw_pictures(taught: Taught, fit: Fit, followed: FollowedShape | None) -> l
 
 
 def _draw_paths(taught: Taught, followed: FollowedShape | None) -> Drawing:
-    """The waypoints, the path and the tool's way along it, from above and from the side."""
+    """Draw waypoints, fitted path and tool, from above and from the side."""
     line, points = line_of(taught.path), taught.table.positions
     canvas = Canvas(figsize=(WIDTH, 6.2))
     across = int(np.argmin(np.ptp(points, axis=0)[:2]))
@@ -50,7 +50,7 @@ def _draw_paths(taught: Taught, followed: FollowedShape | None) -> Drawing:
     views = [(along, across, "From above"), (along, 2, "From the side")]
     for panel, (i, j, title) in zip(canvas.subplots(2, 1), views, strict=True):
         panel.plot(line[:, i], line[:, j], label="fitted path", **BROAD)
-        label = "tool that follows it"
+        label = "tool following it"
         if followed is not None:
             panel.plot(followed.y_t[:, i], followed.y_t[:, j], color=COLOURS[0], label=label)
         panel.plot(
@@ -58,24 +58,24 @@ def _draw_paths(taught: Taught, followed: FollowedShape | None) -> Drawing:
         )
         panel.set(title=title, xlabel=f"{_AXES[i]} in m", ylabel=f"{_AXES[j]} in m")
         panel.set_aspect("equal", adjustable="datalim")
-        place_legend(panel)
+        add_legend(panel)
     caption = (
-        "The waypoints are where encoders and model tell the tool to be while a hand leads it; "
-        "the tool that follows is drawn where it truly is, off by the model's error."
+        "Waypoints are tool positions measured by encoders and model during hand guiding; the tool "
+        "that follows is drawn at its actual position, displaced by the model's error."
     )
     return Drawing("taught", "Taught, fitted and followed", caption, canvas)
 
 
 def _draw_distances(fit: Fit, followed: FollowedShape | None) -> Drawing:
-    """What the fit takes away, and what the robot adds."""
+    """Draw distances of waypoints from the path, and errors of the tool."""
     canvas, panels = make_panels(2 if followed is not None else 1, 2.6, common_time=False)
     panels[0].plot(fit.eta, _MILLI * fit.distances, ".-", color=COLOURS[1], linewidth=0.8)
     panels[0].set(title="Waypoints from the fitted path", ylabel="distance in mm")
     if followed is not None:
         lines = {
-            "model's error of place": followed.error,
-            "from where it was taught": followed.repeated,
-            "from the path, as measured": followed.seen,
+            "position error of the model": followed.error,
+            "distance from taught position": followed.repeated,
+            "measured distance from the path": followed.measured,
             "change of that error since teaching": followed.error_change,
         }
         for colour, (label, values) in zip(COLOURS, lines.items(), strict=False):
@@ -83,18 +83,19 @@ def _draw_distances(fit: Fit, followed: FollowedShape | None) -> Drawing:
         panels[1].set(title="The tool", ylabel="distance in mm", yscale="log")
         low = max(1e-4, 0.5 * _MILLI * float(np.quantile(followed.error_change, 0.05)))
         panels[1].set_ylim(bottom=low)
-        place_legend(panels[1], columns=2)
+        add_legend(panels[1], columns=2)
     panels[-1].set_xlabel(r"$\eta$ in m")
     caption = (
-        "Above: corners, stops and tremor of the hand, which the fit smooths. Below: how far the "
-        "tool is from where the controller takes it to be, which was the same while teaching; from "
-        "where it truly was while it was taught; and from the path."
+        "Above: corners, stops and tremor of the operator's hand, which the fit smooths. Below: "
+        "distance of actual from measured tool point, with its change since teaching; distance "
+        "from "
+        "the taught position; and distance from the path."
     )
     return Drawing("distances", "Distances", caption, canvas)
 
 
 def _draw_shape(taught: Taught, fit: Fit) -> Drawing:
-    """Curvature before and after the fit, and the orientation."""
+    """Draw curvature before and after the fit, and the orientation."""
     oriented = taught.table.quaternions is not None
     canvas, panels = make_panels(2 if oriented else 1, 2.6, common_time=False)
     if fit.through is not None:
@@ -102,11 +103,11 @@ def _draw_shape(taught: Taught, fit: Fit) -> Drawing:
     _draw_curvature(panels[0], taught.path, "fitted", COLOURS[0])
     panels[0].set(title="Curvature", ylabel="1/m", yscale="log")
     panels[0].set_ylim(bottom=0.3)
-    place_legend(panels[0])
+    add_legend(panels[0])
     if oriented:
         _draw_angles(panels[1], taught, fit)
     panels[-1].set_xlabel(r"$\eta$ in m")
-    caption = "How sharply the path bends, before and after the fit, and how it turns the tool."
+    caption = "Curvature of the path before and after the fit, and its orientation."
     return Drawing("shape", "Shape of the path", caption, canvas)
 
 
@@ -131,7 +132,7 @@ def _draw_angles(panel: Axes, taught: Taught, fit: Fit) -> None:
     points += 360.0 * np.round((path[0] - points[0]) / 360.0)
     panel.plot(fit.eta, points, ".", color=INK, markersize=2.5)
     panel.set(title="ZYX angles, fitted, and of the waypoints (dots)", ylabel="deg")
-    place_legend(panel)
+    add_legend(panel)
 
 
 def _angles_deg(quaternions: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What a hand taught in a run, a path near it, and a run that follows that."""
+"""Waypoints of a hand-guiding run, a path fitted to them, and the scenario that follows it."""
 
 import copy
 import dataclasses as dc
@@ -31,16 +31,16 @@ from pfsc_drake.yaml.typed import load_file
 
 @dc.dataclass(frozen=True)
 class TeachingOptions:
-    """How waypoints are picked, how closely a path fits them, and how fast it is followed.
+    """Options of waypoints, fit and speed of a taught path.
 
     Attributes:
         spacing: Spacing of the waypoints [m].
-        angle_deg: Turn after which a waypoint is taken before that [deg].
-        closed: Whether the tool was led back to where it began.
-        tolerance: How far the path may be from a waypoint [m].
-        tolerance_deg: The same of the orientation [deg].
-        velocity: Along the path [m/s].
-        acceleration: Along the path [m/s^2].
+        angle_deg: Rotation after which a further waypoint is taken [deg].
+        closed: Whether the path is closed.
+        tolerance: Largest distance of the path from a waypoint [m].
+        tolerance_deg: Largest angle of the path from a waypoint's orientation [deg].
+        velocity: Velocity along the path [m/s].
+        acceleration: Acceleration along the path [m/s^2].
     """
 
     spacing: float = 0.01
@@ -61,7 +61,7 @@ class TeachingOptions:
 
     @property
     def angle(self) -> float:
-        """The angle [rad]."""
+        """Largest rotation between waypoints [rad]."""
         return math.radians(self.angle_deg)
 
 
@@ -70,11 +70,11 @@ class Taught:
     """A taught path.
 
     Attributes:
-        settings: Settings of the run in which a hand led the tool.
+        settings: Settings of the hand-guiding run.
         log: Log of the run.
         rows: Samples that became waypoints, shape (n,).
-        table: The waypoints, where the controller took the tool to be.
-        path: Near them.
+        table: Waypoints, measured by the controller.
+        path: The fitted path.
     """
 
     settings: Scenario
@@ -85,18 +85,18 @@ class Taught:
 
     @property
     def smoothness(self) -> int:
-        """Class C^k of paths that the law needs, k."""
+        """Order k of the class C^k of paths required by the law."""
         return smoothness_of(self.settings)
 
 
 def read_run(folder: FilePath) -> tuple[Scenario, RunLog]:
-    """Return what was run, and its log.
+    """Return scenario and log of a hand-guiding run.
 
     Args:
         folder: Folder of a run's results.
 
     Raises:
-        InputError: If it holds none, or none of a tool that a hand led through space.
+        InputError: If it is not the folder of a hand-guiding run.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; allowed: the folder of a run's results")
@@ -104,24 +104,24 @@ def read_run(folder: FilePath) -> tuple[Scenario, RunLog]:
     manifold = settings.controller.manifold
     if manifold != SpaceManifold.name:
         raise InputError(
-            f"{folder}: controller.manifold = {manifold}; allowed: {SpaceManifold.name}, a tool "
-            "that a hand led"
+            f"{folder}: controller.manifold = {manifold}; allowed: {SpaceManifold.name}, a "
+            "hand-guiding run"
         )
     return settings, RunLog.read(folder / "log.h5")
 
 
 def taught_path(settings: Scenario, log: RunLog, options: TeachingOptions) -> Taught:
-    """Return the path that a hand taught.
+    """Return the taught path of a hand-guiding run.
 
     Args:
         settings: Settings of a run with ``controller.manifold: space``.
         log: Log of the run.
-        options: How waypoints are picked, and how closely the path fits them.
+        options: Options of waypoints and fit.
 
     Raises:
         InputError: If nothing was taught, or no path fits.
     """
-    positions, rotations = seen_tool(log)
+    positions, rotations = measured_tool(log)
     picked = rotations if keeps_orientation(settings) else None
     rows = pick_waypoints(
         positions, picked, Picking(options.spacing, options.angle, options.closed)
@@ -131,7 +131,7 @@ def taught_path(settings: Scenario, log: RunLog, options: TeachingOptions) -> Ta
         length = np.linalg.norm(np.diff(positions[rows], axis=0), axis=1).sum()
         raise InputError(
             f"taught path: {len(rows)} waypoints on {length:.3g} m; the law "
-            f"'{settings.controller.law}' needs {smoothness + 2} or more: lead the tool further, "
+            f"'{settings.controller.law}' needs {smoothness + 2} or more: guide the tool farther, "
             f"or allow a --spacing below {options.spacing:g} m"
         )
     quaternions = None if picked is None else matrix_to_quaternion(picked[rows])
@@ -146,19 +146,17 @@ def taught_path(settings: Scenario, log: RunLog, options: TeachingOptions) -> Ta
 
 
 def smoothness_of(settings: Scenario) -> int:
-    """Return k of the class C^k that a scenario's law needs of a path."""
+    """Return the order k of the class C^k of paths required by a scenario's law."""
     return RELATIVE_DEGREE[settings.controller.law] + 1
 
 
 def keeps_orientation(settings: Scenario) -> bool:
-    """Return whether a tool that is led through space has an orientation."""
+    """Return whether a freely guided tool has an orientation."""
     return settings.fixtures is not None and settings.fixtures.orientation.kind == "given"
 
 
-def seen_tool(log: RunLog) -> tuple[FloatArray, FloatArray]:
-    """Return where the controller took the tool to be.
-
-    By encoders and the model that it believes, where these are not perfect.
+def measured_tool(log: RunLog) -> tuple[FloatArray, FloatArray]:
+    """Return the tool poses measured by the controller's encoders and nominal model.
 
     Args:
         log: Log of a run.
@@ -167,7 +165,7 @@ def seen_tool(log: RunLog) -> tuple[FloatArray, FloatArray]:
         Tool points [m], shape (samples, 3), and orientations, shape (samples, 3, 3).
 
     Raises:
-        InputError: If the run had such encoders, and its log does not tell.
+        InputError: If the log lacks the measured poses.
     """
     suffix = "_measured" if "y_t_measured" in log else ""
     if not suffix and "q_J_measured" in log:
@@ -175,15 +173,15 @@ def seen_tool(log: RunLog) -> tuple[FloatArray, FloatArray]:
     return log[f"y_t{suffix}"].values, log[f"R_e{suffix}"].values.reshape(-1, 3, 3)
 
 
-def true_tool(log: RunLog) -> tuple[FloatArray, FloatArray]:
-    """Return where the tool was; see :func:`seen_tool`."""
+def actual_tool(log: RunLog) -> tuple[FloatArray, FloatArray]:
+    """Return the actual tool poses; see :func:`measured_tool`."""
     return log["y_t"].values, log["R_e"].values.reshape(-1, 3, 3)
 
 
 CSV_NAME, YAML_NAME = "taught.csv", "follow.yaml"
 TRANSITION, DWELL = 0.3, 0.5  # s
-# what is the robot's, and not the task's
-_KEPT = (
+# blocks of the robot, not of the task
+_ROBOT_KEYS = (
     "robot",
     "friction",
     "drive_friction",
@@ -200,20 +198,21 @@ _GRID = 1e-4  # m, to which the end of the motion is rounded
 def follow_scenario(taught: Taught, options: TeachingOptions) -> dict[str, Any]:
     """Return the scenario: the same robot, law and gains, on the taught path.
 
-    Where the gains tell none for the transversal coordinates, they get those of the tangential
-    ones. What is not given has its default.
+    Without gains for the transversal coordinates the tangential ones are used.
 
     Args:
         taught: The path, whose waypoints are in ``CSV_NAME`` beside the scenario.
-        options: How it fits, and how fast it is followed.
+        options: Options of fit and speed.
     """
     settings = taught.settings
-    given, default = typed_data(settings), typed_data(Scenario())
-    blocks = {key: _pruned(given[key], default[key]) for key in _KEPT if key in given}
-    blocks["robot"] |= {key: given["robot"][key] for key in ("model", "tool_frame")}
+    values, default = typed_data(settings), typed_data(Scenario())
+    blocks = {
+        key: _without_defaults(values[key], default[key]) for key in _ROBOT_KEYS if key in values
+    }
+    blocks["robot"] |= {key: values["robot"][key] for key in ("model", "tool_frame")}
     controller = blocks["controller"] | {"gains": _gains(settings), "manifold": "path"}
     if settings.controller.external_torque.source == "measured":
-        blocks["sensor"] = _pruned(given["sensor"], default["sensor"])
+        blocks["sensor"] = _without_defaults(values["sensor"], default["sensor"])
     shape = {
         "file": CSV_NAME,
         "closed": options.closed,
@@ -225,7 +224,7 @@ def follow_scenario(taught: Taught, options: TeachingOptions) -> dict[str, Any]:
     return {
         "name": f"{settings.name or 'taught'}_follow",
         "section": "5.3",
-        "description": f"Path following along the path that a hand taught in {settings.name}.",
+        "description": f"Path following along the path taught by hand guiding in {settings.name}.",
         **{key: block for key, block in blocks.items() if block not in ({}, None)},
         "path": {"shape": shape} | _orientation(settings),
         "controller": controller,
@@ -240,47 +239,47 @@ def follow_scenario(taught: Taught, options: TeachingOptions) -> dict[str, Any]:
 
 
 def follow_text(taught: Taught, options: TeachingOptions) -> str:
-    """Return the same as the content of a file."""
+    """Return the scenario as the content of a file."""
     return dump_yaml(follow_scenario(taught, options))
 
 
-def _pruned(given: Any, default: Any) -> Any:
-    """Return what is not as it is anyway."""
-    if not (isinstance(given, dict) and isinstance(default, dict)):
-        return given
-    if given.get(TAG_KEY) != default.get(TAG_KEY):
-        return given
+def _without_defaults(values: Any, default: Any) -> Any:
+    """Return the entries that differ from their defaults."""
+    if not (isinstance(values, dict) and isinstance(default, dict)):
+        return values
+    if values.get(TAG_KEY) != default.get(TAG_KEY):
+        return values
     return {
-        key: _pruned(value, default.get(key)) if key in default else value
-        for key, value in given.items()
+        key: _without_defaults(value, default.get(key)) if key in default else value
+        for key, value in values.items()
         if key not in default or value != default[key]
     }
 
 
 def _gains(settings: Scenario) -> dict[str, Any]:
     law = settings.controller.law
-    gains = _pruned(typed_data(settings.controller.gains[law]), typed_data(LawGains()))
+    gains = _without_defaults(typed_data(settings.controller.gains[law]), typed_data(LawGains()))
     if "xi" not in gains:
         gains["xi"] = copy.deepcopy(gains["eta"])
     return {law: gains}
 
 
 def _orientation(settings: Scenario) -> dict[str, Any]:
-    """Return what of the path's orientation the tool follows: what it kept while it was led."""
+    """Return the orientation task of the path: the one of hand guiding."""
     if not keeps_orientation(settings):
         return {"orientation": {"task": "none"}}
     assert settings.fixtures is not None  # it keeps an orientation
-    said = settings.fixtures.orientation
-    if said.task == "full":
+    orientation = settings.fixtures.orientation
+    if orientation.task == "full":
         return {}
-    axis = {"tool_axis": "tool_axis", "yaw": "yaw_axis"}[said.task]
-    return {"orientation": {"task": said.task, axis: list(getattr(said, axis))}}
+    axis = {"tool_axis": "tool_axis", "yaw": "yaw_axis"}[orientation.task]
+    return {"orientation": {"task": orientation.task, axis: list(getattr(orientation, axis))}}
 
 
 def _posture(taught: Taught) -> list[float]:
-    """Return the joint angles at the first waypoint [deg], or as the run was started.
+    """Return the joint angles at the first waypoint [deg], or the run's start posture.
 
-    Those that joints of both kinds have are not told apart by the log.
+    The start posture is used for joints of both kinds, which the log does not distinguish.
     """
     log = taught.log
     signal = log["q_J_measured" if "q_J_measured" in log else "q_J"]

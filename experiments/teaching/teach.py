@@ -1,4 +1,4 @@
-"""From the results of a run in which a hand led the tool to a path that is followed."""
+"""Teaching: from the results of a hand-guiding run to a path that is followed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,21 +27,21 @@ from reporting.provenance import standard_attributes
 
 KIND, FOLLOW = "teaching", "follow"
 _DESCRIPTION = (
-    "A hand led the tool, and turned it. Where encoders and model tell the tool to be was picked "
-    "as waypoints, by distance and angle; the path is the smoothest within a tolerance of them."
+    "An operator guided the tool by hand. Waypoints are tool poses measured by encoders and model, "
+    "selected by distance and angle; the path is the smoothest one within a tolerance of them."
 )
 SCENARIO, GUIDE = "teach_by_hand_6r", "guide"
 
 
 @dataclass(frozen=True)
 class TeachingOutcome:
-    """What came of teaching.
+    """Outcome of teaching.
 
     Attributes:
-        report: The page.
+        report: The report page.
         waypoints: CSV file of the waypoints; None if it could not be written.
         scenario: YAML file of the scenario that follows them; None if it could not be written.
-        fault: Why the run along the path was stopped, or None.
+        fault: Fault of the run along the path, or None.
     """
 
     report: Report
@@ -59,16 +59,16 @@ def teach(
     drawn: bool = True,
     progress: Callable[[str], None] = lambda line: None,
 ) -> TeachingOutcome:
-    """Turn a run in which a hand led the tool into a path, and follow that.
+    """Turn a hand-guiding run into a path, and follow it.
 
     Args:
-        run: Folder of its results.
+        run: Folder of the run.
         out: Folder for ``taught.csv``, ``follow.yaml``, the page, and in ``follow`` the results
             of the run along the path.
-        options: How the path is taught.
+        options: Options of teaching.
         follow: Whether to run along the path.
         drawn: Whether that run has figures and a recording.
-        progress: Told one line per step.
+        progress: Receives one line per step.
 
     Raises:
         InputError: If there is no such run, nothing was taught, no path fits, the robot cannot
@@ -88,35 +88,35 @@ def teach(
         scenario = results.write(YAML_NAME, follow_text(taught, chosen))
         outcome = None
         if follow and scenario is not None and results.explain_problems() is None:
-            outcome = run_and_tell(str(scenario), out / FOLLOW, progress, drawn=drawn)
+            outcome = run_and_report(str(scenario), out / FOLLOW, progress, drawn=drawn)
         fault = None if outcome is None else outcome.fault
         report = _write_page(results, taught, chosen, outcome, out / FOLLOW)
         return TeachingOutcome(report, csv, scenario, fault)
 
 
 def check_folders(out: Path, run: Path) -> None:
-    """Refuse folders that cannot take the results; changes nothing.
+    """Check that folders can take the results, without changes.
 
     Args:
-        out: For the results.
-        run: Run of the run in which a hand leads the tool.
+        out: Folder for the results.
+        run: Folder of the hand-guiding run.
 
     Raises:
-        InputError: If so.
+        InputError: If they cannot.
     """
     check_folder(out, KIND, [run / "log.h5", run / "scenario.yaml"])
     check_folder(out / FOLLOW, "run")
 
 
-def run_and_tell(
+def run_and_report(
     scenario: str, out: Path, progress: Callable[[str], None], *, drawn: bool = True
 ) -> RunOutcome:
-    """Run a scenario, see :func:`run_scenario`, and tell a line about it.
+    """Run a scenario, see :func:`run_scenario`, and report lines about it.
 
     Args:
         scenario: Name or file.
         out: Folder for its results.
-        progress: Told one line before and after.
+        progress: Receives one line before and after.
         drawn: Whether it has figures and a recording.
 
     Raises:
@@ -133,28 +133,28 @@ def run_and_tell(
     )
     if outcome.interrupted:
         raise KeyboardInterrupt
-    for said in [*outcome.warnings, *filter(None, [outcome.fault, outcome.problem])]:
-        progress(f"{loaded.name}: {said}")
+    for message in [*outcome.warnings, *filter(None, [outcome.fault, outcome.problem])]:
+        progress(f"{loaded.name}: {message}")
     progress(f"{loaded.name}: open {outcome.report}")
     return outcome
 
 
 class _Quarters:
-    """Tells a line at each quarter of a run."""
+    """Progress listener that reports a line at each quarter of a run."""
 
-    def __init__(self, name: str, tell: Callable[[str], None]) -> None:
-        self._name, self._tell = name, tell
-        self._duration, self._told = 0.0, 0
+    def __init__(self, name: str, report: Callable[[str], None]) -> None:
+        self._name, self._report = name, report
+        self._duration, self._reported = 0.0, 0
 
     def expect(self, duration: float) -> None:
-        """Told the simulated time at the end [s], once it is known."""
+        """Set the simulated time at the end [s]."""
         self._duration = duration
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """Told the simulated time [s] and what goes on, e.g. ``simulating``."""
-        if self._duration > 0.0 and 4.0 * simulated_time / self._duration >= self._told + 1:
-            self._told += 1
-            self._tell(f"{self._name}: {simulated_time:.1f} of {self._duration:.1f} s")
+        """Update the simulated time [s] and the phase, e.g. ``simulating``."""
+        if self._duration > 0.0 and 4.0 * simulated_time / self._duration >= self._reported + 1:
+            self._reported += 1
+            self._report(f"{self._name}: {simulated_time:.1f} of {self._duration:.1f} s")
 
 
 def _write_page(
@@ -175,7 +175,7 @@ def _write_page(
     pictures = draw_pictures(taught, fit, followed)
     warnings = []
     if "fault" in taught.log.attributes:
-        warnings.append(f"while it was taught: {taught.log.attributes['fault']}")
+        warnings.append(f"during teaching: {taught.log.attributes['fault']}")
     return Page(
         kind="Teaching",
         title=f"Taught in {taught.settings.name}",
@@ -186,9 +186,7 @@ def _write_page(
         log_attributes=standard_attributes(taught.settings.name),
         fault=None if outcome is None else outcome.fault,
         warnings=warnings,
-        commands={
-            "follow the path once more": f"python -m experiments run {results.path / YAML_NAME}"
-        },
+        commands={"follow the path again": f"pfsc run {results.path / YAML_NAME}"},
         cards=_cards(followed),
         details=f"Scenario {YAML_NAME}",
     ).write(results)
@@ -216,23 +214,23 @@ def write_teach_in(
     *,
     drawn: bool = True,
 ) -> Report:
-    """Let a hand lead a tool, follow the path that this taught, and write a page.
+    """Simulate hand guiding, follow the taught path, and write a page.
 
     Args:
-        out: Folder for waypoints, scenario and page; the run with the hand is in ``guide``, the
-            one along the path in ``follow``.
-        progress: Told one line per step.
-        scenario: Name or file of the scenario with the hand.
-        options: How the path is taught.
+        out: Folder for waypoints, scenario and page; hand guiding is in ``guide``, the run along
+            the path in ``follow``.
+        progress: Receives one line per step.
+        scenario: Name or file of the hand-guiding scenario.
+        options: Options of teaching.
         drawn: Whether the two runs have figures and recordings.
 
     Returns:
         The page.
 
     Raises:
-        InputError: If a run is refused; nothing has been run where a folder cannot take results.
+        InputError: If a run is rejected; nothing has been run if a folder cannot take results.
         KeyboardInterrupt: If the user stopped a run.
     """
     check_folders(out, out / GUIDE)
-    run_and_tell(scenario, out / GUIDE, progress, drawn=drawn)
+    run_and_report(scenario, out / GUIDE, progress, drawn=drawn)
     return teach(out / GUIDE, out, options, drawn=drawn, progress=progress).report

@@ -1,1 +1,1 @@
-"""Parameters that a body can have: the nearest such set, straight from data, and as a model."""
+"""Physically consistent parameters: nearest to an estimate, or from data, and as a model."""

@@ -1,4 +1,4 @@
-"""What is known of a robot's bodies before anything is measured, as bounds and inequalities."""
+"""Prior knowledge of a robot's bodies, as bounds and inequalities."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,8 +28,8 @@ class FrameBox:
     """A box along the axes of a frame.
 
     Attributes:
-        lower: ``[3]`` its corner with the smallest coordinates [m].
-        upper: ``[3]`` that with the largest ones [m].
+        lower: Corner with the smallest coordinates [m], shape (3,).
+        upper: Corner with the largest coordinates [m], shape (3,).
     """
 
     lower: np.ndarray = field(default_factory=lambda: np.zeros(3), metadata=REQUIRED)
@@ -43,27 +43,27 @@ class FrameBox:
 
     @property
     def center(self) -> np.ndarray:
-        """``[3]`` [m]."""
+        """Shape (3,) [m]."""
         return 0.5 * (self.lower + self.upper)
 
     @property
     def half_widths(self) -> np.ndarray:
-        """``[3]`` [m]."""
+        """Shape (3,) [m]."""
         return 0.5 * (self.upper - self.lower)
 
 
 @dataclass
 class LinkBounds(Parameters):
-    """What is known of one link, in the link frame of the robot's chain.
+    """Bounds of one link, in the link frame of the robot's chain.
 
     Attributes:
         mass: ``[2]`` least and largest mass [kg].
-        center_of_mass: Where the centre of mass is.
-        body: Where all of its mass is; if known. The second moments of the link then keep
-            ``int (x - lower)(upper - x) dm >= 0`` along each axis.
-        least_extent: How far its mass spreads at least in any direction, as standard deviation of
-            its places [m]. A ball of radius R has ``R / sqrt(5)``. The smaller it is, the nearer
-            a set may come to what no body has.
+        center_of_mass: Box that contains the centre of mass.
+        body: Box that contains all of its mass; None if unknown. With it, the second moments of the
+            link satisfy ``int (x - lower)(upper - x) dm >= 0`` along each axis.
+        least_extent: Least standard deviation of the mass distribution in any direction [m]. A ball
+            of radius R has ``R / sqrt(5)``. The smaller it is, the nearer a set may come to
+            parameters that no body has.
     """
 
     mass: np.ndarray = field(default_factory=_unit_interval, metadata=REQUIRED)
@@ -78,13 +78,12 @@ class LinkBounds(Parameters):
 
 @dataclass
 class DeltaMassBounds:
-    """What is known of the moving masses of a DELTA robot, with their shares of the rods.
+    """Bounds of the moving masses of a DELTA robot, with their shares of the rods.
 
     Attributes:
         slide: ``[2]`` least and largest ``m_q`` [kg].
         plate: ``[2]`` least and largest ``m_y`` [kg].
-        equal_slides: Whether the three slides weigh the same, as the robot's parameter file has
-            it.
+        equal_slides: Whether the three slides have the same mass, as in the robot's parameter file.
     """
 
     slide: np.ndarray = field(default_factory=_unit_interval, metadata=REQUIRED)
@@ -98,16 +97,16 @@ class DeltaMassBounds:
 
 @dataclass
 class PhysicalBounds(Parameters):
-    """What is known of a robot; either links, or the masses of a DELTA robot.
+    """Bounds of a robot; either links, or the masses of a DELTA robot.
 
     Attributes:
         name: Name of the robot.
-        links: From the base on; of the last one without tool, if the tool is not identified.
+        links: Links from the base on; the last one without tool, if the tool is not identified.
         rotor_inertia: ``[2]`` least and largest ``I_M`` of each joint [kg m^2], at the motor side
             as in the parameters; empty for no bounds but zero.
         total_mass: ``[2]`` least and largest mass of all links [kg]; empty if unknown.
         delta: Masses of a DELTA robot.
-        source: Where the numbers are from.
+        source: Source of the numbers.
     """
 
     name: Name = field(default="unnamed", metadata=REQUIRED)
@@ -131,7 +130,7 @@ class PhysicalBounds(Parameters):
 
 
 def load_bounds(robot: str | Path) -> PhysicalBounds:
-    """Return what is known of a robot.
+    """Return the bounds of a robot.
 
     Args:
         robot: Name of a shipped robot, or a YAML file.
@@ -143,7 +142,7 @@ def load_bounds(robot: str | Path) -> PhysicalBounds:
 
 
 def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
-    """Return what is known of a robot's bodies: of a file, else what is shipped.
+    """Return the bounds of a robot's bodies from a file, or else the shipped ones.
 
     Raises:
         InputError: If there is neither, or the file cannot be read.
@@ -154,7 +153,7 @@ def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
         return load_bounds(subject.family)
     except InputError:
         raise InputError(
-            f"{subject.name}: nothing is known of its links; write --bounds FILE, or of a chain "
+            f"{subject.name}: no bounds of its links; write --bounds FILE, or for a chain "
             "--total-mass LOW:HIGH [kg]"
         ) from None
 
@@ -162,19 +161,19 @@ def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
 def bounds_from_geometry(
     subject: Subject, total_mass: tuple[float, float], margin: float
 ) -> PhysicalBounds:
-    """Return bounds for a chain of which only the joints and the mass on a scale are known.
+    """Return bounds for a chain with known joints and total mass only.
 
-    A link's centre of mass is in the box around the origins of its own and the next joint (of the
-    last link: the tool point), and its mass in a box wider by as much again. Links share the total
-    mass within a factor of ten of equal shares, and spread by a tenth of the margin at least.
+    The centre of mass of a link is in the box around the origins of its own and the next joint (for
+    the last link: the tool point), and its mass in a box wider by as much again. Links share the
+    total mass within a factor of ten of equal shares, and extend by a tenth of the margin at least.
 
     Args:
         subject: A serial robot of N joints.
         total_mass: Least and largest mass of all links [kg].
-        margin: By which the box of the centre of mass is wider than the joints' origins [m].
+        margin: Margin of the box of the centre of mass around the joints' origins [m].
 
     Raises:
-        InputError: If the robot is no chain, the margin is not positive or the masses are none.
+        InputError: If the robot is not a chain, or the margin or a mass is not positive.
     """
     if subject.chain is None:
         raise InputError(f"{subject.name}: no chain of links; allowed: bounds from a file")
@@ -195,10 +194,10 @@ def bounds_from_geometry(
 
 
 def check_interval(key: str, value: np.ndarray) -> None:
-    """Refuse what is no interval of positive numbers; both ends may be equal.
+    """Refuse anything but an interval of positive numbers; both ends may be equal.
 
     Raises:
-        InputError: If it is none.
+        InputError: If it is not such an interval.
     """
     require_numbers(key, value, _INTERVAL)
     require(bool(0.0 < value[0] <= value[1]), key, value, "[least, largest], both positive")
@@ -212,14 +211,14 @@ _MASS, _FIRST_MOMENT = (LINK_PARAMETERS.index(name) for name in ("m", "mx"))
 Intervals = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def extended(link: LinkBounds) -> np.ndarray:
+def extent_terms(link: LinkBounds) -> np.ndarray:
     """Return ``M_k``, shape (10, 4, 4), of the matrix ``sum_k rho_k M_k >= 0`` of a link.
 
-    That is ``P - m r^2 diag(1, 1, 1, 0)``: about the centre of mass its first three rows and
-    columns are positive semidefinite just if the mass spreads by r in every direction.
+    It is ``P - m r^2 diag(1, 1, 1, 0)``: about the centre of mass its first three rows and columns
+    are positive semidefinite if and only if the mass extends by r in every direction.
 
     Args:
-        link: What is known of it, with the least extent r.
+        link: Bounds of the link, with the least extent r.
     """
     terms = _TERMS.copy()
     terms[_MASS, :3, :3] -= link.least_extent**2 * np.eye(3)
@@ -227,13 +226,13 @@ def extended(link: LinkBounds) -> np.ndarray:
 
 
 def link_intervals(link: LinkBounds) -> Intervals:
-    """Return what is known of the ten parameters of a link, k rows of shape (k, 10).
+    """Return the intervals of the ten parameters of a link, k rows of shape (k, 10).
 
     The mass is within its bounds, ``m lower <= h <= m upper`` for the centre of mass, and
-    ``int (x - lower)(upper - x) dm >= 0`` along each axis for all that is inside the body's box.
+    ``int (x - lower)(upper - x) dm >= 0`` along each axis for a body in a known box.
 
     Args:
-        link: What is known.
+        link: Bounds of the link.
     """
     unit = np.eye(PER_LINK)
     mass, moments = unit[_MASS], unit[_FIRST_MOMENT : _FIRST_MOMENT + 3]
@@ -250,14 +249,14 @@ def link_intervals(link: LinkBounds) -> Intervals:
 
 
 def other_intervals(layout: Layout, bounds: PhysicalBounds) -> Intervals:
-    """Return what is known beside the links one by one, rows of shape (k, n).
+    """Return the intervals beyond those of single links, rows of shape (k, n).
 
-    Those are the total mass, rotors, friction, which is not negative, and the masses of a DELTA
+    These are the total mass, rotors, friction, which is not negative, and the masses of a DELTA
     robot.
 
     Args:
         layout: Order of the n parameters.
-        bounds: What is known.
+        bounds: Bounds of the robot.
     """
     unit, none = np.eye(layout.size), [0.0, np.inf]
     rows = list(
@@ -280,23 +279,23 @@ def check_bounds(layout: Layout, bounds: PhysicalBounds) -> None:
     """Refuse bounds of another robot.
 
     Raises:
-        InputError: If they are not of as many links, or of a DELTA robot where there is none.
+        InputError: If they have another number of links, or belong to another kind of robot.
     """
-    given = f"{len(bounds.links)} links" if bounds.delta is None else "a DELTA robot"
+    found = f"{len(bounds.links)} links" if bounds.delta is None else "a DELTA robot"
     there = "a DELTA robot" if layout.is_delta else f"{len(layout.links)} links"
-    if given != there:
-        raise InputError(f"bounds of {bounds.name}: {given}; must be {there}")
+    if found != there:
+        raise InputError(f"bounds of {bounds.name}: {found}; must be {there}")
 
 
 def shipped_or_own(robot: str | Path, name: str) -> Path:
-    """Return a file that is shipped with a robot, or a user's own.
+    """Return a file shipped with a robot, or a user's own.
 
     Args:
         robot: Name of a shipped robot, or a file.
         name: Name of the shipped file.
 
     Raises:
-        InputError: If there is no such file with the robot.
+        InputError: If the robot has no such file.
     """
     path = Path(robot)
     if path.suffix:

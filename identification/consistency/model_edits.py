@@ -1,4 +1,4 @@
-"""A robot with identified inertias as a model file: its own with edits, or a new URDF."""
+"""Model file of a robot with identified inertias: an edited copy of its own, or a new URDF."""
 
 import copy
 import xml.etree.ElementTree as ET
@@ -20,7 +20,11 @@ from identification.consistency.parameter_files import (
     links_without_tool,
     tool_parameters,
 )
-from identification.model.dynamic_parameters import link_parameters, moved, true_parameters
+from identification.model.dynamic_parameters import (
+    link_parameters,
+    transform_parameters,
+    true_parameters,
+)
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.model_text import absolute_names
@@ -30,7 +34,7 @@ from pfsc_drake.robot.serial.links import ChainLink
 
 BASE = "base"
 _DRAKE = "https://drake.mit.edu"
-# where the attributes of an <inertia> stand in its matrix
+# positions of the attributes of an <inertia> in its matrix
 INERTIA_ENTRIES = {
     "ixx": (0, 0),
     "ixy": (0, 1),
@@ -44,17 +48,17 @@ INERTIA_ENTRIES = {
 def urdf_text(subject: Subject, parameters: np.ndarray) -> str:
     """Return a serial robot as URDF.
 
-    The link frames are those of the chain, counted from the frame that stands at the scenario's
-    ``robot.base_pose``. Rotors are in the transmissions, as Drake has them; elastic joints are
-    rigid here. What the robot's parameter file says of a tool is a link of its own. Friction of a
-    robot without such a file is in the joints' dynamics; that of others belongs to the scenario.
+    The link frames are those of the chain, relative to the frame at the scenario's
+    ``robot.base_pose``. Rotors are in the transmissions, as in Drake; elastic joints are rigid
+    here. A tool from the robot's parameter file is a link of its own. Friction of a robot without
+    such a file is in the joints' dynamics; otherwise it belongs to the scenario.
 
     Args:
         subject: A serial robot of N joints.
         parameters: Parameters of the robot, with or without friction, shape (n,).
 
     Raises:
-        InputError: If the robot is no chain, there are not as many parameters or one is not finite.
+        InputError: If the robot is not a chain, or the parameters have a wrong number or value.
     """
     chain, robot, layout = subject.chain, subject.parameters, layout_of(subject, parameters)
     if chain is None:
@@ -69,7 +73,7 @@ def urdf_text(subject: Subject, parameters: np.ndarray) -> str:
         X_PF = _pose(chain.links[i].R_PF, chain.links[i].p_PF)
         joint = _moving_joint(model, chain.links[i], subject.acceleration_limit[i])
         _connect(joint, *(names[i - 1 : i + 1] if i else (BASE, names[0])))
-        _place(joint, X_PF if i else X_WB.inverse() @ X_PF)
+        _add_origin(joint, X_PF if i else X_WB.inverse() @ X_PF)
         if robot is None:
             friction = parameters[layout.friction].reshape(-1, 2)
             coulomb, viscous = friction[i] if friction.size else (0.0, 0.0)
@@ -101,10 +105,10 @@ def _numbers(parent: ET.Element, tag: str, **values: float) -> None:
     ET.SubElement(parent, tag, texts)
 
 
-def _place(element: ET.Element, X: RigidTransform) -> None:
+def _add_origin(element: ET.Element, X: RigidTransform) -> None:
     angles = RollPitchYaw(X.rotation()).vector()
-    place = {"xyz": format_numbers(X.translation()), "rpy": format_numbers(angles)}
-    ET.SubElement(element, "origin", place)
+    pose = {"xyz": format_numbers(X.translation()), "rpy": format_numbers(angles)}
+    ET.SubElement(element, "origin", pose)
 
 
 def _connect(joint: ET.Element, parent: str, child: str) -> None:
@@ -115,7 +119,7 @@ def _connect(joint: ET.Element, parent: str, child: str) -> None:
 def _weld(model: ET.Element, parent: str, child: str, X: RigidTransform) -> None:
     joint = ET.SubElement(model, "joint", name=f"weld_{child}", type="fixed")
     _connect(joint, parent, child)
-    _place(joint, X)
+    _add_origin(joint, X)
 
 
 def _moving_joint(model: ET.Element, link: ChainLink, acceleration_limit: float) -> ET.Element:
@@ -127,8 +131,8 @@ def _moving_joint(model: ET.Element, link: ChainLink, acceleration_limit: float)
     limits = {"effort": link.effort_limit, "velocity": link.velocity_limit}
     limits |= {"lower": lower, "upper": upper} if limited else {}
     limits |= {"drake:acceleration": acceleration_limit}
-    given = {key: float(value) for key, value in limits.items() if np.isfinite(value)}
-    _numbers(joint, "limit", **given)
+    finite = {key: float(value) for key, value in limits.items() if np.isfinite(value)}
+    _numbers(joint, "limit", **finite)
     return joint
 
 
@@ -136,7 +140,7 @@ def _body(model: ET.Element, name: str, parameters: np.ndarray) -> None:
     """Add a link with the inertia about its centre of mass."""
     mass, center, I_C = central_inertia(parameters)
     inertial = ET.SubElement(ET.SubElement(model, "link", name=name), "inertial")
-    _place(inertial, RigidTransform(center))
+    _add_origin(inertial, RigidTransform(center))
     _numbers(inertial, "mass", value=mass)
     _numbers(inertial, "inertia", **{key: I_C[entry] for key, entry in INERTIA_ENTRIES.items()})
 
@@ -160,19 +164,19 @@ _ROTOR = "drake:rotor_inertia"
 
 @dataclass(frozen=True)
 class _Edit:
-    """Bytes of a file from start to end that become a text."""
+    """Replacement of a file's bytes from start to end by a text."""
 
     start: int
     end: int
     text: str
 
 
-def edited_model(subject: Subject, parameters: np.ndarray) -> str:
+def edit_model(subject: Subject, parameters: np.ndarray) -> str:
     """Return the text of a robot's model file with identified inertias.
 
-    What was identified of a link beyond what the model has goes into the heaviest of the bodies
-    that it is made of; the others, such as a tool or a gripper with its fingers fixed, stay. Rotors
-    stand at the drives; friction is left to the scenario, and damping that the model has stays.
+    Changes of a link beyond its model go into the heaviest of its bodies; the others, such as a
+    tool or a gripper with its fixed fingers, stay the same. Rotor inertias are at the drives;
+    friction is left to the scenario, and damping in the model stays.
 
     Args:
         subject: A serial robot read from a URDF or an SDF file with rigid joints.
@@ -214,7 +218,9 @@ def _inertial(model: ModelXml, plant: MultibodyPlant, joint: str, change: np.nda
     bodies = plant.GetBodiesWeldedTo(frame.body())
     body = max(bodies, key=lambda body: body.default_mass())
     X_BL = plant.CalcRelativeTransform(context, body.body_frame(), frame)
-    own = _parameters(plant, body) + moved(change, X_BL.rotation().matrix(), X_BL.translation())
+    own = _parameters(plant, body) + transform_parameters(
+        change, X_BL.rotation().matrix(), X_BL.translation()
+    )
     faults = link_faults(own)
     if faults:
         others = ", ".join(other.name() for other in bodies if other is not body) or "nothing"
@@ -255,13 +261,17 @@ def _sdf_inertial(own: np.ndarray) -> str:
 
 
 def _rotor(model: ModelXml, joint: str, inertia: float) -> Iterator[_Edit]:
-    """Yield the edit of a drive, or none if the model and the measurement have no rotor there."""
+    """Yield the edit of a drive, if the model or the estimate has a rotor there."""
     value = format_numbers([inertia])
     if model.root.name == "robot":
         for transmission in model.root.all("transmission"):
-            told = transmission.first("joint")
+            joint_element = transmission.first("joint")
             actuator = transmission.first("actuator")
-            if told is None or actuator is None or told.attributes.get("name") != joint:
+            if (
+                joint_element is None
+                or actuator is None
+                or joint_element.attributes.get("name") != joint
+            ):
                 continue
             yield _child(model, actuator, f'<{_ROTOR} value="{value}"/>')
             return
@@ -276,7 +286,7 @@ def _rotor(model: ModelXml, joint: str, inertia: float) -> Iterator[_Edit]:
 
 
 def _child(model: ModelXml, parent: Element, text: str) -> _Edit:
-    """Return the edit that puts the rotor's inertia into an element, in place of what is there."""
+    """Return the edit that puts the rotor's inertia into an element, or replaces it there."""
     old = parent.first(_ROTOR)
     if old is not None:
         return _Edit(old.start, old.end, text)

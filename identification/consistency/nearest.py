@@ -1,4 +1,4 @@
-"""Physically consistent parameters: nearest to identified ones, or straight from measurements."""
+"""Physically consistent parameters: nearest to identified ones, or directly from measurements."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -13,24 +13,23 @@ from pfsc_drake.checks import require, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.rules import Parameters, Range
 
-# of a covariance matrix scaled to ones on its diagonal; below, it is singular but for rounding
+# of a covariance matrix scaled to ones on its diagonal; below, it is singular up to rounding
 _SINGULAR = 1e-13
-# chi squared of each base parameter above which no robot can be meant: ten standard deviations;
-# that of Tab. C.3 is 26
+# largest plausible chi squared of each base parameter: ten standard deviations; Tab. C.3 has 26
 _FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction(Parameters):
-    """Torques that are to be predicted as by the identified base parameters.
+    """Torques to predict in agreement with the identified base parameters.
 
-    Tables of standard deviations leave out the correlations, and with them how parameters may
-    differ together without a torque telling. A few torques beside them bring that back.
+    Tables of standard deviations lack the correlations, and thus the directions in which parameters
+    may change together without an effect on torques. A few predicted torques restore them.
 
     Attributes:
         matrices: Regression matrices ``Y_b`` of a motion, shape (K, N, n_b).
         standard_deviation: Standard deviation of the torques [Nm or N], shape (N,).
-        weight: For how many measurements of each torque the motion counts.
+        weight: Number of measurements of each torque that the motion counts for.
 
     Raises:
         InputError: If shapes do not fit each other, or a number is out of range.
@@ -66,7 +65,7 @@ class ConsistentParameters:
         names: Names of the parameters.
         parameters: ``rho``, SI units, shape (n,).
         chi_squared: ``|L^-1 (K_b rho - rho_b)|^2`` with the covariance ``L L'`` of the base
-            parameters ``rho_b``: how far it is from what was measured.
+            parameters ``rho_b``: distance from the measurement.
         base_names: Names of the n_b base parameters, in words.
         base_values: ``K_b rho``, shape (n_b,).
         deviations: ``K_b rho - rho_b`` in standard deviations of each, shape (n_b,).
@@ -91,23 +90,23 @@ def nearest_consistent(
 ) -> ConsistentParameters:
     """Return the consistent parameters nearest to base parameters.
 
-    Near is meant in the metric of the covariance: the set is the most likely one among the
-    consistent ones, but for the small weight of the prior; see
+    The distance is in the metric of the covariance: the set is the most likely one among the
+    consistent ones, up to the small weight of the prior; see
     :func:`~identification.consistency.semidefinite_program.least_squares`.
 
     Args:
         base: Base of the robot, or other combinations of its parameters.
         values: Identified base parameters ``rho_b``, shape (n_b,).
         covariance: Covariance of the values, shape (n_b, n_b).
-        bounds: What is known of the bodies.
-        prior: What parameters without effect tend to, shape (n,); by default the middle of the
+        bounds: Bounds of the bodies.
+        prior: Values for parameters without effect, shape (n,); by default the middle of the
             bounds.
         prior_weight: Weight of the distance from the prior beside chi squared.
         prediction: Torques that count beside chi squared.
 
     Raises:
         InputError: If a shape is wrong, a number not finite, the covariance not positive definite,
-            or the bounds cannot be kept.
+            or the bounds cannot be met.
     """
     values = check_values(base, values)
     L = factor(base, covariance)
@@ -132,15 +131,15 @@ def nearest_consistent(
 
 
 def refuse_far(found: ConsistentParameters, source: str) -> None:
-    """Refuse a consistent set that is nowhere near to what was measured.
+    """Refuse a consistent set that is far from the measurement.
 
     Args:
         found: The set.
-        source: Source of what was measured.
+        source: Source of the measurement.
 
     Raises:
         InputError: If chi squared is far above the number of base parameters; names the parameters
-            that are furthest off.
+            with the largest deviations.
     """
     count = len(found.base_values)
     if found.chi_squared <= _FAR * count:
@@ -161,7 +160,7 @@ def check_values(base: BaseParameters, values: np.ndarray) -> np.ndarray:
     """Return base parameters as an array, shape (n_b,).
 
     Raises:
-        InputError: If they are not as many as the base has, or one is not finite.
+        InputError: If their number differs from the base, or one is not finite.
     """
     values = np.asarray(values, dtype=float)
     if values.shape != (base.rank,):
@@ -178,7 +177,7 @@ def factor(base: BaseParameters, covariance: np.ndarray) -> np.ndarray:
     """Return the lower triangular ``L`` with the covariance ``L L'``, shape (n_b, n_b).
 
     Args:
-        base: Whose values have the covariance.
+        base: Base parameters of the covariance.
         covariance: Shape (n_b, n_b).
 
     Raises:
@@ -215,21 +214,19 @@ def estimate_consistent(
 ) -> ConsistentParameters:
     """Return the consistent parameters with the least weighted squares (2.80) of the residuals.
 
-    All torques that count enter by the factors of the weighted information matrix: with
-    ``X = U F``, ``F = diag(values) V' diag(scale)``, ``|F K_b rho - U' b|^2`` and a constant are
-    the weighted squares, see
-    :func:`~identification.consistency.semidefinite_program.least_squares`. Noise
-    is taken for white; for the metric of a covariance of coloured noise take
-    :func:`nearest_consistent`. Chi squared is by how much the weighted squares grow as the
-    parameters are required to be consistent.
+    All used torques enter by the factors of the weighted information matrix: with ``X = U F``,
+    ``F = diag(values) V' diag(scale)``, ``|F K_b rho - U' b|^2`` and a constant are the weighted
+    squares, see :func:`~identification.consistency.semidefinite_program.least_squares`. Noise is
+    assumed white; for the metric of a covariance of coloured noise use :func:`nearest_consistent`.
+    Chi squared is the increase of the weighted squares by the requirement of consistency.
 
     Args:
-        estimate: What a motion tells about the base parameters.
-        bounds: What is known of the bodies.
-        prior_weight: As of :func:`nearest_consistent`, beside the weighted squares.
+        estimate: Estimate of the base parameters from a motion.
+        bounds: Bounds of the bodies.
+        prior_weight: As in :func:`nearest_consistent`, beside the weighted squares.
 
     Raises:
-        InputError: If the bounds are of another robot or cannot be kept.
+        InputError: If the bounds belong to another robot or cannot be met.
     """
     base, factors = estimate.base, estimate.factors
     F = factors.values[:, None] * factors.directions.T * factors.scale

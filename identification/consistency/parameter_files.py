@@ -1,4 +1,4 @@
-"""Parameters checked to be those of a robot, and written into robots' parameter files."""
+"""Physical checks of a robot's parameters, and parameter files from them."""
 
 from dataclasses import replace
 
@@ -8,8 +8,8 @@ from identification.consistency.pseudo_inertia import Layout, pseudo_inertia
 from identification.model.dynamic_parameters import (
     link_moments,
     link_parameters,
-    moved,
     parameter_names,
+    transform_parameters,
 )
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
@@ -22,19 +22,19 @@ from pfsc_drake.robot.models.robot_parameters import (
 )
 from pfsc_drake.robot.serial.chain import SerialChain
 
-# of the largest moment of inertia, by which rounding may break an inequality
+# of the largest moment of inertia, tolerance of the inequalities for rounding
 _ROUNDING = 1e-9
 
 
 def inconsistencies(subject: Subject, parameters: np.ndarray) -> list[str]:
-    """Return what no body has, one sentence each; nothing for a consistent set.
+    """Return the violated physical conditions, one sentence each; nothing for a consistent set.
 
     Args:
         subject: The robot.
-        parameters: All of them, with or without friction, shape (n,).
+        parameters: All parameters, with or without friction, shape (n,).
 
     Raises:
-        InputError: If they are not as many, or one is not finite.
+        InputError: If their number is wrong, or one is not finite.
     """
     layout = layout_of(subject, parameters)
     parameters = layout.check("parameters", parameters)
@@ -60,10 +60,10 @@ def require_consistent(subject: Subject, parameters: np.ndarray) -> None:
 
     Args:
         subject: The robot.
-        parameters: All of them, with or without friction, shape (n,).
+        parameters: All parameters, with or without friction, shape (n,).
 
     Raises:
-        InputError: If they are not as many, one is not finite, or there are inconsistencies.
+        InputError: If their number is wrong, one is not finite, or there are inconsistencies.
     """
     found = inconsistencies(subject, parameters)
     if found:
@@ -72,17 +72,17 @@ def require_consistent(subject: Subject, parameters: np.ndarray) -> None:
 
 
 def layout_of(subject: Subject, parameters: np.ndarray) -> Layout:
-    """Return the layout of parameters with friction, or without if they are as many."""
+    """Return the layout of parameters with or without friction, by their number."""
     layout = Layout.of(parameter_names(subject))
-    bare = Layout.of(parameter_names(subject, friction=False))
-    return bare if np.shape(parameters) == (bare.size,) else layout
+    without_friction = Layout.of(parameter_names(subject, friction=False))
+    return without_friction if np.shape(parameters) == (without_friction.size,) else layout
 
 
 def central_inertia(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass [kg], centre of mass [m] (3,) and inertia about that [kg m^2] (3, 3).
+    """Return mass [kg], centre of mass [m] (3,) and inertia about it [kg m^2] (3, 3).
 
     Args:
-        parameters: The ten of one link, with a mass, shape (10,).
+        parameters: The ten parameters of a link with a mass, shape (10,).
     """
     mass, moment, inertia = link_moments(parameters)
     center = moment / mass
@@ -90,10 +90,10 @@ def central_inertia(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarr
 
 
 def link_faults(parameters: np.ndarray) -> list[str]:
-    """Return what is not physical about a link, in words; nothing if it is.
+    """Return the violated physical conditions of a link in words; nothing if there are none.
 
     Args:
-        parameters: Its ten, shape (10,).
+        parameters: Its ten parameters, shape (10,).
     """
     if parameters[0] <= 0.0:
         return [f"mass {parameters[0]:.6g} kg; must be positive"]
@@ -108,23 +108,23 @@ def link_faults(parameters: np.ndarray) -> list[str]:
 
 
 SOURCE = "identified; physically consistent"
-# of a slide's mass, by which slides that the file holds as one may differ
+# of a slide's mass, tolerated difference of slides that have one mass in the file
 _EQUAL_SLIDES = 1e-6
 
 
 def identified_robot(subject: Subject, parameters: np.ndarray) -> ArmParameters:
     """Return a serial robot's parameters with identified links, rotors and friction.
 
-    Geometry, limits, tool, elasticities and variants stay. If the tool was identified as a part of
-    the last link, what the file says of it is taken off.
+    Geometry, limits, tool, elasticities and variants stay the same. If the tool was identified as
+    a part of the last link, it is subtracted with its parameters from the file.
 
     Args:
-        subject: A robot that was read from parameters in a file, with all its joints.
-        parameters: Identified ones, with or without friction, shape (n,).
+        subject: A robot from a parameter file, with all its joints.
+        parameters: Identified parameters, with or without friction, shape (n,).
 
     Raises:
-        InputError: If the robot has no such parameters, or not all of its joints, or a link is
-            not physical.
+        InputError: If the robot has no such parameters, or not all of its joints, or a link is not
+            physical.
     """
     robot, chain = subject.parameters, subject.chain
     if robot is None or chain is None:
@@ -132,14 +132,14 @@ def identified_robot(subject: Subject, parameters: np.ndarray) -> ArmParameters:
     if len(robot.links) != chain.dimension:
         raise InputError(
             f"{subject.name}: {chain.dimension} joints; must be the {len(robot.links)} of "
-            f"{robot.name}, since what is welded cannot be told apart"
+            f"{robot.name}, since the parameters of welded links cannot be distinguished"
         )
     layout = layout_of(subject, parameters)
     links = links_without_tool(subject, parameters)
     frames = [(link.R_PF, link.p_PF) for link in chain.links[1:]]
     frames.append(flange(chain, robot.tool))
     bodies = [
-        _body(old.name, moved(own, R.T, -R.T @ p))
+        _body(old.name, transform_parameters(own, R.T, -R.T @ p))
         for old, own, (R, p) in zip(robot.links, links, frames, strict=True)
     ]
     rotors = replace(robot.rotors, inertia=_rotors(layout, parameters), source=SOURCE)
@@ -149,15 +149,15 @@ def identified_robot(subject: Subject, parameters: np.ndarray) -> ArmParameters:
 def identified_delta(subject: Subject, parameters: np.ndarray) -> DeltaParameters:
     """Return a DELTA robot's parameters with identified masses and friction.
 
-    Of the masses with their shares of the rods only the sums are identifiable: rods and load stay,
-    slide and plate take the difference.
+    Only the sums of the masses and their shares of the rods are identifiable: rods and load stay
+    the same, slide and plate take the difference.
 
     Args:
         subject: A DELTA robot.
-        parameters: Identified ones, with or without friction, shape (n,).
+        parameters: Identified parameters, with or without friction, shape (n,).
 
     Raises:
-        InputError: If the slides differ, or nothing would be left of slide or plate.
+        InputError: If the slides differ, or no mass is left for slide or plate.
     """
     assert subject.delta is not None
     layout, robot = layout_of(subject, parameters), subject.delta.parameters
@@ -184,7 +184,7 @@ def identified_delta(subject: Subject, parameters: np.ndarray) -> DeltaParameter
 
 
 def links_without_tool(subject: Subject, parameters: np.ndarray) -> np.ndarray:
-    """Return the ten parameters of each link, of the last one without the tool of the file.
+    """Return the ten parameters of each link, the last one without the tool of the file.
 
     Args:
         subject: A serial robot of N joints.
@@ -194,12 +194,12 @@ def links_without_tool(subject: Subject, parameters: np.ndarray) -> np.ndarray:
         Shape (N, 10).
 
     Raises:
-        InputError: If there are not as many parameters, or one is not finite.
+        InputError: If the number of parameters is wrong, or one is not finite.
     """
     layout, robot, chain = layout_of(subject, parameters), subject.parameters, subject.chain
     links = layout.check("parameters", parameters)[layout.links]
     if robot is not None and chain is not None and subject.tool:
-        links[-1] -= moved(tool_parameters(robot.tool), *flange(chain, robot.tool))
+        links[-1] -= transform_parameters(tool_parameters(robot.tool), *flange(chain, robot.tool))
     return links
 
 
@@ -207,7 +207,7 @@ def tool_parameters(tool: ToolParameters) -> np.ndarray:
     """Return the ten parameters of a tool in its own frame, shape (10,).
 
     Args:
-        tool: As the robot's file has it.
+        tool: Tool from the robot's file.
     """
     center = tool.center_of_mass
     around = tool.mass * (center @ center * np.eye(3) - np.outer(center, center))
@@ -219,7 +219,7 @@ def flange(chain: SerialChain, tool: ToolParameters) -> tuple[np.ndarray, np.nda
 
     Args:
         chain: The robot with the tool point of the tool.
-        tool: What it carries.
+        tool: Its tool.
     """
     return chain.R_LT, chain.p_LT - chain.R_LT @ tool.tool_point
 
@@ -245,7 +245,7 @@ def _rotors(layout: Layout, parameters: np.ndarray) -> np.ndarray:
 
 
 def _friction(subject: Subject, parameters: np.ndarray) -> FrictionParameters:
-    """Return identified friction; that of the robot where none was identified."""
+    """Return identified friction, or the robot's own if none was identified."""
     layout, n = layout_of(subject, parameters), subject.dimension
     if layout.friction.size:
         coulomb, viscous = parameters[layout.friction].reshape(n, 2).T

@@ -1,13 +1,14 @@
-"""Pseudo-inertia matrices: when ten numbers are the inertial parameters of a body.
+"""Pseudo-inertia matrices: conditions for ten numbers to be the inertial parameters of a body.
 
 For a body with density ``rho`` and points ``p`` in the link frame::
 
     P = int [p; 1] [p; 1]' rho dV = [Sigma  h]      Sigma = tr(I) / 2 E - I,  h = m p_LC
                                     [h'     m]
 
-is linear in the ten parameters of a link. They belong to some distribution of positive mass if and
-only if P is positive semidefinite: then the mass is positive, and the principal moments of inertia
-about the centre of mass are positive and obey the triangle inequalities (P. M. Wensing, S. Kim,
+is linear in the ten parameters of a link. They belong to a distribution of positive mass if and
+only
+if P is positive semidefinite: then the mass is positive, and the principal moments of inertia about
+the centre of mass are positive and satisfy the triangle inequalities (P. M. Wensing, S. Kim,
 J.-J. E. Slotine: Linear matrix inequalities for physically consistent inertial parameter
 identification. IEEE Robotics and Automation Letters 3(1), 2018).
 """
@@ -33,7 +34,7 @@ def pseudo_inertia(parameters: np.ndarray) -> np.ndarray:
     """Return P, shape (4, 4): second moments [kg m^2], first moments [kg m] and mass [kg].
 
     Args:
-        parameters: The ten of one link about the origin of its frame, shape (10,).
+        parameters: The ten parameters of a link about the origin of its frame, shape (10,).
     """
     mass, moment, inertia = link_moments(parameters)
     P = np.empty((SIZE, SIZE))
@@ -59,13 +60,13 @@ def linear_terms() -> list[np.ndarray]:
 
 
 def spread(parameters: np.ndarray) -> np.ndarray:
-    """Return how far the mass of a link spreads along its principal axes [m], shape (3,).
+    """Return the extent of a link's mass along its principal axes [m], shape (3,).
 
-    That is the standard deviation of the places of its mass, ascending; NaN where its square is
-    negative, of which there is none in a consistent set.
+    It is the standard deviation of the mass distribution, ascending; NaN if its square is negative,
+    which a consistent set excludes.
 
     Args:
-        parameters: The ten of one link, with a positive mass, shape (10,).
+        parameters: The ten parameters of a link with a positive mass, shape (10,).
     """
     P = pseudo_inertia(parameters)
     about_center = P[:3, :3] / P[3, 3] - np.outer(P[:3, 3], P[:3, 3]) / P[3, 3] ** 2
@@ -74,7 +75,7 @@ def spread(parameters: np.ndarray) -> np.ndarray:
 
 
 def distance(P: np.ndarray, prior: np.ndarray) -> float:
-    """Return how far a link is from another, ``|L^-1 (P - P_0) L^-T|^2 / 2`` with ``P_0 = L L'``.
+    """Return the distance of a link from another, ``|L^-1 (P - P_0) L^-T|^2 / 2``, ``P_0 = L L'``.
 
     It is the relative entropy of the two distributions of mass up to second order, independent of
     the frame and the units, and convex in P (T. Lee, P. M. Wensing, F. C. Park: Geometric robot
@@ -133,12 +134,12 @@ class Layout:
 
     @property
     def is_delta(self) -> bool:
-        """Whether they are those of a DELTA robot."""
+        """Whether they belong to a DELTA robot."""
         return self.masses.size > 0
 
     @property
     def slides(self) -> np.ndarray:
-        """Of the slides' masses of a DELTA robot, shape (3,)."""
+        """Indices of the slides' masses of a DELTA robot, shape (3,)."""
         return self.masses[:NUM_ARMS]
 
     def link_name(self, link: int) -> str:
@@ -149,11 +150,11 @@ class Layout:
         """Return parameters as an array, shape (n,).
 
         Args:
-            key: What they are, for the message.
+            key: Name of the parameters, for the message.
             values: One number per parameter.
 
         Raises:
-            InputError: If they are not as many, or one is not finite.
+            InputError: If their number is wrong, or one is not finite.
         """
         values = np.asarray(values, dtype=float)
         if values.shape != (self.size,):

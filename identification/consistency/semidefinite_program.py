@@ -1,4 +1,4 @@
-"""The semidefinite program behind consistent parameters."""
+"""Semidefinite program for consistent parameters."""
 
 from collections.abc import Sequence
 from typing import NoReturn
@@ -12,7 +12,7 @@ from identification.consistency.bounds import (
     LinkBounds,
     PhysicalBounds,
     check_bounds,
-    extended,
+    extent_terms,
     link_intervals,
     other_intervals,
 )
@@ -26,20 +26,21 @@ from identification.consistency.pseudo_inertia import (
 from identification.model.dynamic_parameters import PER_LINK
 from pfsc_drake.errors import InputError
 
-# of the largest eigenvalue in units of mass and size; a flatter prior holds on too hard
+# of the largest eigenvalue in units of mass and size; a flatter prior is too strong
 _FLATTEST = 1e-9
 
 
 def prior_from_bounds(names: Sequence[str], bounds: PhysicalBounds) -> np.ndarray:
-    """Return a full set of parameters in the middle of what is known, shape (n,).
+    """Return a full set of parameters in the middle of the bounds, shape (n,).
 
-    Each link weighs the geometric mean of its bounds and fills the box of its centre of mass
+    Each link has the geometric mean of its mass bounds and fills the box of its centre of mass
     evenly; bounded rotors have the geometric mean of their bounds. Friction and rotors without
-    bounds are NaN: nothing is assumed of them. Masses of a DELTA robot are identifiable, and NaN.
+    bounds are
+    NaN: nothing is assumed of them. Masses of a DELTA robot are identifiable, and NaN.
 
     Args:
         names: Names of the n parameters.
-        bounds: What is known.
+        bounds: Bounds of the robot.
     """
     layout = Layout.of(names)
     prior = np.full(layout.size, np.nan)
@@ -55,10 +56,11 @@ def check_prior(names: Sequence[str], prior: np.ndarray) -> np.ndarray:
 
     Args:
         names: Names of the n parameters.
-        prior: Full set; NaN for what nothing is assumed of, which no link's parameter can be.
+        prior: Full set; NaN for parameters without assumption, which no link may have.
 
     Raises:
-        InputError: If the shape differs, or a link is not the parameters of an extended body.
+        InputError: If the shape differs, or a link does not have the parameters of an extended
+            body.
     """
     layout, prior = Layout.of(names), np.asarray(prior, dtype=float)
     if prior.shape != (layout.size,):
@@ -98,7 +100,7 @@ def _is_extended(parameters: np.ndarray) -> bool:
 
 # of the distance from the prior, in units of squared standard deviations
 PRIOR_WEIGHT = 0.1
-# no combination of parameters counts as known better than to this part of the prior's size
+# lower limit of the uncertainty of any combination of parameters, in units of the prior
 _MOST_CERTAIN = 1e6
 _TERMS = np.array(linear_terms())
 
@@ -116,28 +118,28 @@ def least_squares(
     They solve::
 
         min |A rho - b|^2 + w sum_i d(P_i, P_i0) + w sum_j (I_M,j / I_M0,j - 1)^2
-        s.t. P_i - m_i r_i^2 diag(1, 1, 1, 0) >= 0          mass spreads by r_i at least
+        s.t. P_i - m_i r_i^2 diag(1, 1, 1, 0) >= 0          mass extends by r_i at least
              m_i lower <= h_i <= m_i upper                  centre of mass in its box
              bounds of masses and rotors; I_M, f_c, f_v >= 0
 
     with the pseudo-inertias P, their blocks Sigma, h, m and the distance d of
-    :mod:`~identification.consistency.pseudo_inertia`. The prior decides on what the torques do not
-    depend on, whatever its weight. With ``P_0 = L L'`` the unknown of each link is
-    ``L^-1 P L^-T``, of the order of one; and all are counted from a set that fits the
-    measurements without being consistent, so that the cost is of the order of chi squared. What is
-    known to better than 1e-6 of that unit counts as known to 1e-6.
+    :mod:`~identification.consistency.pseudo_inertia`. The prior determines the parameters that
+    torques do not depend on, whatever its weight. With ``P_0 = L L'`` the unknown of each link is
+    ``L^-1 P L^-T``, of the order of one; all unknowns are relative to a set that fits the
+    measurements without being consistent, so that the cost is of the order of chi squared.
+    Combinations known to better than 1e-6 of that unit count as known to 1e-6.
 
     Args:
-        A: Weighted so that b has the unit matrix for its covariance, shape (k, n).
+        A: Weighted such that b has the unit matrix for its covariance, shape (k, n).
         b: Shape (k,).
         names: Names of the n parameters.
-        bounds: What is known beforehand.
-        prior: ``rho_0``, see :func:`check_prior`; by default that of the bounds.
+        bounds: Bounds of the robot.
+        prior: ``rho_0``, see :func:`check_prior`; by default the middle of the bounds.
         prior_weight: ``w``; 1 weighs the distance like a squared standard deviation.
 
     Raises:
-        InputError: If the bounds contradict each other (names the link) or are of another robot,
-            the prior is of no robot, the weight is not positive or no solution is found.
+        InputError: If the bounds contradict each other (names the link) or belong to another robot,
+            the prior is not physical, the weight is not positive or no solution is found.
     """
     if not 0.0 < prior_weight < np.inf:
         raise InputError(f"prior_weight = {prior_weight!r}; must be finite and positive")
@@ -146,7 +148,7 @@ def least_squares(
     rho_0 = prior_from_bounds(names, bounds) if prior is None else check_prior(names, prior)
     S = _units(layout, rho_0, A)
     start = np.linalg.solve(S, np.where(np.isfinite(rho_0), rho_0, 0.0))
-    known, values = _reduced(A @ S, b)
+    known, values = _reduce(A @ S, b)
     weak, middle = _prior_rows(layout, rho_0)
     weight = np.sqrt(prior_weight)
     start += np.linalg.lstsq(known, values - known @ start, rcond=None)[0]
@@ -155,7 +157,7 @@ def least_squares(
     program = MathematicalProgram()
     z = program.NewContinuousVariables(layout.size, "z")
     triangle = np.asarray(np.linalg.qr(np.column_stack([rows, offset]), mode="r"))
-    # the length itself, since its square is worse conditioned
+    # the length itself, because its square is worse conditioned
     program.AddL2NormCostUsingConicConstraint(triangle[:, :-1], triangle[:, -1], z)
     _add(program, other_intervals(layout, bounds), S, start, z)
     for link_rows, link in zip(layout.links, bounds.links, strict=True):
@@ -170,8 +172,8 @@ def least_squares(
     return np.asarray(parameters)
 
 
-def _reduced(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return as few rows with the same squares but for a constant, none too certain."""
+def _reduce(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return as few rows with the same squares up to a constant, none of them too certain."""
     U, sizes, Vt = np.linalg.svd(A, full_matrices=False)
     certain = np.minimum(sizes, _MOST_CERTAIN)
     share = np.divide(certain, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
@@ -228,11 +230,11 @@ def _add_link(
     start: np.ndarray,
     z: np.ndarray,
 ) -> None:
-    """Add what is required of a link with ``rho = S (start + z)``."""
+    """Add the constraints of a link with ``rho = S (start + z)``."""
     _add(program, link_intervals(link), S, start, z)
     P_0 = pseudo_inertia(S @ _identity())
     inverse = np.linalg.inv(np.linalg.cholesky(P_0))
-    terms = inverse @ np.tensordot(S.T, extended(link), 1) @ inverse.T
+    terms = inverse @ np.tensordot(S.T, extent_terms(link), 1) @ inverse.T
     terms = 0.5 * (terms + terms.transpose(0, 2, 1))
     program.AddLinearMatrixInequalityConstraint([np.tensordot(start, terms, 1), *terms], z)
 
@@ -250,10 +252,10 @@ def _explain(outcome: str, layout: Layout, bounds: PhysicalBounds) -> NoReturn:
         z = program.NewContinuousVariables(PER_LINK)
         _add_link(program, link, S[np.ix_(rows, rows)], np.zeros(PER_LINK), z)
         if not ClarabelSolver().Solve(program).is_success():
-            body = "" if link.body is None else f", all of it {_place(link.body)}"
+            body = "" if link.body is None else f", all of it {_box_text(link.body)}"
             raise InputError(
                 f"bounds of {bounds.name}: {layout.link_name(i)}: no body of {link.mass} kg has "
-                f"its centre of mass {_place(link.center_of_mass)}{body} and spreads by "
+                f"its centre of mass {_box_text(link.center_of_mass)}{body} and spreads by "
                 f"{link.least_extent:g} m"
             )
     masses = np.sum([link.mass for link in bounds.links], axis=0)
@@ -269,5 +271,5 @@ def _explain(outcome: str, layout: Layout, bounds: PhysicalBounds) -> NoReturn:
     )
 
 
-def _place(box: FrameBox) -> str:
+def _box_text(box: FrameBox) -> str:
     return f"between {box.lower.tolist()} and {box.upper.tolist()} m"

@@ -1,4 +1,4 @@
-"""Identified robots as the files that models and scenarios are made of."""
+"""Identified robots as files for models and scenarios."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from diagrams.robots.model import locate_model
-from identification.consistency.model_edits import edited_model, urdf_text
+from identification.consistency.model_edits import edit_model, urdf_text
 from identification.consistency.parameter_files import (
     identified_delta,
     identified_robot,
@@ -30,12 +30,12 @@ class WrittenModel:
 
     Attributes:
         parameters: The parameter file, for ``controller.model``, for
-            ``controller.friction.believed.file`` and of a DELTA robot for ``robot.model``; None
-            for robots that were read from a bare model.
-        models: SDF files, one for each variant of the parameter file; of another robot its own
+            ``controller.friction.believed.file`` and, for a DELTA robot, for ``robot.model``; None
+            for robots from a bare model.
+        models: SDF files, one for each variant of the parameter file; for another robot its own
             model file with identified inertias.
         urdf: The robot with rigid joints; None for DELTA robots.
-        notes: What could not be written and why, one sentence each.
+        notes: Parts that could not be written, with the reason, one sentence each.
     """
 
     parameters: Path | None
@@ -45,7 +45,7 @@ class WrittenModel:
 
     @property
     def files(self) -> list[Path]:
-        """All of them."""
+        """All files."""
         files = (self.parameters, *self.models, self.urdf)
         return list(dict.fromkeys(file for file in files if file is not None))
 
@@ -53,17 +53,17 @@ class WrittenModel:
 def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) -> WrittenModel:
     """Write an identified robot.
 
-    A robot with a parameter file gets another one, with the same variants as SDF files beside it
-    and the look of the robot, as ``models/<robot>/`` has them; any other one a URDF alone.
+    A robot with a parameter file gets a new one, with the same variants as SDF files beside it and
+    the robot's appearance, as in ``models/<robot>/``; any other one a URDF alone.
 
     Args:
         subject: The robot.
         parameters: A consistent set, with or without friction, shape (n,).
-        folder: Where to write; made if it is not there. Files of the same name are replaced.
+        folder: Folder; created if it is missing. Files of the same name are replaced.
 
     Raises:
-        InputError: If the parameters are not consistent or not as many as the robot's, the robot's
-            file cannot hold them, or a file cannot be written.
+        InputError: If the parameters are not consistent or their number is wrong, the robot's file
+            cannot represent them, or a file cannot be written.
     """
     parameters = np.asarray(parameters, dtype=float)
     require_consistent(subject, parameters)
@@ -71,13 +71,13 @@ def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) ->
     make_folder(folder)
     file = folder / PARAMETERS_FILE
     if subject.delta is not None:
-        write_text(file, _commented(dump_typed(identified_delta(subject, parameters))))
+        write_text(file, _add_comment(dump_typed(identified_delta(subject, parameters))))
         return WrittenModel(file, [], None)
     if subject.parameters is None:
         return _write_own(subject, parameters, folder)
     robot = identified_robot(subject, parameters)
     urdf = folder / f"{robot.name}.urdf"
-    write_text(file, _commented(dump_typed(robot)))
+    write_text(file, _add_comment(dump_typed(robot)))
     appearance, models = _appearance(subject), []
     for variant in robot.variants:
         models.append(folder / f"{variant.name}.sdf")
@@ -94,7 +94,7 @@ def _write_own(subject: Subject, parameters: np.ndarray, folder: Path) -> Writte
     if model.resolve() == own.resolve():
         raise InputError(f"{folder}: holds the robot's own model {own.name}; must be another one")
     try:
-        text = edited_model(subject, parameters)
+        text = edit_model(subject, parameters)
     except InputError as error:
         write_text(urdf, urdf_text(subject, parameters))
         return WrittenModel(None, [], urdf, [f"links and joints alone are written: {error}"])
@@ -105,11 +105,11 @@ def _write_own(subject: Subject, parameters: np.ndarray, folder: Path) -> Writte
 
 
 def _appearance(subject: Subject) -> Appearance:
-    """Return the look of the robot that lies next to its model; without it none."""
+    """Return the appearance of the robot from the file beside its model, if there is one."""
     assert subject.block is not None
     file = locate_model(subject.block, subject.folder).with_name("appearance.yaml")
     return load_file(Appearance, file) if file.is_file() else Appearance()
 
 
-def _commented(text: str) -> str:
+def _add_comment(text: str) -> str:
     return f"# Identified parameters of a robot, physically consistent. SI units.\n{text}"

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from identification.options import Robot, Wording, read_number
+from identification.options import ReadingOptions, Robot, read_number
 from identification.output import check_folder, make_folder, write_text
 from reporting.progress import fraction_display
 from reporting.terminal import interruptible
@@ -31,7 +31,7 @@ def elastic_command(
         ),
     ] = None,
     locked: Annotated[
-        bool, typer.Option("--locked", help="The links were held, and the motors shaken.")
+        bool, typer.Option("--locked", help="The links were locked, and the motors excited.")
     ] = False,
     viscous: Annotated[
         str | None,
@@ -42,8 +42,8 @@ def elastic_command(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_elastic")] = None,
-    seed: Annotated[int, typer.Option(help="Of a simulated experiment.")] = 1,
-    wording: Wording,
+    seed: Annotated[int, typer.Option(help="Seed of a simulated experiment.")] = 1,
+    wording: ReadingOptions,
 ) -> None:
     """Estimate the elastic joints of a robot from signals of motors and links."""
     from identification.elastic.estimate import estimate_joints

@@ -4,12 +4,12 @@ The motor of a visco-elastic joint obeys (2.65b), (2.66) on the joint side::
 
     tau_d = I a_M + K (q_M - q_J) + D (v_M - v_J) + f_c sign(v_M) + f_v v_M + c
 
-with a constant ``c`` for zeros of encoders and torques. Friction turns over a little later than the
-velocity; where the motor reverses often, ``f_c sign(v_M) - l d/dt sign(v_M)`` with the lag
-``l / f_c`` stands for it to first order. The equation is linear in its parameters; in the weak form
-of :mod:`~identification.elastic.signals` no signal is differentiated. The noise of the positions,
-which would make the torsion look larger and the joint softer than it is, is measured and taken out
-of the normal equations.
+with a constant ``c`` for offsets of encoders and torques. Friction reverses a little later than the
+velocity; if the motor reverses often, ``f_c sign(v_M) - l d/dt sign(v_M)`` with the lag ``l / f_c``
+approximates this to first order. The equation is linear in its parameters; in the weak form of
+:mod:`~identification.elastic.signals` no signal is differentiated. The noise of the positions would
+increase the apparent torsion and decrease the stiffness; it is estimated and removed from the
+normal equations.
 """
 
 from dataclasses import dataclass
@@ -30,26 +30,26 @@ from identification.measurement.record import Record
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 
-_VAGUE = 0.2  # relative standard deviation of a stiffness that tells nothing
+_VAGUE = 0.2  # relative standard deviation from which on a stiffness is unknown
 _SURE = 4.0  # standard deviations
 
 
 @dataclass(frozen=True, eq=False)
 class JointEstimate:
-    """What was found of one joint, on the joint side; units of a slide in brackets.
+    """Estimate of one joint, on the joint side; units of a slide in brackets.
 
     Attributes:
         name: Name of the joint.
         unit: ``rad`` or ``m``.
         values: Values of ``parameters``, shape (n,).
         covariance: Covariance of ``values``, shape (n, n).
-        parameters: Which were estimated: ``stiffness`` [Nm/rad (N/m)], ``damping``
+        parameters: Names of the estimated ones: ``stiffness`` [Nm/rad (N/m)], ``damping``
             [Nm s/rad (N s/m)], ``inertia`` of the motor [kg m^2 (kg)], ``coulomb`` [Nm (N)],
-            ``lag`` l [Nm s (N s)] where the motor reverses often, ``viscous`` [Nm s/rad (N s/m)]
-            unless locked, ``offset`` [Nm (N)]. For a locked joint ``damping`` has lost the
-            viscous friction that was given.
-        residual: RMS of what the equation leaves over of the torque, smoothed [Nm or N].
-        samples: That were used.
+            ``lag`` l [Nm s (N s)] if the motor reverses often, ``viscous`` [Nm s/rad (N s/m)]
+            unless locked, ``offset`` [Nm (N)]. For a locked joint the known viscous friction has
+            been subtracted from ``damping``.
+        residual: RMS of the equation's residual torque, smoothed [Nm or N].
+        samples: Number of samples used.
     """
 
     name: str
@@ -86,12 +86,12 @@ class JointEstimate:
 
     @property
     def resonance(self) -> float:
-        """Of the motor against a held link [Hz]."""
+        """Resonance of the motor against a locked link [Hz]."""
         return float(np.sqrt(self.stiffness / self.inertia) / (2.0 * np.pi))
 
 
 def check_estimate(where: str, estimate: JointEstimate) -> None:
-    """Refuse what no joint has, or what says next to nothing.
+    """Refuse parameters that no joint has, or a stiffness with too large a deviation.
 
     Args:
         where: Name of the joint, for messages.
@@ -119,10 +119,10 @@ def check_estimate(where: str, estimate: JointEstimate) -> None:
             )
 
 
-KNOTS = 3e-3  # s, distance in the test function, which passes what is below about 100 Hz
+KNOTS = 3e-3  # s, distance in the test function, which passes frequencies below about 100 Hz
 _LEAST_KNOTS = 3.0  # sampling times
-_MEMORY = 0.1  # s, after which what the equation leaves over no longer correlates, or
-_STRETCHES, _FEWEST_STRETCHES = 40, 12  # of this length that there are to be
+_MEMORY = 0.1  # s, after which residuals no longer correlate, or
+_STRETCHES, _FEWEST_STRETCHES = 40, 12  # numbers of sections of this length
 _LOST = 0.2  # of the torsion's variance that may be noise
 _SINGULAR = 1e-9
 _FEWEST = 200  # samples
@@ -139,14 +139,14 @@ def estimate_joints(
     """Return the estimates of all joints of a robot from one record.
 
     Args:
-        record: With positions of the motors.
-        subject: Whose record it is.
-        locked: Whether all links were held.
+        record: Record with positions of the motors.
+        subject: Robot of the record.
+        locked: Whether all links were locked.
         viscous: ``f_v`` of the drives, for locked joints only, shape (N,).
-        coupling: Whether what turning links do to spinning rotors is known and taken off.
+        coupling: Whether to subtract the known coupling of turning links and spinning rotors.
 
     Raises:
-        InputError: As :func:`estimate_joint` and
+        InputError: As in :func:`estimate_joint` and
             :func:`~identification.elastic.signals.joint_signals`.
     """
     known = [None if viscous is None else float(f_v) for f_v in _each(viscous, subject)]
@@ -176,22 +176,22 @@ def estimate_joint(
 ) -> JointEstimate:
     """Return stiffness, damping, motor inertia and friction of a joint.
 
-    The covariance holds whatever the equation leaves over, correlated or not, and is right for
-    many samples. It does not hold how friction differs from Coulomb's: where the motor reverses
-    often and friction takes a third of the torque, as it may in locked joints, inertias are
-    off by up to some tenths of a percent.
+    The covariance contains all residuals, correlated or not, and is correct for many samples. It
+    does not contain deviations of friction from Coulomb's law: if the motor reverses often and
+    friction takes a third of the torque, as it may in locked joints, inertias are off by up to some
+    tenths of a percent.
 
     Args:
         signals: Signals of the joint.
-        locked: Whether the link was held. The motor then feels the joint's damping and its own
-            viscous friction as one, so that the latter has to be known from elsewhere.
+        locked: Whether the link was locked. The joint's damping and the motor's viscous friction
+            then act as one, so that the latter has to be known.
         viscous: ``f_v`` [Nm s/rad or N s/m], for a locked joint only.
         position_noise: Standard deviations of white noise on the positions of motor and link
-            [rad or m]; taken from the signals if omitted.
+            [rad or m]; estimated from the signals if omitted.
 
     Raises:
-        InputError: If signals are too short or not of one joint, the motion does not tell the
-            parameters apart, or the torsion is lost in noise.
+        InputError: If signals are too short or do not belong to one joint, the motion does not
+            distinguish the parameters, or the torsion is below the noise.
     """
     where = f"{signals.source}: {signals.name}"
     if locked == (viscous is None):
@@ -209,10 +209,10 @@ def estimate_joint(
     _check_torsion(where, signals.unit, equation)
     values, normal = _solve(where, equation)
     left = equation.tau - equation.Y @ values
-    # what the noise of the positions adds to the scores has been taken out of their mean
+    # the contribution of position noise to the mean of the scores has been removed
     scores = equation.Y * left[:, None] + equation.noise @ values * equation.used[:, None]
     length = _memory(signals.step, function.half, equation.samples)
-    # as few stretches as there are, the parameters take more of their spread than of samples
+    # with few sections, the parameters reduce their spread more than in single samples
     stretches = equation.samples / length
     spread = long_run_covariance(scores, length) * stretches / (stretches - values.size)
     inverse = np.linalg.inv(normal)
@@ -233,7 +233,7 @@ def estimate_joint(
 
 
 def _memory(step: float, half: int, samples: int) -> int:
-    """Return the samples after which what the equation leaves over no longer correlates."""
+    """Return the number of samples after which residuals no longer correlate."""
     longest = min(round(_MEMORY / step), samples // _STRETCHES)
     return max(longest, min(2 * half, samples // _FEWEST_STRETCHES))
 
@@ -264,7 +264,7 @@ def _solve(where: str, equation: MotorEquation) -> tuple[np.ndarray, np.ndarray]
         share = np.abs(directions[:, 0])
         alike = [parameters[i] for i in np.argsort(-share) if share[i] > 0.1 * share.max()]
         raise InputError(
-            f"{where}: the motion does not tell {' and '.join(alike)} apart; a motion with more "
+            f"{where}: the motion does not distinguish {' and '.join(alike)}; a motion with more "
             "frequencies and reversals is required"
         )
     return np.linalg.solve(normal, Y.T @ equation.tau), normal

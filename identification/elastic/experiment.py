@@ -43,9 +43,9 @@ def zippered_multisine(
     lowest: float = 4.0,
     highest: float = 90.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sines of equal size whose frequencies the joints take in turns.
+    """Return sines of equal size whose frequencies are distributed over the joints in turns.
 
-    No frequency belongs to two joints, so that what moves at one is by the drive of one joint.
+    No two joints share a frequency, so that motion at a frequency has one drive as its cause.
 
     Args:
         rms: Root of the mean square of each joint's torque [Nm or N], shape (N,).
@@ -83,8 +83,8 @@ def zippered_multisine(
 
 RATE = 1000.0  # samples per second
 _STEP = 0.25e-3  # s, of the integration
-_CHUNK = 0.25  # s, after which progress is told
-# RMS of what shakes locked joints, well above friction, and moving ones, of the largest torque
+_CHUNK = 0.25  # s, between reports of progress
+# RMS of the excitation of locked joints, well above friction, and of moving ones, of the largest
 _LOCKED, _MOVING = 0.2, 0.05
 
 
@@ -97,22 +97,22 @@ def simulate_locked(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Record:
-    """Return what is measured while the links are held and the drives shake the joints.
+    """Return the measurement of an experiment with locked links and excited joints.
 
-    All joints at once, by sines of 4 to 90 Hz, each a motor with friction on a visco-elastic joint
-    to a link at rest.
+    All joints are excited together by sines of 4 to 90 Hz; each is a motor with friction and a
+    visco-elastic joint to a link at rest.
 
     Args:
-        subject: A robot with elastic joints; its friction has to be known.
+        subject: A robot with elastic joints and known friction.
         faults: Noise of the torques, encoders and noise of the positions.
-        duration: [s].
+        duration: Duration [s].
         share: Share of the drives' largest torques, RMS of the sines.
         seed: Seed of all random numbers.
-        progress: Told the fraction done and what is done.
+        progress: Receives the completed fraction and the current step.
 
     Raises:
-        InputError: If joints are rigid, friction is unknown, an option is out of range, or drives
-            are asked for more than they have.
+        InputError: If joints are rigid, friction is unknown, an option is out of range, or a drive
+            would exceed its limit.
     """
     chain, coulomb, viscous = _elastic(subject, faults)
     n, random = subject.dimension, np.random.default_rng(seed)
@@ -135,7 +135,7 @@ def simulate_locked(
     signals = _simulate(builder.Build(), log, lambda _: None, duration, progress)
     check_effort(subject, signals["torque"])
     q_M = signals["state"][:, :n]
-    return _measured(subject, faults, (np.zeros_like(q_M), q_M, signals["torque"]), random)
+    return _measure(subject, faults, (np.zeros_like(q_M), q_M, signals["torque"]), random)
 
 
 def simulate_excited(
@@ -147,22 +147,22 @@ def simulate_excited(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Record:
-    """Return what is measured while the robot follows an excitation and its joints are shaken.
+    """Return the measurement of an experiment with an excitation and additional sines.
 
     The servo acts on the motors, without delay; sines of 4 to 90 Hz add to its torques. The plant
-    is the full model (2.64), with the coupling of rotors where it is known how they sit.
+    is the full model (2.64), with the coupling of rotors if their mounts are known.
 
     Args:
-        subject: A robot with elastic joints; its friction has to be known.
+        subject: A robot with elastic joints and known friction.
         trajectory: Excitation, within the limits of the robot.
         faults: Noise of the torques, encoders and noise of the positions.
-        periods: How often the excitation is run.
+        periods: Number of periods of the excitation.
         seed: Seed of all random numbers.
-        progress: Told the fraction done and what is done.
+        progress: Receives the completed fraction and the current step.
 
     Raises:
-        InputError: If joints are rigid, friction is unknown, the excitation is of another robot
-            or beyond its limits, or drives are asked for more than they have.
+        InputError: If joints are rigid, friction is unknown, the excitation belongs to another
+            robot or exceeds its limits, or a drive would exceed its limit.
     """
     chain, coulomb, viscous = _elastic(subject, faults)
     servo, n, random = Servo(), subject.dimension, np.random.default_rng(seed)
@@ -191,7 +191,7 @@ def simulate_excited(
     )
     builder.Connect(resistance, plant.GetInputPort("resistance"))
     log = add_log(builder, {"state": joint_state, "torque": drive}, 1.0 / RATE)
-    # motors at rest on the excitation, links where they hang
+    # motors at rest on the excitation, links in static equilibrium
     start = np.concatenate([q[0] - rigid[0] / chain.K_s, np.zeros(n), q[0], np.zeros(n)])
 
     def set_state(root: Context) -> None:
@@ -199,15 +199,15 @@ def simulate_excited(
 
     signals = _simulate(builder.Build(), log, set_state, run.duration - run.ramp, progress)
     first = round(run.ramp * RATE)
-    kept = slice(first, first + round(periods * trajectory.period * RATE))
-    q_J, _, q_M, _ = np.split(signals["state"][kept], 4, axis=1)
+    window = slice(first, first + round(periods * trajectory.period * RATE))
+    q_J, _, q_M, _ = np.split(signals["state"][window], 4, axis=1)
     check_effort(subject, signals["torque"])
-    record = _measured(subject, faults, (q_J, q_M, signals["torque"][kept]), random)
+    record = _measure(subject, faults, (q_J, q_M, signals["torque"][window]), random)
     return replace(record, period=trajectory.period)
 
 
 def _elastic(subject: Subject, faults: Imperfections) -> tuple[SerialChain, np.ndarray, np.ndarray]:
-    """Return the chain and the friction of a robot that fits."""
+    """Return the chain and the friction of a suitable robot."""
     chain = subject.chain
     if chain is None or not chain.is_elastic or not np.all(chain.D_M > 0.0):
         raise InputError(
@@ -249,13 +249,13 @@ def _simulate(
     )[1]
 
 
-def _measured(
+def _measure(
     subject: Subject,
     faults: Imperfections,
     true: tuple[np.ndarray, np.ndarray, np.ndarray],
     random: np.random.Generator,
 ) -> Record:
-    """Return the record of true link positions, motor positions and torques."""
+    """Return the record of simulated link positions, motor positions and torques."""
     turn = np.array([2.0 * np.pi if unit == "rad" else 1.0 for unit in subject.joint_units])
     with np.errstate(divide="ignore"):
         resolution = np.where(
@@ -264,9 +264,11 @@ def _measured(
     coarse = resolution > 0.0
     positions = []
     for q in true[:2]:
-        seen = q + faults.position_noise * random.normal(size=q.shape)
-        seen[:, coarse] = resolution[coarse] * np.round(seen[:, coarse] / resolution[coarse])
-        positions.append(seen)
+        measured = q + faults.position_noise * random.normal(size=q.shape)
+        measured[:, coarse] = resolution[coarse] * np.round(
+            measured[:, coarse] / resolution[coarse]
+        )
+        positions.append(measured)
     tau = true[2] + faults.torque_noise * random.normal(size=true[2].shape)
     return Record(
         np.arange(len(tau)) / RATE,

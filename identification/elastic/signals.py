@@ -1,13 +1,13 @@
-"""What is measured of one elastic joint, and its equations without derivatives of signals.
+"""Measured signals of one elastic joint, and its equations without derivatives of signals.
 
 An equation ``tau = I q'' + K q + ...`` is convolved with a smooth function ``phi`` of finite
 length. The derivatives then fall on ``phi``::
 
     phi * tau = I (phi'' * q) + K (phi * q) + ...
 
-which holds exactly, whatever the motion was before and after, periodic or not. Here ``phi`` is the
-B-spline of degree 5, sampled; sums stand for integrals, with errors that fall with the sixth power
-of its knots' distance.
+which holds exactly, whatever the motion before and after, periodic or not. Here ``phi`` is the
+B-spline of degree 5, sampled; sums replace integrals, with errors that fall with the sixth power
+of the knots' distance.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.rotor_coupling import rotor_momentum
 
 _DEGREE = 5
-_ORDER = 6  # of the difference that leaves nothing but noise of a smooth signal
+_ORDER = 6  # of the difference that reduces a smooth signal to its noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class TestFunction:
         kernels: Kernels of the derivatives 0, 1, 2, shape (3, 2 H + 1).
     """
 
-    __test__ = False  # of the weak form, none of the tests'
+    __test__ = False  # not a test of pytest
 
     kernels: np.ndarray
 
@@ -72,7 +72,7 @@ class TestFunction:
 def white_noise(signal: np.ndarray) -> float:
     """Return the standard deviation of the white noise on a smooth signal.
 
-    A difference of order 6 leaves next to nothing of what changes slowly compared to the samples.
+    A difference of order 6 removes almost everything that changes slowly compared to the samples.
 
     Args:
         signal: Evenly sampled, shape (K,).
@@ -84,11 +84,11 @@ def white_noise(signal: np.ndarray) -> float:
 def mean_sign(v: np.ndarray) -> np.ndarray:
     """Return the mean of a velocity's sign over the sampling time about each sample, shape (K,).
 
-    The velocity changes evenly between ``v_1`` and ``v_2`` in the middles before and after the
-    sample: ``(v_1 + v_2) / (|v_1| + |v_2|)``.
+    The velocity is linear between ``v_1`` and ``v_2`` at the midpoints before and after the sample:
+    ``(v_1 + v_2) / (|v_1| + |v_2|)``.
 
     Args:
-        v: In the middles between K samples, shape (K - 1,).
+        v: At the midpoints between K samples, shape (K - 1,).
     """
     before, after = np.append(v[0], v), np.append(v, v[-1])
     size = np.maximum(np.abs(before) + np.abs(after), np.finfo(float).tiny)
@@ -100,24 +100,24 @@ def long_run_covariance(scores: np.ndarray, length: int) -> np.ndarray:
 
     Args:
         scores: The vectors, mean zero, shape (K, n).
-        length: Samples after which nothing correlates any more.
+        length: Number of samples after which nothing correlates.
     """
     sums = np.array([fftconvolve(column, np.ones(length)) for column in scores.T])
     return np.asarray(sums @ sums.T / length)
 
 
-_SAME = 0.02  # by which the motor's travel may differ from the link's, beside
+_SAME = 0.02  # tolerance of the motor's travel compared to the link's, beside
 _TWIST = 0.02  # rad or m
 _MOST = 0.5
-_STILL = 0.05  # of the motor's travel, by which a locked link may move
+_STILL = 0.05  # of the motor's travel, tolerated motion of a locked link
 _NOISE = 6.0  # standard deviations within which a joint stands still
-_SLOW = 0.03  # of the largest velocity, below which friction is anything between both signs
-_RATE_NOISE = 4.0  # standard deviations of the measured velocity within which it is none
-_WIDTHS = (1, 3, 5, 9)  # samples, over which velocities are taken
-_CLEAR = 0.1  # of the largest velocity, that its noise may be
-_UNSURE = 0.1  # of a test function that may lie where it is
-_TURNING = 0.9  # of its full size, that friction has where the motor reverses
-_OFTEN = 0.2  # of the samples at which it does, for a lag of friction to tell
+_SLOW = 0.03  # of the largest velocity, below which friction has any value between both signs
+_RATE_NOISE = 4.0  # standard deviations of the measured velocity, below which it is zero
+_WIDTHS = (1, 3, 5, 9)  # samples, widths for velocities
+_CLEAR = 0.1  # of the largest velocity, tolerated noise of it
+_UNSURE = 0.1  # of a test function, tolerated share where it is unknown
+_TURNING = 0.9  # of its full size, below which friction counts as reversing
+_OFTEN = 0.2  # of the samples at reversals, required to estimate a lag of friction
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class JointSignals:
         unit: ``rad`` or ``m``.
         spin: Angular velocity of the link that carries the rotor, about the rotor's axis, divided
             by the gear ratio [rad/s or m/s], shape (K,); None for no coupling.
-        source: Where the signals are from, for messages.
+        source: Source of the signals, for messages.
     """
 
     name: str
@@ -155,14 +155,14 @@ def joint_signals(record: Record, subject: Subject, coupling: bool = True) -> li
     """Return the signals of all joints of a record.
 
     Args:
-        record: With positions of the motors.
-        subject: Whose record it is.
-        coupling: Whether what the links' motion does to the rotors (2.62) is taken off, where
-            ``subject.mounts`` says how they sit.
+        record: Record with positions of the motors.
+        subject: Robot of the record.
+        coupling: Whether the effect of the links' motion on the rotors (2.62) is subtracted, if
+            ``subject.mounts`` is known.
 
     Raises:
-        InputError: If there are no positions of motors, the joints are others, the samples are
-            not evenly spaced, or motor and link do not move by the same.
+        InputError: If there are no positions of motors, the joints differ, the samples are not
+            evenly spaced, or motor and link move by different amounts.
     """
     if record.q_motor is None:
         raise InputError(
@@ -201,7 +201,7 @@ def _spin(record: Record, subject: Subject) -> np.ndarray | None:
 
 
 def check_same_travel(signals: JointSignals) -> None:
-    """Refuse positions of a motor that are no positions of that joint.
+    """Refuse motor positions that do not belong to the joint.
 
     Raises:
         InputError: If the motor does not move by as much as the link.
@@ -210,11 +210,11 @@ def check_same_travel(signals: JointSignals) -> None:
     if not link.any():
         raise InputError(
             f"{signals.source}: {signals.name}: q is constant; a joint that moves is required, or "
-            "that it is locked has to be said"
+            "the option for locked joints"
         )
     size = link @ link - link.size * white_noise(signals.q) ** 2
     factor = float(link @ signals.q_motor / max(size, 0.1 * (link @ link)))
-    # links that are shaken beyond their resonance move otherwise than motors, by a little
+    # links excited beyond their resonance move slightly differently from motors
     if abs(factor - 1.0) > min(_SAME + _TWIST / float(np.std(link)), _MOST):
         raise InputError(
             f"{signals.source}: q_motor of {signals.name} moves by {factor:.4g} times q; must be 1 "
@@ -226,7 +226,7 @@ def check_locked(signals: JointSignals) -> None:
     """Refuse a locked joint whose link moves, or whose motor does not.
 
     Raises:
-        InputError: If so.
+        InputError: If that is the case.
     """
     travel = np.ptp(signals.q)
     allowed = 2.0 * _NOISE * white_noise(signals.q)
@@ -247,7 +247,7 @@ class MotorEquation:
         Y: Shape (K, n).
         tau: Smoothed torques [Nm or N], shape (K,).
         used: Which samples count, shape (K,).
-        noise: What the noise of the positions adds to ``Y' Y`` for each sample, shape (n, n).
+        noise: Contribution of position noise to ``Y' Y`` for each sample, shape (n, n).
     """
 
     parameters: tuple[str, ...]
@@ -270,15 +270,15 @@ def motor_equation(
 ) -> MotorEquation:
     """Return the equation of a joint.
 
-    Samples at which the motor rests or is about to reverse do not count, since friction is
-    not known there.
+    Samples at which the motor rests or is about to reverse do not count, because friction is not
+    known there.
 
     Args:
         signals: Signals of the joint.
-        locked: Whether the link was held.
-        function: That the equation is convolved with.
+        locked: Whether the link was locked.
+        function: Function for the convolution.
         position_noise: Standard deviations of white noise on the positions of motor and link;
-            taken from the signals if omitted.
+            estimated from the signals if omitted.
     """
     q_J = np.full(signals.t.size, signals.q.mean()) if locked else signals.q
     torsion = signals.q_motor - q_J
@@ -313,8 +313,8 @@ def motor_equation(
 
 
 def _friction_side(signals: JointSignals) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean sign of the motor's velocity about each sample, and where it is not sure."""
-    # as short as the noise allows: what smooths the velocity shifts reversals and hides rests
+    """Return the mean sign of the motor's velocity about each sample, and where it is unsure."""
+    # as short as the noise allows: smoothing the velocity shifts reversals and hides rests
     for width in _WIDTHS:
         v = (signals.q_motor[width:] - signals.q_motor[:-width]) / (width * signals.step)
         noise = _RATE_NOISE * white_noise(signals.q_motor) * np.sqrt(2.0) / (width * signals.step)

@@ -1,1 +1,1 @@
-"""From measurements to parameters and their uncertainty."""
+"""Parameters and their uncertainty from measurements."""

@@ -1,15 +1,15 @@
-"""Which friction the data ask for, by prediction of a motion that was not used to estimate.
+"""Choice of friction terms, by prediction of a motion that was not used to estimate.
 
 Terms are added to Coulomb and viscous friction one after the other. A candidate is estimated on one
-motion, its width included, and judged on another one: the decrease of the squared weighted errors,
-summed over sections of the motion, must be larger than chance explains, whatever the number of
-candidates, and be worth a parameter. The best one stays if its factor differs from zero, too, by
-more than the noise of the first motion explains: a needless term changes all parameters a little,
-which helps every other time. In the end each term goes that is no longer worth it, now that others
-are there.
+motion, including its width, and assessed on another one: the decrease of the squared weighted
+errors, summed over sections of the motion, must be larger than chance explains, whatever the number
+of candidates, and worth a parameter. The best candidate is accepted if its factor also differs from
+zero by more than the noise of the first motion explains: a needless term changes all parameters a
+little, which helps every other time. Finally, terms are removed that are no longer worth a
+parameter, given the others.
 
-Friction is not the same every day, and what matters here is its form. Before errors are squared,
-the sizes of Coulomb and viscous friction are therefore adapted to the motion that is judged on.
+Friction changes from day to day, and only its form matters here. Before errors are squared, the
+sizes of Coulomb and viscous friction are therefore adapted to the motion of the assessment.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,29 +34,29 @@ from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
-# sections of the motion that terms are judged on; errors that go together are shorter than one
+# sections of the assessed motion; correlated errors are shorter than one
 _SECTIONS = 40
-# probability to choose any term where none is
+# probability to choose any term if there is none
 _ERROR = 0.01
-# least part of the mean square of a joint's friction torque by which a term must lower the error's
+# least decrease of the error's mean square by a term, as part of a joint's friction torque squared
 _WORTH = 1e-4
-# widths that are tried first, of a joint's largest velocity
+# initial widths, as part of a joint's largest velocity
 _WIDTHS = np.geomspace(0.02, 0.8, 8)
 _WIDTH_TOLERANCE = 1e-3  # of the logarithm
 # least part of a column outside the span of the others, squared
 _INDEPENDENT = 1e-7
-_REMEMBERED = 8  # models with their errors
+_REMEMBERED = 8  # stored models with their errors
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a term does to the prediction of a motion that was not used.
+    """Effect of a term on the prediction of a motion that was not used.
 
     Attributes:
-        term: Which, with the best width.
+        term: The term, with the best width.
         improvement: Decrease of the sum of squared weighted errors.
-        share: Mean of that for a torque, as part of the weighted mean square of the joint's
-            Coulomb and viscous friction.
+        share: Mean of that decrease for a torque, as part of the weighted mean square of the
+            joint's Coulomb and viscous friction.
         significance: Mean improvement of the sections by its standard deviation.
         chosen: Whether the term is in the model.
     """
@@ -70,13 +70,13 @@ class Judgement:
 
 @dataclass(frozen=True)
 class FrictionChoice:
-    """The friction that data ask for.
+    """Chosen friction terms.
 
     Attributes:
-        model: Terms beside Coulomb and viscous friction; none if these do.
-        judgements: On all candidates, sorted by joints; those that are chosen are judged against
-            the model without them, the others as one more term.
-        threshold: That significances must exceed, and factors in standard deviations.
+        model: Terms beside Coulomb and viscous friction, if any.
+        judgements: Assessment of all candidates, sorted by joints; chosen ones compared to the
+            model without them, others as one more term.
+        threshold: Lower limit of significances, and of factors in standard deviations.
     """
 
     model: FrictionTerms
@@ -91,13 +91,13 @@ def choose_friction(
     other: MeasuredMotion,
     kinds: Sequence[str] = KINDS,
 ) -> FrictionChoice:
-    """Return the friction terms that predict a motion better that was not used.
+    """Return the friction terms that improve the prediction of another motion.
 
     Args:
         regressor: Regressor of the robot, with friction.
         base: Its base parameters.
-        motion: That parameters are estimated on.
-        other: That they are judged on, another trajectory; need not excite all parameters.
+        motion: Motion of the estimate.
+        other: Motion of the assessment, another trajectory; need not excite all parameters.
         kinds: Candidates for each joint, at least one.
 
     Raises:
@@ -111,7 +111,7 @@ def choose_friction(
     if not regressor.friction:
         raise InputError(
             f"{subject.name}: regressor without friction; one with Coulomb and viscous friction is "
-            "required to choose what else there is"
+            "required to choose further terms"
         )
     systems = [information(regressor, base, data) for data in (motion, other)]
     for what, system in zip(("motion", "other motion"), systems, strict=True):
@@ -162,7 +162,7 @@ class _Search:
     def run(self) -> FrictionChoice:
         """Return the choice."""
         model = FrictionTerms()
-        refused: set[str] = set()  # once only, so that the search ends
+        refused: set[str] = set()  # once only, so that the search terminates
         while True:
             judged = [
                 self._judge_added(model, term) for term in self._candidates if not model.has(term)
@@ -183,7 +183,7 @@ class _Search:
         return FrictionChoice(model, tuple(judged), self.threshold)
 
     def _is_sure(self, model: FrictionTerms, term: FrictionTerm) -> bool:
-        """Return whether the factor of one more term differs from zero for sure."""
+        """Return whether the factor of one more term certainly differs from zero."""
         return self._deviations(model.with_term(term)) > self.threshold
 
     def _judge_added(self, model: FrictionTerms, term: FrictionTerm) -> Judgement:
@@ -194,7 +194,7 @@ class _Search:
         return self._judge(self._with_best_widths(model.without(term)), model, term)
 
     def _first_needless(self, model: FrictionTerms) -> FrictionTerm | None:
-        """Return the first term but the last one that the model does as well without."""
+        """Return the first term, except the last one, that the model does not need."""
         judged = (self._judge_present(model, term) for term in model.terms[:-1])
         return next((judgement.term for judgement in judged if not judgement.chosen), None)
 
@@ -210,11 +210,11 @@ class _Search:
     def _with_best_widths(self, model: FrictionTerms) -> FrictionTerms:
         for term in model.terms:
             if term.has_width:
-                model = model.replaced(self._with_best_width(model.without(term), term))
+                model = model.with_width(self._with_best_width(model.without(term), term))
         return model
 
     def _with_best_width(self, model: FrictionTerms, term: FrictionTerm) -> FrictionTerm:
-        """Return the term with the width that explains most of the motion estimated on."""
+        """Return the term with the width that explains most of the motion of the estimate."""
         if not term.has_width:
             return term
         largest = self._fastest[term.joint]
@@ -232,7 +232,7 @@ class _Search:
         return replace(term, width=float(np.exp(found.x) * largest))
 
     def _solve(self, model: FrictionTerms) -> tuple[np.ndarray, float]:
-        """Return parameters and the sum of squared weighted errors of the motion estimated on."""
+        """Return parameters and squared weighted errors for the motion of the estimate."""
         size, terms = len(self._right), model.terms
         products = [self._training.products(term) for term in terms]
         normal = np.zeros((size + len(terms), size + len(terms)))
@@ -244,7 +244,7 @@ class _Search:
         right = np.concatenate([self._right, [own.torques for own in products]])
         scale = np.sqrt(np.diag(normal))
         scaled = normal / np.outer(scale, scale)
-        # columns that are hardly told apart get small factors
+        # nearly indistinguishable columns get small factors
         scaled[np.diag_indices_from(scaled)] += _INDEPENDENT
         solution = cho_solve(cho_factor(scaled), right / scale) / scale
         squares = self._square - 2.0 * right @ solution + solution @ normal @ solution

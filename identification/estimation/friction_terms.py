@@ -10,8 +10,8 @@ To ``f_c sign(v) + f_v v`` of (2.41) each joint may add
 ``quadratic``   ``v |v|``                   viscous friction that grows or falls with velocity
 =============== =========================== =======================================================
 
-Each stands for a torque against the motion; the factors are linear parameters like those of
-:mod:`~identification.model.dynamic_parameters`, the widths w are not and have to be searched for.
+Each is a torque against the motion; the factors are linear parameters like those of
+:mod:`~identification.model.dynamic_parameters`, the widths w are not and need a search.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.model.base import BaseParameters
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 
 # parameter name of each kind, and power of the velocity in its unit
 _NAMES = {
@@ -40,7 +40,7 @@ class FrictionTerm:
     """A term of the friction of one joint.
 
     Attributes:
-        joint: Whose, from 0.
+        joint: Index of the joint, from 0.
         kind: One of :data:`KINDS`.
         width: w [rad/s or m/s] of a kind that has one, else None.
 
@@ -55,7 +55,7 @@ class FrictionTerm:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise InputError(
-                f"friction term {shortened(repr(self.kind))}: must be one of {', '.join(KINDS)}"
+                f"friction term {shorten(repr(self.kind))}: must be one of {', '.join(KINDS)}"
             )
         if self.has_width != (self.width is not None):
             required = "is required" if self.has_width else "is not allowed"
@@ -70,7 +70,7 @@ class FrictionTerm:
 
     @property
     def name(self) -> str:
-        """Of the parameter, ``joint_2.f_s``, joints from 1."""
+        """Name of the parameter, ``joint_2.f_s``, joints from 1."""
         return f"joint_{self.joint + 1}.{_NAMES[self.kind]}"
 
     def unit(self, joint_unit: str) -> str:
@@ -102,10 +102,10 @@ class FrictionTerm:
 
 @dataclass(frozen=True)
 class FrictionTerms:
-    """Which terms the joints of a robot have beside Coulomb and viscous friction.
+    """Terms of a robot's joints beside Coulomb and viscous friction.
 
     Attributes:
-        terms: In the order of their parameters; not two of the same kind for a joint.
+        terms: Terms in the order of their parameters; no kind twice for a joint.
 
     Raises:
         InputError: If a joint has a kind twice.
@@ -117,11 +117,11 @@ class FrictionTerms:
         names = self.names
         for name in names:
             if names.count(name) > 1:
-                raise InputError(f"friction: {name} is there {names.count(name)} times; must be 1")
+                raise InputError(f"friction: {name} appears {names.count(name)} times; must be 1")
 
     @property
     def names(self) -> list[str]:
-        """Of the parameters."""
+        """Names of the parameters."""
         return [term.name for term in self.terms]
 
     def check_size(self, joints: int) -> None:
@@ -145,8 +145,8 @@ class FrictionTerms:
             columns[:, term.joint, i] = term.column(v[:, term.joint])
         return columns
 
-    def extended(self, base: BaseParameters, joint_units: Sequence[str]) -> BaseParameters:
-        """Return base parameters with those of the terms behind them.
+    def extend(self, base: BaseParameters, joint_units: Sequence[str]) -> BaseParameters:
+        """Return base parameters followed by the terms' parameters.
 
         Args:
             base: Base of the robot without the terms.
@@ -171,8 +171,8 @@ class FrictionTerms:
         """Return the model with one more term."""
         return FrictionTerms((*self.terms, term))
 
-    def replaced(self, term: FrictionTerm) -> "FrictionTerms":
-        """Return the model with another width of a term that it has."""
+    def with_width(self, term: FrictionTerm) -> "FrictionTerms":
+        """Return the model with another width of one of its terms."""
         return FrictionTerms(tuple(term if t.name == term.name else t for t in self.terms))
 
     def without(self, term: FrictionTerm) -> "FrictionTerms":

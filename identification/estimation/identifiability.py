@@ -1,9 +1,8 @@
-"""What a motion tells about which parameters, by singular values of the scaled regressor.
+"""Identifiability of parameters from a motion, by singular values of the scaled regressor.
 
 The weighted information matrix is scaled to columns of length 1, ``X = A diag(s)``, so that units
-do not matter. Directions of the scaled parameters along which A is zero change no torque at all:
-what takes part in them cannot be told apart. Directions with small singular values are hardly
-seen.
+do not matter. Directions of the scaled parameters along which A is zero change no torque: their
+parameters cannot be distinguished. Directions with small singular values are nearly invisible.
 """
 
 from collections.abc import Sequence
@@ -15,16 +14,16 @@ from scipy.sparse.csgraph import connected_components
 
 from pfsc_drake.errors import InputError
 
-# of the largest singular value; those below are zero but for rounding
+# of the largest singular value; smaller ones are zero up to rounding
 _ZERO = 1e-8
-# part that a parameter has in a direction, from which on it counts
+# least component of a parameter in a direction that counts
 _TAKES_PART = 1e-4
 _MOST_NAMES = 12
-# relative standard deviation, above which Sec. C.2 calls a parameter badly identifiable
+# relative standard deviation above which Sec. C.2 calls a parameter badly identifiable
 BADLY = 0.15
-# correlation from which on parameters move together, and how many of them are told
+# correlation from which on parameters are reported as partners, and their largest number
 _TOGETHER, _MOST_PARTNERS = 0.7, 3
-# how much better a parameter were known if the others were, to blame them
+# least improvement by known other parameters that makes them the reason
 _BLAME = 3.0
 
 
@@ -61,34 +60,36 @@ class Factors:
 
 
 def factorize(X: np.ndarray, b: np.ndarray, names: Sequence[str], what: str) -> Factors:
-    """Return singular values of an information matrix that tells all parameters apart.
+    """Return singular values of an information matrix that distinguishes all parameters.
 
     Args:
         X: Weighted, shape (rows, n_b).
         b: Weighted torques, shape (rows,).
         names: Names of the parameters.
-        what: Whose they are, for messages.
+        what: Subject of the messages.
 
     Raises:
-        InputError: If there are fewer rows than parameters, or parameters that have no effect or
-            cannot be told apart; says which.
+        InputError: If there are fewer rows than parameters, or parameters have no effect or cannot
+            be distinguished; names them.
     """
     rows = int(np.count_nonzero(np.any(X != 0.0, axis=1)))
     scale = np.linalg.norm(X, axis=0)
-    seen = scale > 0.0
-    Q, R = qr(X[:, seen] / scale[seen], mode="economic", check_finite=False)
+    effective = scale > 0.0
+    Q, R = qr(X[:, effective] / scale[effective], mode="economic", check_finite=False)
     U, values, Vt = svd(R)
     known = values > _ZERO * values.max(initial=1.0)
-    if not seen.all() or not known.all() or rows < len(names):
+    if not effective.all() or not known.all() or rows < len(names):
         blind = Vt[np.count_nonzero(known) :].T
-        seen_names = [name for name, is_seen in zip(names, seen, strict=True) if is_seen]
+        effective_names = [
+            name for name, is_effective in zip(names, effective, strict=True) if is_effective
+        ]
         lines = []
-        if not seen.all():
-            without = [name for name in names if name not in seen_names]
-            lines.append(f"without effect on the torques: {_listed(without)}")
-        groups = _groups(blind, seen_names)
+        if not effective.all():
+            without = [name for name in names if name not in effective_names]
+            lines.append(f"without effect on the torques: {_join_names(without)}")
+        groups = _groups(blind, effective_names)
         if groups:
-            lines.append("cannot be told apart: " + "; ".join(map(_listed, groups)))
+            lines.append("cannot be distinguished: " + "; ".join(map(_join_names, groups)))
         raise InputError(
             f"{what}: the motion does not excite all {len(names)} parameters ({rows} torques "
             f"count); {'; '.join(lines)}; must move so that each changes the torques in its own way"
@@ -97,7 +98,7 @@ def factorize(X: np.ndarray, b: np.ndarray, names: Sequence[str], what: str) -> 
 
 
 def _groups(blind: np.ndarray, names: Sequence[str]) -> list[list[str]]:
-    """Return parameters that take part in blind directions, those together that are mixed."""
+    """Return groups of parameters that are mixed in directions without effect."""
     if not blind.shape[1]:
         return []
     projector = blind @ blind.T
@@ -107,23 +108,23 @@ def _groups(blind: np.ndarray, names: Sequence[str]) -> list[list[str]]:
     return [[names[i] for i in part[label == group]] for group in np.unique(label)]
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     more = len(names) - _MOST_NAMES
     return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 @dataclass(frozen=True)
 class WeakParameter:
-    """A parameter that is badly identifiable, and why.
+    """A badly identifiable parameter, with the reason.
 
     Attributes:
         name: Name of the parameter.
-        relative_deviation: Standard deviation by magnitude.
+        relative_deviation: Standard deviation divided by the magnitude.
         relative_deviation_alone: The same if all others were known.
-        torque_share: Largest RMS of the torques that the parameter makes, in units of the
-            noise of a torque as measured in the same joint.
+        torque_share: Largest RMS of the parameter's torques, in units of the noise of a measured
+            torque in the same joint.
         joint: Name of that joint.
-        partners: Names of parameters that it moves together with, the closest first.
+        partners: Names of correlated parameters, the closest first.
     """
 
     name: str
@@ -135,7 +136,7 @@ class WeakParameter:
 
     @property
     def reason(self) -> str:
-        """Why, in words."""
+        """Reason in words."""
         reasons = []
         if self.torque_share < 1.0:
             reasons.append(
@@ -169,7 +170,7 @@ def weak_parameters(
     Args:
         matrix: ``Y_b``, shape (K, N, n_b).
         weights: Weights of the torques, shape (K, N).
-        noise: Standard deviation of one torque as measured, shape (N,).
+        noise: Standard deviation of one measured torque, shape (N,).
         values: Values of the parameters, shape (n_b,).
         covariance: Covariance of the parameters, shape (n_b, n_b).
         names: Names of the parameters.

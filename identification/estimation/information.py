@@ -1,4 +1,4 @@
-"""The overdetermined linear system (2.75) of a motion and the torques measured on it."""
+"""Overdetermined linear system (2.75) of a motion and its measured torques."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,22 +13,22 @@ from identification.model.regressor import Regressor
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 
-# of a joint's largest velocity: below, whether it sticks or slips is not known
+# of a joint's largest velocity: below, it is unknown whether it sticks or slips
 SLOW = 0.03
-# of a joint's velocity limit (of 1 rad/s or m/s where there is none): below, it stands still
+# of a joint's velocity limit (or of 1 rad/s or m/s): below, it stands still
 _STILL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class StoredMotion:
-    """A motion of N joints at K instants, as of Sec. 2.5.2, and its torques, without its periods.
+    """A motion of N joints at K instants, as in Sec. 2.5.2, with torques, without single periods.
 
     Attributes:
         q: Positions [rad or m], shape (K, N).
         v: Velocities [rad/s or m/s], shape (K, N).
         a: Accelerations [rad/s^2 or m/s^2], shape (K, N).
         tau: Torques [Nm or N], shape (K, N).
-        torque_variance: Variance of one torque as measured, shape (N,).
+        torque_variance: Variance of one measured torque, shape (N,).
         mean_torque_variance: Variance of ``tau``, shape (N,); smaller if it is a mean.
         t: Times [s], shape (K,); None if unknown.
     """
@@ -47,15 +47,15 @@ MeasuredMotion = StoredMotion | AveragedMotion
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What a motion tells about n_b parameters; K instants, N joints.
+    """Linear system of a motion with n_b parameters; K instants, N joints.
 
     Attributes:
-        matrix: ``Y_b`` at each instant, shape (K, N, n_b); one below the other these are the
-            information matrix X (2.76).
+        matrix: ``Y_b`` at each instant, shape (K, N, n_b); stacked, the information matrix X
+            (2.76).
         torques: ``tau_d`` at each instant (2.77) [Nm or N], shape (K, N).
-        used: Which torques count, shape (K, N): those of joints that move.
+        used: Which torques count, shape (K, N): those of moving joints.
         variance: Variance of the torques, the diagonal of Upsilon in (2.80), shape (N,).
-        base: What the columns stand for.
+        base: Base parameters of the columns.
         still: Whether a joint stands still throughout, shape (N,).
     """
 
@@ -68,7 +68,7 @@ class Information:
 
     @property
     def weights(self) -> np.ndarray:
-        """What rows are multiplied by, ``Upsilon^(-1/2)``; 0 where not used; shape (K, N)."""
+        """Factors of the rows, ``Upsilon^(-1/2)``; 0 if not used; shape (K, N)."""
         return self.used / np.sqrt(self.variance)
 
     def weighted(self) -> tuple[np.ndarray, np.ndarray]:
@@ -87,9 +87,9 @@ def information(
 ) -> Information:
     """Return the linear system of a motion.
 
-    Near a reversal a joint may stick, and its friction is anything up to ``f_c``. The torques of a
-    joint therefore do not count as long as it moves slowly. A joint that stands still throughout,
-    but for noise, is taken not to move at all.
+    Near a reversal a joint may stick, and its friction has any value up to ``f_c``. Therefore the
+    torques of a joint do not count while it moves slowly. A joint that stands still throughout, up
+    to noise, is treated as fixed.
 
     Args:
         regressor: Regressor of the robot.
@@ -99,7 +99,7 @@ def information(
         slow: Part of a joint's largest velocity below which its torques do not count.
 
     Raises:
-        InputError: If the motion is of another robot, the base parameters are of another
+        InputError: If the motion belongs to another robot, the base parameters to another
             regressor, a variance is not positive, or ``slow`` is not in [0, 1).
     """
     subject = regressor.subject
@@ -125,19 +125,19 @@ def information(
             f"{subject.name}: variance of the torque of {subject.joint_names[j]} = "
             f"{variance[j]:g}; must be positive and finite, as of measured torques"
         )
-    fastest, still = np.abs(motion.v).max(axis=0), standing_still(subject, motion.v)
+    fastest, still = np.abs(motion.v).max(axis=0), joints_at_rest(subject, motion.v)
     v, a = np.where(still, 0.0, motion.v), np.where(still, 0.0, motion.a)
     matrix = base.reduce(regressor.matrix(motion.q, v, a))
     if friction is not None and friction.terms:
         friction.check_size(n)
         matrix = np.concatenate([matrix, friction.columns(v)], axis=2)
-        base = friction.extended(base, subject.joint_units)
+        base = friction.extend(base, subject.joint_units)
     used = (np.abs(v) >= slow * fastest) & ~still
     return Information(matrix, torques, used, variance, base, still)
 
 
-def standing_still(subject: Subject, v: np.ndarray) -> np.ndarray:
-    """Return which joints stand still throughout but for noise, shape (N,).
+def joints_at_rest(subject: Subject, v: np.ndarray) -> np.ndarray:
+    """Return which joints stand still throughout up to noise, shape (N,).
 
     Args:
         subject: The robot.
@@ -147,11 +147,11 @@ def standing_still(subject: Subject, v: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(v).max(axis=0) <= _STILL * limit)
 
 
-_REMEMBERED = 128  # terms with their products
+_REMEMBERED = 128  # terms with stored products
 
 
 class Products(NamedTuple):
-    """What a further column adds to the normal equations.
+    """Contribution of a further column to the normal equations.
 
     Attributes:
         column: Column of one joint, weighted, shape (K,).
@@ -165,7 +165,7 @@ class Products(NamedTuple):
 
 
 class FurtherColumns:
-    """A weighted linear system that terms of friction may be added to; K instants, N joints.
+    """A weighted linear system that can be extended by friction terms; K instants, N joints.
 
     Attributes:
         X: Weighted information matrix, shape (K N, n_b).
@@ -177,7 +177,7 @@ class FurtherColumns:
     """
 
     def __init__(self, system: Information, v: np.ndarray) -> None:
-        """Weights a system.
+        """Weight a system.
 
         Args:
             system: The linear system.

@@ -1,4 +1,4 @@
-"""Weighted least squares for the base parameters (2.80), its weights, how well they are known."""
+"""Weighted least squares for the base parameters (2.80), with weights and covariance."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,24 +17,24 @@ from identification.estimation.information import SLOW, Information, MeasuredMot
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 
-# neighbours on either side that a spectrum is averaged over
+# neighbours on either side for the average of a spectrum
 _SMOOTH = 10
-# harmonics at which bands begin in all of which white noise is equally strong
+# first harmonics of bands with equal power of white noise
 _BANDS = (1, 11, 41, 161, 641)
-# probability to call white noise coloured, for a band of a joint
+# probability to classify white noise as coloured, for a band of a joint
 _ERROR = 1e-5
 
 
 def mean_torque_spectrum(motion: MeasuredMotion) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the spectrum of the noise in the mean torques; None if there are no periods.
 
-    What differs from period to period is noise; what all periods share is not in it, so that a
-    wrong model does not spoil it. The power is that at the harmonics of the period, averaged over
-    some neighbours; over all of them in joints whose noise is equally strong in all bands of
-    frequencies, but for what chance explains.
+    Differences between the periods are noise; everything common to all periods is excluded, so that
+    a wrong model has no effect. The power is given at the harmonics of the period, averaged over
+    some neighbours; over all of them in joints whose noise has equal power in all frequency bands,
+    up to chance.
 
     Args:
-        motion: Has torques of P periods as ``tau_periods``, shape (P, K, N), or not.
+        motion: Motion with torques of P periods as ``tau_periods``, shape (P, K, N), or without.
 
     Returns:
         Variances per sample [(Nm)^2 or N^2] at the frequencies of ``rfft``, shape
@@ -67,8 +67,8 @@ def mean_torque_spectrum(motion: MeasuredMotion) -> tuple[np.ndarray, np.ndarray
 def coloured_covariance(inverse: np.ndarray, system: Information, powers: np.ndarray) -> np.ndarray:
     """Return the covariance of the weighted least-squares estimate under coloured noise.
 
-    ``(X' W X)^-1 X' W E W X (X' W X)^-1`` with the covariance E of the torques, which in a motion
-    of periods is diagonal in the frequencies.
+    ``(X' W X)^-1 X' W E W X (X' W X)^-1`` with the covariance E of the torques, which is diagonal
+    in the frequencies for a periodic motion.
 
     Args:
         inverse: ``(X' W X)^-1``, shape (n_b, n_b).
@@ -94,19 +94,19 @@ class Estimate:
     """Base parameters of a robot from one experiment; K instants, N joints, n_b parameters.
 
     Attributes:
-        robot: Its name.
+        robot: Name of the robot.
         joint_names: N names.
         joint_units: ``rad`` or ``m`` of each joint.
-        base: What the parameters are combinations of; those of ``friction`` are the last ones.
+        base: Combinations of the parameters; those of ``friction`` are the last ones.
         friction: Terms beside Coulomb and viscous friction.
         base_parameters: ``rho_b`` of (2.80), shape (n_b,), SI units.
         covariance: Covariance of ``base_parameters``, shape (n_b, n_b).
-        coloured: In which joints the noise that the covariance stands for has the spectrum that
-            was measured, shape (N,). In the others it is white; in all of them,
-            ``(X' Upsilon^-1 X)^-1`` is the covariance.
-        motion: What it is from.
+        coloured: In which joints the covariance uses the measured noise spectrum, shape (N,). In
+            the others noise is white; if in all of them, ``(X' Upsilon^-1 X)^-1`` is the
+            covariance.
+        motion: Motion of the estimate.
         system: The linear system that was solved.
-        factors: Singular values of that.
+        factors: Its singular values.
     """
 
     robot: str
@@ -123,22 +123,22 @@ class Estimate:
 
     @property
     def names(self) -> list[str]:
-        """What each parameter is a combination of."""
+        """Combination of each parameter."""
         return self.base.names
 
     @property
     def short_names(self) -> list[str]:
-        """The names of the parameters that lead the combinations."""
+        """Leading parameter of each combination."""
         return self.base.short_names
 
     @property
     def units(self) -> list[str]:
-        """Of the parameters."""
+        """Units of the parameters."""
         return self.base.units
 
     @property
     def robot_base(self) -> BaseParameters:
-        """Those of the robot without ``friction``: the first ones, with their covariance."""
+        """Base parameters without ``friction``: the first ones, with their covariance."""
         rank, full = (size - len(self.friction.terms) for size in self.base.projection.shape)
         return BaseParameters(
             self.base.indices[:rank],
@@ -149,12 +149,12 @@ class Estimate:
 
     @property
     def standard_deviation(self) -> np.ndarray:
-        """Of the parameters, shape (n_b,)."""
+        """Standard deviations of the parameters, shape (n_b,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def relative_standard_deviation(self) -> np.ndarray:
-        """In units of the magnitudes, shape (n_b,)."""
+        """Standard deviations in units of the magnitudes, shape (n_b,)."""
         return self.standard_deviation / np.abs(self.base_parameters)
 
     @cached_property
@@ -169,12 +169,12 @@ class Estimate:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Torques that count less parameters."""
+        """Number of used torques minus number of parameters."""
         return int(np.count_nonzero(self.system.used)) - self.base.rank
 
     @property
     def variance_factor(self) -> float:
-        """Mean square of the weighted residuals; 1 if noise is all that they are."""
+        """Mean square of the weighted residuals; 1 for pure noise."""
         squares = np.sum((self.residuals * self.system.weights) ** 2)
         return float(squares / self.degrees_of_freedom)
 
@@ -184,7 +184,7 @@ class Estimate:
         return self.factors.condition
 
     def weak_parameters(self) -> list[WeakParameter]:
-        """Return the parameters that are badly identifiable, and why, the worst first."""
+        """Return the badly identifiable parameters with reasons, the worst first."""
         return weak_parameters(
             self.system.matrix,
             self.system.weights,
@@ -206,22 +206,22 @@ def estimate(
 ) -> Estimate:
     """Estimate base parameters by weighted least squares (2.80).
 
-    The torques of each joint are weighted with their variance. The covariance of white noise is
-    ``(X' Upsilon^-1 X)^-1``; where the periods of a motion show that noise has a colour, that of
-    the same estimate under noise of the spectrum that was measured is larger.
+    The torques of each joint are weighted with their variance. The covariance for white noise is
+    ``(X' Upsilon^-1 X)^-1``; if the periods of a motion show coloured noise, the covariance of the
+    same estimate for the measured noise spectrum is larger.
 
     Args:
         regressor: Regressor of the robot.
         base: Its base parameters.
         motion: Positions, velocities, accelerations and torques.
         friction: Terms beside Coulomb and viscous friction.
-        slow: Part of a joint's largest velocity below which its torques do not count, since the
+        slow: Part of a joint's largest velocity below which its torques do not count, because the
             joint may stick.
-        white: Whether to take all noise for white even if the periods show that it is not.
+        white: Whether to assume white noise even if the periods show coloured noise.
 
     Raises:
-        InputError: If the motion does not fit the robot, or does not excite all parameters (says
-            which cannot be told apart).
+        InputError: If the motion does not fit the robot, or does not excite all parameters (names
+            those that cannot be distinguished).
     """
     system = information(regressor, base, motion, friction, slow)
     subject = regressor.subject
@@ -253,28 +253,28 @@ def _source(system: Information, regressor: Regressor) -> str:
     return regressor.subject.name + (f", {', '.join(still)} standing still" if still else "")
 
 
-# below this part of the largest, an eigenvalue is zero but for rounding
+# below this part of the largest, an eigenvalue is zero up to rounding
 _RANK = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Parameters and what is left, linear in factors s of the torques of N joints.
+    """Parameters and residual squares, linear in factors s of the torques of N joints.
 
     With ``tau_j`` in the rows of joint j as column j of C and the weighted regressor X, the
-    parameters are ``(X' X)^-1 X' C s``, and the squares that are left are ``s' M s`` with
+    parameters are ``(X' X)^-1 X' C s``, and the residual squares are ``s' M s`` with
     ``M = C' C - C' X (X' X)^-1 X' C``.
 
     Attributes:
-        left_over: M in units of the noise, shape (N, N).
+        residual_squares: M in units of the noise, shape (N, N).
         parameters: ``(X' X)^-1 X' C``, shape (n_b, N).
         deviation: Standard deviations of the parameters, shape (n_b,); infinite for those that
-            torques do not tell apart.
-        sizes: RMS of the torque that a parameter of one makes, in units of the noise, shape (n_b,).
-        freedom: Torques that count less parameters.
+            torques do not distinguish.
+        sizes: RMS of the torque of a parameter of one, in units of the noise, shape (n_b,).
+        freedom: Number of used torques minus number of parameters.
     """
 
-    left_over: np.ndarray
+    residual_squares: np.ndarray
     parameters: np.ndarray
     deviation: np.ndarray
     sizes: np.ndarray
@@ -284,7 +284,7 @@ class NormalEquations:
     def of(
         cls, matrix: np.ndarray, v: np.ndarray, tau: np.ndarray, noise: np.ndarray
     ) -> "NormalEquations":
-        """Return those of a motion of K instants; torques of slow joints do not count.
+        """Return the equations of a motion of K instants; torques of slow joints do not count.
 
         Args:
             matrix: ``Y_b``, shape (K, N, n_b).

@@ -11,13 +11,13 @@ from pfsc_drake.errors import InputError
 
 @dataclass(frozen=True)
 class SpreadTest:
-    """Whether runs differ as much as their covariance predicts.
+    """Test whether runs differ as much as their covariance predicts.
 
     Attributes:
         chi_squared: ``sum_r (x_r - mean)' C^-1 (x_r - mean)``.
-        degrees_of_freedom: ``R - 1`` times the number of parameters that count.
+        degrees_of_freedom: ``R - 1`` times the number of used parameters.
         p_value: Probability of a chi-squared at least as far from the middle, on either side.
-        median_ratio: Median of empirical by predicted standard deviations.
+        median_ratio: Median of the ratios of empirical to predicted standard deviations.
     """
 
     chi_squared: float
@@ -34,7 +34,7 @@ class Repetitions:
         estimates: One for each run, of the same robot, base and friction.
 
     Raises:
-        InputError: If there is none, or they are of different parameters.
+        InputError: If there is none, or they have different parameters.
     """
 
     estimates: tuple[Estimate, ...]
@@ -52,37 +52,37 @@ class Repetitions:
 
     @property
     def values(self) -> np.ndarray:
-        """Of the parameters in each run, shape (R, n_b)."""
+        """Parameters of each run, shape (R, n_b)."""
         return np.array([run.base_parameters for run in self.estimates])
 
     @property
     def mean(self) -> np.ndarray:
-        """Of the runs, shape (n_b,)."""
+        """Mean of the runs, shape (n_b,)."""
         return np.mean(self.values, axis=0)
 
     @property
     def covariance(self) -> np.ndarray:
-        """Predicted of one run, mean of the runs, shape (n_b, n_b)."""
+        """Predicted covariance of one run, mean of the runs, shape (n_b, n_b)."""
         return np.mean([run.covariance for run in self.estimates], axis=0)
 
     @property
     def standard_deviation(self) -> np.ndarray:
-        """Of the runs about their mean, shape (n_b,); NaN for one run."""
+        """Standard deviations of the runs about their mean, shape (n_b,); NaN for one run."""
         if len(self.estimates) < 2:
             return np.full(self.mean.shape, np.nan)
         return np.std(self.values, axis=0, ddof=1)
 
     @property
     def predicted_standard_deviation(self) -> np.ndarray:
-        """Of one run, shape (n_b,)."""
+        """Predicted standard deviations of one run, shape (n_b,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def covariance_of_mean(self) -> np.ndarray:
-        """Of ``mean``, shape (n_b, n_b).
+        """Covariance of ``mean``, shape (n_b, n_b).
 
-        The predicted one, larger where runs differ by more than it predicts, as friction does
-        that is another one each day.
+        The predicted one, larger if runs differ by more than it predicts, as friction does, which
+        changes from day to day.
         """
         predicted = self.covariance / len(self.estimates)
         ratio = self.standard_deviation / self.predicted_standard_deviation
@@ -113,14 +113,14 @@ class Repetitions:
         return np.min(shares, axis=0)
 
     def spread_test(self, friction: bool = True) -> SpreadTest:
-        """Compare the spread of the runs with what their covariance predicts.
+        """Compare the spread of the runs with their covariance.
 
         Args:
-            friction: Whether parameters of friction count, which may be others in each run
-                while those of the bodies stay.
+            friction: Whether parameters of friction count, which may differ between runs, while
+                those of the bodies stay the same.
 
         Raises:
-            InputError: If there is one run only.
+            InputError: If there is only one run.
         """
         runs = len(self.estimates)
         if runs < 2:

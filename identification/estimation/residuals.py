@@ -1,11 +1,12 @@
-"""What is left of measured torques: noise, motion that was filtered out, or what a model lacks.
+"""Residuals of measured torques: noise, filtered motion, or missing terms of a model.
 
-Sec. C.2 keeps 20 harmonics of the period. That is right for a robot that follows its excitation.
-One whose servo does not know its friction sticks a little at each reversal and moves with edges, of
-which such a filter leaves nothing: accelerations are missing and parameters are biased, far more
-than their covariance tells. With too large a bandwidth the noise of the positions, whose second
-derivative grows with the frequency squared, biases them as well. What is left of the torques at low
-frequencies tells both.
+Sec. C.2 uses 20 harmonics of the period. That is right for a robot that follows its excitation. A
+robot whose servo does not compensate friction sticks a little at each reversal and moves with
+edges,
+which such a filter removes: accelerations are missing and parameters are biased, far more than
+their covariance indicates. If the bandwidth is too large, the noise of the positions, whose second
+derivative grows with the frequency squared, biases them as well. The residuals at low frequencies
+show both.
 """
 
 from collections.abc import Sequence
@@ -23,15 +24,15 @@ from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 
-# delays that residuals are compared with themselves at, in samples
+# delays of the autocorrelation, in samples
 LAGS = 20
-# of the period that residuals are looked at in
+# of the period, highest harmonic for the residuals
 _HARMONICS = 100
 
 
 @dataclass(frozen=True, eq=False)
 class Whiteness:
-    """Test of Ljung and Box whether the residuals of N joints are white.
+    """Ljung-Box test whether the residuals of N joints are white.
 
     Attributes:
         joint_names: N names.
@@ -39,7 +40,7 @@ class Whiteness:
         bound: 95 % of the autocorrelations of white residuals are within +- this, shape (N,).
         statistic: ``sum_h (n + 2) n / (n - h) r_h^2``, shape (N,); chi-squared with L degrees of
             freedom for white residuals.
-        p_value: Probability of a larger one, shape (N,).
+        p_value: Probability of a larger statistic, shape (N,).
     """
 
     joint_names: tuple[str, ...]
@@ -56,7 +57,7 @@ def whiteness(
 
     Args:
         residuals: Shape (K, N), samples at an even rate.
-        used: Which count, shape (K, N); pairs of which one does not are left out.
+        used: Which residuals count, shape (K, N); pairs with an unused one are left out.
         joint_names: N names.
         lags: Largest delay [samples].
 
@@ -70,12 +71,12 @@ def whiteness(
             f"whiteness: {counts[j]} residuals of {joint_names[j]}, delays to {lags}; at least one "
             "delay and 5 times as many residuals are required"
         )
-    kept = np.where(used, residuals - np.mean(residuals, axis=0, where=used), 0.0)
-    power = np.sum(kept**2, axis=0) / counts
+    centered = np.where(used, residuals - np.mean(residuals, axis=0, where=used), 0.0)
+    power = np.sum(centered**2, axis=0) / counts
     autocorrelation, statistic = np.empty((lags, len(joint_names))), np.zeros(len(joint_names))
     for h in range(1, lags + 1):
         pairs = np.sum(used[h:] & used[:-h], axis=0)
-        autocorrelation[h - 1] = np.sum(kept[h:] * kept[:-h], axis=0) / pairs / power
+        autocorrelation[h - 1] = np.sum(centered[h:] * centered[:-h], axis=0) / pairs / power
         # (n + 2) n / (n - h) r^2 with r a sum over all n, without gaps
         statistic += pairs * (counts + 2) / counts * autocorrelation[h - 1] ** 2
     return Whiteness(
@@ -89,16 +90,16 @@ def whiteness(
 
 @dataclass(frozen=True, eq=False)
 class Excess:
-    """Power of the residuals of N joints at low frequencies, by that of the noise there.
+    """Power of the residuals of N joints at low frequencies, relative to the noise there.
 
-    Noise is what differs from period to period, whatever its colour. A model that lacks something
-    leaves more than that: what is the same in all periods. Above the frequencies of the motion
-    that may be the robot's drives, whose torques ring without moving it.
+    Noise is the difference between periods, of any colour. An incomplete model leaves more: a part
+    that is the same in all periods. Above the frequencies of the motion it may come from the
+    robot's drives, whose torques oscillate without moving it.
 
     Attributes:
         freedom: Degrees of freedom of the residuals of a joint.
-        ratio: Shape (N,); 1 if there is nothing but noise.
-        p_value: Probability of a larger ratio of noise, shape (N,).
+        ratio: Ratio of the powers, shape (N,); 1 for pure noise.
+        p_value: Probability of a larger ratio for pure noise, shape (N,).
     """
 
     freedom: float
@@ -117,15 +118,15 @@ def excess(
 
     Args:
         residuals: Residuals of the mean torques, shape (K, N).
-        used: Which count, shape (K, N).
-        motion: Whose residuals they are.
-        highest_hz: By default that of 100 harmonics of the period [Hz].
-        parameters: Number that was estimated from the same torques, which takes away as many
-            degrees of freedom; 0 for another motion.
+        used: Which residuals count, shape (K, N).
+        motion: Motion of the residuals.
+        highest_hz: Highest frequency [Hz]; by default 100 harmonics of the period.
+        parameters: Number of parameters estimated from the same torques, which reduces the degrees
+            of freedom; 0 for another motion.
 
     Raises:
-        InputError: If the frequency is not between that of the period and half the sampling
-            rate, or there are more parameters than frequencies tell.
+        InputError: If the frequency is not between the period's and half the sampling rate, or
+            there are more parameters than frequencies.
     """
     samples, joints = residuals.shape
     half = 0.5 * samples / motion.period
@@ -143,7 +144,7 @@ def excess(
             f"{highest:g} Hz; must be fewer"
         )
     spectrum = mean_torque_spectrum(motion)
-    assert spectrum is not None  # averages are of two periods or more
+    assert spectrum is not None  # averages have two periods or more
     band = slice(1, count + 1)
     power = np.abs(np.fft.rfft(np.where(used, residuals, 0.0), axis=0)) ** 2
     power *= 1.0 / used.sum(axis=0)
@@ -153,18 +154,18 @@ def excess(
 
 # in units of 20 harmonics
 _MULTIPLES = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
-# standard deviations by which what is left may be above the least
+# standard deviations, tolerance of the residuals above the least ones
 _CHANCE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class BandwidthChoice:
-    """The bandwidth with which positions are filtered.
+    """Bandwidth for filtering the positions.
 
     Attributes:
         motion: The record averaged with it.
-        candidates: Bandwidths that were tried [Hz], rising.
-        excesses: What each leaves of the torques.
+        candidates: Tested bandwidths [Hz], rising.
+        excesses: Excess of the residuals for each of them.
     """
 
     motion: AveragedMotion
@@ -178,7 +179,7 @@ class BandwidthChoice:
 
     @property
     def excess(self) -> Excess:
-        """What the chosen one leaves."""
+        """Excess of the residuals for the chosen bandwidth."""
         return self.excesses[self.candidates.index(self.bandwidth_hz)]
 
 
@@ -197,11 +198,11 @@ def choose_bandwidth(
         base: Its base parameters.
         record: Record of a periodic motion.
         period: ``T_f`` [s]; by default the record's.
-        skip: Periods at the start that are left out.
-        progress: Told the fraction done and what is done.
+        skip: Periods at the start to leave out.
+        progress: Receives the completed fraction and the current step.
 
     Raises:
-        InputError: As of :func:`~identification.measurement.periods.average` and
+        InputError: As in :func:`~identification.measurement.periods.average` and
             :func:`~identification.estimation.least_squares.estimate`.
     """
     first = average(record, period, skip)

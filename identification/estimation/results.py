@@ -1,25 +1,25 @@
-"""``identification.h5``: an estimate with all that somebody needs to check it.
+"""``identification.h5``: an estimate with all data for its verification.
 
 K instants, N joints, n parameters, n_b base parameters; SI units throughout:
 
 ==================== ============== ============================================================
 ``regressor``        (K, N, n_b)    ``Y_b`` (2.76); times ``projection`` it is Y of all parameters
 ``torques``          (K, N)         measured ``tau_d``, mean of the periods (2.77)
-``weights``          (K, N)         what rows were multiplied by, ``Upsilon^(-1/2)``; 0: not used
+``weights``          (K, N)         factors of the rows, ``Upsilon^(-1/2)``; 0: not used
 ``base_parameters``  (n_b,)         the estimate (2.80)
 ``covariance``       (n_b, n_b)     of the estimate
 ``standard_deviation`` (n_b,)       of the estimate
 ``projection``       (n_b, n)       ``K_b``: base parameters of all parameters
 ``indices``          (n_b,)         parameters whose columns the regressor has
-``motion/...``                      ``t, q, v, a`` that the regressor is of, shapes (K,), (K, N);
+``motion/...``                      ``t, q, v, a`` of the regressor, shapes (K,), (K, N);
                                     ``torque_variance``, ``mean_torque_variance`` (N,)
 ``repetitions/...``                 ``base_parameters`` (R, n_b), ``covariance`` (R, n_b, n_b)
 ==================== ============== ============================================================
 
-Attributes hold names and units: ``names`` (in words), ``short_names`` and ``units`` of
+Attributes contain names and units: ``names`` (in words), ``short_names`` and ``units`` of
 ``base_parameters``, ``names`` and ``units`` of ``projection`` (of all n parameters), ``labels``
-(joints) and ``units`` of signals. Those of ``friction`` tell terms beside Coulomb and viscous
-friction: ``joints`` (from 1), ``kinds``, ``widths`` (NaN without).
+(joints) and ``units`` of signals. The attributes of ``friction`` describe terms beside Coulomb and
+viscous friction: ``joints`` (from 1), ``kinds``, ``widths`` (NaN without).
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ from identification.model.base import BaseParameters
 from identification.output import write_bytes
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import read_regular_file
-from reporting.hdf5_reading import opened
+from reporting.hdf5_reading import open_hdf5
 
 FILE_NAME = "identification.h5"
 _MOTION = {"q": "q", "v": "v", "a": "a", "torque_variance": "tau", "mean_torque_variance": "tau"}
@@ -51,13 +51,13 @@ def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None
 
     Args:
         path: Path of the file, which is replaced.
-        estimate: What it is to hold.
+        estimate: The estimate.
         runs: Repetitions of the experiment.
 
     Raises:
         InputError: If the file cannot be written.
     """
-    content = BytesIO()  # HDF5 itself does not say that a disk is full
+    content = BytesIO()  # HDF5 itself does not report a full disk
     with h5py.File(content, "w") as file:
         _write(file, estimate)
         if runs is not None:
@@ -68,16 +68,16 @@ def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None
 
 
 def load_estimate(path: str | Path) -> Repetitions:
-    """Read the estimates of ``identification.h5``, of which the first alone has its system.
+    """Read the estimates of ``identification.h5``; only the first one has its linear system.
 
     Args:
-        path: Path of a file that :func:`save_estimate` wrote.
+        path: Path of a file from :func:`save_estimate`.
 
     Raises:
         InputError: If the file cannot be read or is not such a file.
     """
     read_regular_file(path, "HDF5")
-    with opened(Path(path), FILE_NAME) as content:
+    with open_hdf5(Path(path), FILE_NAME) as content:
         content.check()
         return _read(content.file)
 

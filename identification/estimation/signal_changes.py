@@ -1,4 +1,4 @@
-"""Signals as they would be without a mistake in their sign, order or unit."""
+"""Signals without an assumed mistake in sign, order or unit."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -7,22 +7,22 @@ from itertools import combinations
 import numpy as np
 
 _DEGREES = 180.0 / np.pi
-# signs are tried in all combinations of so many joints
+# largest number of joints for which all combinations of signs are tried
 _MOST_SIGNS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class SignalChange:
-    """How signals of N joints are changed to undo a mistake.
+    """Change of the signals of N joints that undoes a mistake.
 
     Attributes:
         cause: The mistake, in words; empty without.
-        steps: How unlikely it is: the number of signals that are mistaken.
-        order: Whose positions each joint gets, shape (N,).
+        steps: Number of wrong signals; the larger, the less likely.
+        order: Joint that each joint's positions come from, shape (N,).
         factors: Factors of the positions, shape (N,).
-        rate: Rate of the velocities beside; that of the accelerations is its square.
-        torque_order: Whose torques each joint gets, shape (N,).
-        torque_factors: Torque factors of the torques, shape (N,).
+        rate: Additional factor of the velocities; its square is the factor of the accelerations.
+        torque_order: Joint that each joint's torques come from, shape (N,).
+        torque_factors: Factors of the torques, shape (N,).
     """
 
     cause: str
@@ -35,37 +35,37 @@ class SignalChange:
 
     @classmethod
     def nothing(cls, joints: int) -> "SignalChange":
-        """Return that of no mistake.
+        """Return the change without a mistake.
 
         Args:
-            joints: Their number N.
+            joints: Number N of joints.
         """
         order, ones = np.arange(joints), np.ones(joints)
         return cls("", 0.0, order, ones, 1.0, order.copy(), ones.copy())
 
     @property
     def motion(self) -> tuple[bytes, ...]:
-        """What two changes share that change the motion in the same way."""
+        """Key that is equal for changes with the same effect on the motion."""
         return self.order.tobytes(), self.factors.tobytes(), np.float64(self.rate).tobytes()
 
     def of_motion(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return positions, velocities and accelerations as changed, each (K, N)."""
+        """Return the changed positions, velocities and accelerations, each (K, N)."""
         rates = 1.0, self.rate, self.rate**2
         return tuple(
             x[:, self.order] * self.factors * rate for x, rate in zip((q, v, a), rates, strict=True)
         )
 
     def of_torques(self, tau: np.ndarray) -> np.ndarray:
-        """Return torques as changed, shape (K, N)."""
+        """Return the changed torques, shape (K, N)."""
         return tau[:, self.torque_order] * self.torque_factors
 
     def of_noise(self, deviation: np.ndarray) -> np.ndarray:
-        """Return the standard deviations of torques as changed, shape (N,)."""
+        """Return the changed standard deviations of torques, shape (N,)."""
         return deviation[self.torque_order] * np.abs(self.torque_factors)
 
 
 def likely_changes(names: Sequence[str], units: Sequence[str]) -> Iterator[SignalChange]:
-    """Yield what undoes the mistakes that people make.
+    """Yield changes that undo common mistakes.
 
     Args:
         names: Names of N joints.
@@ -112,7 +112,7 @@ def likely_changes(names: Sequence[str], units: Sequence[str]) -> Iterator[Signa
 def _units(
     nothing: SignalChange, names: Sequence[str], units: Sequence[str]
 ) -> Iterator[SignalChange]:
-    """Yield other units of angles and of time."""
+    """Yield changes of the units of angles and of time."""
     n, turning = len(names), [j for j, unit in enumerate(units) if unit == "rad"]
     groups = [[j] for j in turning] + ([turning] if len(turning) > 1 else [])
     for group in groups:

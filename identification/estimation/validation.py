@@ -1,4 +1,4 @@
-"""Whether an estimate is to be believed: predicted motions, known truth, signs that cannot be."""
+"""Plausibility of an estimate: predicted motions, ground truth, impossible signs."""
 
 from dataclasses import dataclass
 
@@ -12,13 +12,14 @@ from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
 _NEVER_NEGATIVE = ("f_c", "f_v", "I_M")
-# standard deviations below zero from which on a parameter cannot be; the torque that it makes has
-# to be this part of the noise of a measurement, too
+# standard deviations below zero that rule a parameter out; its torque must also exceed this part of
+# the noise of a measurement
 _SURE, _MATERIAL = 5.0, 0.2
-# RMS of residuals in units of the noise of a measurement, and of the torques about their mean,
-# above both of which a model does not explain them
+# RMS of residuals in units of the noise of a measurement, and of the torques about their mean;
+# above
+# both of them a model does not explain the torques
 _MOST_NOISE, _MOST_TORQUE = 4.0, 0.3
-_SPEEDS = 50  # at which friction of several terms is looked at
+_SPEEDS = 50  # for the evaluation of friction with several terms
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +30,12 @@ class PredictedTorque:
         joint_names: N names.
         units: ``Nm`` or ``N`` of each joint.
         measured: Mean measured torques, shape (K, N).
-        predicted: Those of the model, shape (K, N).
+        predicted: Torques of the model, shape (K, N).
         used: Whether a joint moves fast enough for its friction to be known, shape (K, N).
         torque_variance: Variance of one measured torque, shape (N,).
         mean_torque_variance: Variance of ``measured``, shape (N,).
-        uncertainty: Standard deviation of ``predicted`` from that of the parameters, RMS of each
-            joint, shape (N,).
+        uncertainty: Standard deviation of ``predicted`` from the parameters' covariance, RMS of
+            each joint, shape (N,).
     """
 
     joint_names: tuple[str, ...]
@@ -48,17 +49,17 @@ class PredictedTorque:
 
     @property
     def residuals(self) -> np.ndarray:
-        """Measured less predicted, shape (K, N)."""
+        """Measured minus predicted torques, shape (K, N)."""
         return self.measured - self.predicted
 
     @property
     def rms(self) -> np.ndarray:
-        """Of ``residuals``, all instants, shape (N,)."""
+        """RMS of ``residuals``, all instants, shape (N,)."""
         return np.sqrt(np.mean(self.residuals**2, axis=0))
 
     @property
     def error_rms(self) -> np.ndarray:
-        """RMS of single measured torques less predicted ones, shape (N,), as in Tab. C.4."""
+        """RMS of single measured torques minus predicted ones, shape (N,), as in Tab. C.4."""
         return np.sqrt(self.rms**2 + self.torque_variance - self.mean_torque_variance)
 
     @property
@@ -73,7 +74,7 @@ class PredictedTorque:
 
     @property
     def variance_factor(self) -> np.ndarray:
-        """Mean square of residuals in units of that of noise, where used, shape (N,)."""
+        """Mean square of the used residuals in units of the noise's, shape (N,)."""
         squares = np.sum(np.where(self.used, self.residuals, 0.0) ** 2, axis=0)
         return squares / np.maximum(self.used.sum(axis=0), 1) / self.mean_torque_variance
 
@@ -83,11 +84,11 @@ def predict(
     regressor: Regressor,
     motion: MeasuredMotion,
 ) -> PredictedTorque:
-    """Return what an estimate predicts of another motion.
+    """Return the torques that an estimate predicts for another motion.
 
     Args:
         estimate: Estimate of the robot.
-        regressor: That the estimate was made with, or one like it.
+        regressor: Regressor of the estimate, or an equal one.
         motion: The motion; need not excite all parameters.
 
     Raises:
@@ -109,18 +110,18 @@ def predict(
 
 
 def _regular(covariance: np.ndarray) -> np.ndarray:
-    """Return a covariance that rounding has not made indefinite."""
+    """Return a covariance without negative eigenvalues from rounding."""
     return covariance + np.diag(np.diag(covariance)) * 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class TruthTest:
-    """Errors of an estimate beside the covariance that was predicted for them.
+    """Errors of an estimate beside their predicted covariance.
 
     Attributes:
-        names: Names of the n_b parameters that count.
-        errors: Estimate less truth, SI units, shape (n_b,).
-        standard_errors: In units of their standard deviations, shape (n_b,).
+        names: Names of the n_b used parameters.
+        errors: Estimate minus ground truth, SI units, shape (n_b,).
+        standard_errors: Errors in units of their standard deviations, shape (n_b,).
         chi_squared: ``e' C^-1 e``.
         degrees_of_freedom: n_b.
         p_value: Probability of a chi-squared at least as far from the middle, on either side.
@@ -135,16 +136,16 @@ class TruthTest:
 
 
 def compare_with_truth(estimate: Estimate, truth: np.ndarray, friction: bool = True) -> TruthTest:
-    """Compare an estimate with the true parameters.
+    """Compare an estimate with the ground truth.
 
     Args:
-        estimate: With covariance.
-        truth: True base parameters, ``estimate.base.values(parameters)``, shape (n_b,).
-        friction: Whether parameters of friction count, which may be others in each run
-            while those of the bodies stay.
+        estimate: Estimate with covariance.
+        truth: Ground truth, ``estimate.base.values(parameters)``, shape (n_b,).
+        friction: Whether parameters of friction count, which may differ between runs, while those
+            of the bodies stay the same.
 
     Raises:
-        InputError: If the truth has another size or is not known.
+        InputError: If the ground truth has another size or is not known.
     """
     names = estimate.short_names
     counts = [i for i, name in enumerate(names) if friction or ".f_" not in name]
@@ -191,8 +192,8 @@ def refuse_implausible(estimate: Estimate) -> None:
         estimate: The estimate.
 
     Raises:
-        InputError: If friction or a rotor's inertia is below zero for sure, or residuals are
-            several times the noise of repetitions and not small beside the torques.
+        InputError: If friction or a rotor's inertia is certainly below zero, or residuals are
+            several times the noise of repetitions and not small compared to the torques.
     """
     robot, rank = estimate.robot_base, estimate.robot_base.rank
     spread = np.sqrt(max(estimate.variance_factor, 1.0))
@@ -208,7 +209,7 @@ def refuse_implausible(estimate: Estimate) -> None:
     if found is not None:
         raise InputError(
             f"{estimate.robot}: {describe_negative(*found)}: sign of tau or q, the model's axes, "
-            "or friction of another form (a record for --validation tells it)"
+            "or friction of another form (check it with a record for --validation)"
         )
     _refuse_unexplained(estimate, noise)
 
@@ -220,17 +221,17 @@ def never_negative(
     sizes: np.ndarray,
     but: list[str] | None = None,
 ) -> tuple[str, str, float, float] | None:
-    """Return what cannot be below zero and is, the surest: name, unit, value, deviation.
+    """Return the surest negative value that is impossible: name, unit, value, deviation.
 
-    Friction and rotor inertia count where torques tell them from all else.
+    Friction and rotor inertia count if torques distinguish them from all other parameters.
 
     Args:
-        base: What the parameters are combinations of.
+        base: Combinations of the parameters.
         parameters: Shape (n_b,).
-        deviation: Standard deviations of them, shape (n_b,).
-        sizes: RMS of the torque that a parameter of one makes, in units of the noise of one
-            measurement, shape (n_b,).
-        but: Joints whose friction has further terms and is no matter of one parameter.
+        deviation: Standard deviations of the parameters, shape (n_b,).
+        sizes: RMS of the torque of a parameter of one, in units of the noise of one measurement,
+            shape (n_b,).
+        but: Joints whose friction has further terms, so that no single parameter decides.
     """
     below = [
         i
@@ -248,13 +249,13 @@ def never_negative(
 
 
 def describe_negative(name: str, unit: str, value: float, deviation: float) -> str:
-    """Return that something is below zero that cannot be, in words.
+    """Return a sentence about an impossible negative value.
 
     Args:
         name: Name of the parameter.
         unit: Unit of the parameter.
         value: Value of the parameter.
-        deviation: Standard deviation of that.
+        deviation: Standard deviation of the value.
     """
     return (
         f"{name} = {value:.3g} {unit}, {-value / deviation:.0f} standard deviations below zero, "
@@ -263,7 +264,7 @@ def describe_negative(name: str, unit: str, value: float, deviation: float) -> s
 
 
 def _driving_friction(estimate: Estimate, spread: float) -> tuple[str, str, float, float] | None:
-    """Return where friction of several terms drives a joint for sure."""
+    """Return the joint and velocity at which friction of several terms certainly drives."""
     base, still = estimate.base, estimate.system.still
     for j in sorted({term.joint for term in estimate.friction.terms}):
         own = [i for i, name in enumerate(base.short_names) if name.startswith(f"joint_{j + 1}.f_")]
@@ -298,10 +299,10 @@ def _refuse_unexplained(estimate: Estimate, noise: np.ndarray) -> None:
     j = int(np.argmax(np.where(np.isfinite(excess), excess, 0.0)))
     if excess[j] > 1.0:
         raise InputError(
-            f"{estimate.robot}: what the model leaves of tau of {estimate.joint_names[j]} is "
+            f"{estimate.robot}: residual of tau of {estimate.joint_names[j]}: "
             f"{rms[j] / noise[j]:.3g} times the noise of repetitions ({_MOST_NOISE:g} is allowed) "
             f"and {100.0 * rms[j] / torque[j]:.2g} % of the torque ({100.0 * _MOST_TORQUE:g} % is "
             "allowed), which no sign, order or unit of a signal explains: axes, zeros or gravity "
-            "of the model, something else that acts on the robot, or friction of another form (a "
-            "record for --validation tells it)"
+            "of the model, unmodelled forces on the robot, or friction of another form (check it "
+            "with a record for --validation)"
         )

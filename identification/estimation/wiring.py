@@ -1,11 +1,11 @@
-"""What a person may have mistaken about signals: sign, order or unit.
+"""Detection of mistakes in signals: sign, order or unit.
 
 Torques depend on the motion through the model, and joints on each other: parameters of a link
 appear in the torques of all joints before it. A signal with the wrong sign, of another joint or in
-another unit contradicts the others, or asks for friction that drives. Each mistake that is likely
-is therefore undone on some samples, and the parameters are estimated anew, so that none have to be
-known. The one that leaves least of the torques is named, if it leaves much less than the signals
-as they are, or takes negative friction away.
+another unit contradicts the others, or requires friction that drives. Therefore each likely mistake
+is undone on some samples, and the parameters are estimated again, so that none need to be known.
+The mistake with the least residual torque is reported, if the residual is much less than with the
+original signals, or negative friction disappears.
 """
 
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.information import standing_still
+from identification.estimation.information import joints_at_rest
 from identification.estimation.least_squares import NormalEquations
 from identification.estimation.signal_changes import SignalChange, likely_changes
 from identification.estimation.validation import describe_negative, never_negative
@@ -21,38 +21,37 @@ from identification.measurement.periods import AveragedMotion
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 
-# samples that are compared; more tell no more of mistakes this large
+# number of compared samples; more show no more of mistakes this large
 _SAMPLES = 500
-# mean square of what is left, in units of that of the noise, from which on a mistake is looked for;
-# and the part of what is above the noise that may be left where one is undone
+# mean square residual in units of the noise's, from which on a mistake is searched for; and the
+# largest part of the excess over the noise that may remain after one is undone
 _SUSPICIOUS, _MUCH_LESS = 1.2, 0.1
-# what explanations that take negative friction away may leave more than the signals as they are
+# factor of the residual that changes without negative friction may have
 _NO_MORE = 1.1
-# explanations that leave less than this times the best one are as good
+# changes with a residual below this times the best one are equivalent
 _ALIKE = 1.3
-# from these factors of a torque its unit is looked for, and how often the factor is refined
+# initial factors of a torque in the search for its unit, and number of refinements
 _UNITS_FROM, _ROUNDS = (1.0, 1e3), 2
 _WIDEST = 1e5
 _UNIT_NAMES = {1e3: "kNm or kN", 1e-3: "mNm or mN"}
 _NEAR = 0.35
 _MOST_CAUSES = 3
-# a factor of a torque that ought to show
+# a factor of a torque that must be detectable
 _OUGHT_TO_SHOW = 1.2
-# of what the model takes, from which on the torque of a joint whose factor does not show is
-# doubtful; in units of what those of all joints are
+# ratio to the model's torque, relative to the median of all joints, from which on the torque of a
+# joint with an undetectable factor is doubtful
 _UNLIKE = 1.1
-# times the model's torques, in all joints, from which on another unit is thought of
+# ratio to the model's torques in all joints, from which on another unit is suspected
 _OTHER_UNIT = 10.0
 
 
 @dataclass(frozen=True, eq=False)
 class Mistake:
-    """What is wrong with the signals, as far as torques tell.
+    """A mistake in the signals, as far as torques show it.
 
     Attributes:
-        cause: In words; two, if torques cannot tell which.
-        before: What the model leaves of the mean torques, RMS in units of the noise that
-            repetitions show.
+        cause: Cause in words; two if torques do not distinguish them.
+        before: Residual of the mean torques, RMS in units of the noise from repetitions.
         after: The same without the mistake.
         negative: Friction or rotor inertia below zero, in words; empty without.
     """
@@ -64,28 +63,28 @@ class Mistake:
 
     @property
     def reason(self) -> str:
-        """Why, in words."""
-        left = (
-            f"what the model leaves of the torques is {self.before:.3g} times the noise, and "
+        """Reason in words."""
+        sentence = (
+            f"the residual torque of the model is {self.before:.3g} times the noise, and "
             f"{self.after:.3g} times without that"
         )
-        return f"{self.negative}; {left}" if self.negative else left
+        return f"{self.negative}; {sentence}" if self.negative else sentence
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """What is left with one change of the signals.
+    """Residual with one change of the signals.
 
     Attributes:
         change: The change.
-        left: Mean square of what is left, in units of that of the noise.
-        negative: Parameters below zero that cannot be, in words.
-        torques: What is left with factors s of the torques is ``s' M s``; M, shape (N, N).
-        freedom: Torques that count less parameters.
+        residual: Mean square of the residual, in units of the noise's.
+        negative: Impossible parameters below zero, in words.
+        torques: M, shape (N, N); with factors s of the torques the residual is ``s' M s``.
+        freedom: Number of used torques minus number of parameters.
     """
 
     change: SignalChange
-    left: float
+    residual: float
     negative: str
     torques: np.ndarray
     freedom: int
@@ -94,7 +93,7 @@ class _Fit:
 def find_mistake(
     regressor: Regressor, base: BaseParameters, motion: AveragedMotion
 ) -> Mistake | None:
-    """Return what is wrong with the signals of a motion; None if nothing is, or nothing is found.
+    """Return the mistake in the signals of a motion; None if none is found.
 
     Args:
         regressor: Regressor of the robot, with friction.
@@ -102,82 +101,84 @@ def find_mistake(
         motion: The motion.
     """
     comparison = _Comparison(regressor, base, motion)
-    as_it_is = comparison.as_it_is
-    is_much = as_it_is.left > _SUSPICIOUS
-    if not is_much and not as_it_is.negative:
+    unchanged = comparison.unchanged
+    is_much = unchanged.residual > _SUSPICIOUS
+    if not is_much and not unchanged.negative:
         return None
     fits = [*comparison.fits(), *comparison.units()]
-    much_less = [f for f in fits if f.left <= 1.0 + _MUCH_LESS * (as_it_is.left - 1.0)]
+    much_less = [f for f in fits if f.residual <= 1.0 + _MUCH_LESS * (unchanged.residual - 1.0)]
     sound = [fit for fit in much_less if not fit.negative]
-    # of two mistakes at once, one is left where the other one is undone
+    # of two simultaneous mistakes, one remains if the other is undone
     found = (sound or much_less) if is_much else []
-    if not found and as_it_is.negative:
-        found = [f for f in fits if not f.negative and f.left <= _NO_MORE * as_it_is.left]
+    if not found and unchanged.negative:
+        found = [f for f in fits if not f.negative and f.residual <= _NO_MORE * unchanged.residual]
     if not found:
         return None
-    least = min(fit.left for fit in found)
-    alike = [fit for fit in found if fit.left <= _ALIKE * least]
+    least = min(fit.residual for fit in found)
+    alike = [fit for fit in found if fit.residual <= _ALIKE * least]
     fewest = min(fit.change.steps for fit in alike)
-    alike = sorted((f for f in alike if f.change.steps == fewest), key=lambda fit: fit.left)
+    alike = sorted((f for f in alike if f.change.steps == fewest), key=lambda fit: fit.residual)
     return Mistake(
         ", or ".join([fit.change.cause for fit in alike][:2]),
-        float(np.sqrt(as_it_is.left)),
-        float(np.sqrt(alike[0].left)),
-        as_it_is.negative,
+        float(np.sqrt(unchanged.residual)),
+        float(np.sqrt(alike[0].residual)),
+        unchanged.negative,
     )
 
 
-def unchecked(
-    regressor: Regressor, base: BaseParameters, motion: AveragedMotion, believed: np.ndarray
+def doubtful_signals(
+    regressor: Regressor, base: BaseParameters, motion: AveragedMotion, nominal: np.ndarray
 ) -> list[str]:
-    """Return what of the signals cannot be checked or is doubtful, one sentence each.
+    """Return properties of the signals that cannot be verified or are doubtful, one sentence each.
 
     Args:
         regressor: Regressor of the robot, with friction.
         base: Its base parameters.
         motion: The motion.
-        believed: Parameters as the model has them, shape (n,); NaN where it has none.
+        nominal: Parameters of the model, shape (n,); NaN if it has none.
     """
     comparison = _Comparison(regressor, base, motion)
-    most = max(_SUSPICIOUS, _NO_MORE * comparison.as_it_is.left)
-    unseen = [f.change.cause for f in comparison.fits() if f.left <= most and not f.negative]
-    said = []
-    if unseen:
-        said.append(f"these torques would not show it if {_listed(unseen)}")
+    most = max(_SUSPICIOUS, _NO_MORE * comparison.unchanged.residual)
+    undetected = [
+        f.change.cause for f in comparison.fits() if f.residual <= most and not f.negative
+    ]
+    notes = []
+    if undetected:
+        notes.append(f"these torques would not show it if {_join_causes(undetected)}")
     of_factor = list(comparison.of_factor(_OUGHT_TO_SHOW))
-    names = [name for name, fit in of_factor if fit.left <= most]
+    names = [name for name, fit in of_factor if fit.residual <= most]
     if names:
-        said.append(
+        notes.append(
             f"a factor of {_OUGHT_TO_SHOW:g} in tau of {', '.join(names)} (unit, gear ratio) would "
             "not show in the torques of the other joints"
         )
-    ratio = comparison.ratio_to(np.nan_to_num(believed))
+    ratio = comparison.ratio_to(np.nan_to_num(nominal))
     usual = float(np.median(ratio))
-    if np.isfinite(believed).all():
-        said.extend(
-            f"tau of {name} is {own:.2g} times what the model's masses and friction take, of all "
+    if np.isfinite(nominal).all():
+        notes.extend(
+            f"tau of {name} is {own:.2g} times the model's torque (masses and friction), of all "
             f"joints {usual:.2g} times: its unit, gear ratio or torque constant?"
             for (name, _), own in zip(of_factor, ratio.tolist(), strict=True)
             if name in names and not 1.0 / _UNLIKE < own / usual < _UNLIKE
         )
-    knows = np.nan_to_num(believed).any()
+    knows = np.nan_to_num(nominal).any()
     if knows and (np.all(ratio > _OTHER_UNIT) or np.all(ratio < 1.0 / _OTHER_UNIT)):
-        said.append(
-            f"all torques are about {usual:.2g} times what the model's masses and "
-            "friction take: unit of tau?"
+        notes.append(
+            f"all torques are about {usual:.2g} times the model's torques (masses and "
+            "friction): unit of tau?"
         )
-    return said
+    return notes
 
 
 class _Comparison:
-    """What is left of the torques in some samples of a motion, with signals as others."""
+    """Residuals of the torques in some samples of a motion, with changed signals."""
 
     def __init__(self, regressor: Regressor, base: BaseParameters, motion: AveragedMotion) -> None:
         self._regressor, self._base = regressor, base
         count = len(motion.q)
         some = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(int))
-        still = standing_still(regressor.subject, motion.v)
-        # where all do, the unit of time may be another one
+        still = joints_at_rest(regressor.subject, motion.v)
+        # if all joints do, the unit of time may be another one
         moves = ~still | still.all()
         self._motion = [motion.q[some], motion.v[some] * moves, motion.a[some] * moves]
         self._tau = motion.tau[some]
@@ -186,35 +187,35 @@ class _Comparison:
         nothing = SignalChange.nothing(joints)
         self._solved: tuple[object, ...] = ()
         self._matrix = self._columns(nothing)
-        self.as_it_is = self._fit(nothing, self._matrix)
+        self.unchanged = self._fit(nothing, self._matrix)
 
     def fits(self) -> Iterator[_Fit]:
-        """Yield what is left with each change that is likely."""
+        """Yield the residual with each likely change."""
         subject, matrix = self._regressor.subject, self._matrix
         motion: tuple[bytes, ...] = ()
         for change in likely_changes(subject.joint_names, subject.joint_units):
             if change.motion != motion:
                 motion, matrix = change.motion, self._columns(change)
-            # a DELTA robot has no torques where it cannot be
+            # a DELTA robot has no torques at impossible positions
             if np.all(np.isfinite(matrix)):
                 yield self._fit(change, matrix)
 
     def units(self) -> Iterator[_Fit]:
-        """Yield what is left where the torque of a joint has the factor that fits best."""
+        """Yield the residual with the best factor of the torque of a joint."""
         names = self._regressor.subject.joint_names
         for j in range(len(names) if len(names) > 1 else 0):
             found = [fit for start in _UNITS_FROM for fit in self._of_best_factor(j, start)]
             if found:
-                yield min(found, key=lambda fit: fit.left)
+                yield min(found, key=lambda fit: fit.residual)
 
     def of_factor(self, factor: float) -> Iterator[tuple[str, _Fit]]:
-        """Yield each joint, and what is left with a factor of its torque."""
+        """Yield each joint, and the residual with a factor of its torque."""
         names = self._regressor.subject.joint_names
         for j, name in enumerate(names):
             yield name, self._fit(_of_unit(names, j, factor), self._matrix)
 
     def ratio_to(self, parameters: np.ndarray) -> np.ndarray:
-        """Return measured torques by those of parameters, RMS, shape (N,)."""
+        """Return the ratio of measured torques to those of parameters, RMS, shape (N,)."""
         predicted = self._matrix @ self._base.values(parameters)
         sizes = [np.sqrt(np.mean(tau**2, axis=0)) for tau in (self._tau, predicted)]
         return np.asarray(sizes[0] / np.maximum(sizes[1], np.finfo(float).tiny))
@@ -234,15 +235,15 @@ class _Comparison:
             )
             self._solved = same
         equations = self._equations
-        left = float(signs @ equations.left_over @ signs) / equations.freedom
+        residual = float(signs @ equations.residual_squares @ signs) / equations.freedom
         negative = never_negative(
             self._base,
             equations.parameters @ signs,
-            equations.deviation * np.sqrt(max(left, 1.0)),
+            equations.deviation * np.sqrt(max(residual, 1.0)),
             equations.sizes / np.sqrt(self._periods),
         )
         words = "" if negative is None else describe_negative(*negative)
-        return _Fit(change, left, words, equations.left_over, equations.freedom)
+        return _Fit(change, residual, words, equations.residual_squares, equations.freedom)
 
     def _of_best_factor(self, joint: int, factor: float) -> list[_Fit]:
         names = self._regressor.subject.joint_names
@@ -256,7 +257,7 @@ class _Comparison:
         return [self._fit(_of_unit(names, joint, factor), self._matrix)]
 
 
-def _listed(causes: list[str]) -> str:
+def _join_causes(causes: list[str]) -> str:
     more = len(causes) - _MOST_CAUSES
     return "; or if ".join(causes[:_MOST_CAUSES]) + (f"; and {more} more" if more > 0 else "")
 

@@ -1,4 +1,4 @@
-"""A robot's shapes covered by balls, whose distances are smooth functions of joint positions."""
+"""Balls that cover a robot's shapes, whose distances are smooth functions of joint positions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ class RobotBalls:
 
     Attributes:
         chain: The robot, N joints.
-        links: Index of the link that carries each, from 0, or ``WORLD``; shape (n,).
-        shapes: Index of the shape that each covers, in ``scene.shapes``, or -1; shape (n,).
-        centers: In the link's frame [m], shape (n, 3).
-        radii: [m], shape (n,).
+        links: Index of the link of each ball, from 0, or ``WORLD``; shape (n,).
+        shapes: Index of the covered shape of each ball in ``scene.shapes``, or -1; shape (n,).
+        centers: Centres in the link's frame [m], shape (n, 3).
+        radii: Radii [m], shape (n,).
     """
 
     chain: SerialChain
@@ -35,19 +35,21 @@ class RobotBalls:
     centers: np.ndarray
     radii: np.ndarray
 
-    def places(self, q: ca.SX, numbers: list[int]) -> dict[int, ca.SX]:
-        """Return where the centres of some balls are in the world [m], by number.
+    def world_centers(self, q: ca.SX, numbers: list[int]) -> dict[int, ca.SX]:
+        """Return the centres of some balls in the world [m], by number.
 
         Args:
             q: Joint positions, shape (N, 1).
-            numbers: Which balls.
+            numbers: Numbers of the balls.
         """
         still = [jets.constant(q[i], 1) for i in range(self.chain.dimension)]
         moving = [n for n in numbers if self.links[n] != WORLD]
         points = [(int(self.links[n]), self.centers[n]) for n in moving]
         jets_there = points_on_links(self.chain, still, points)
-        places = {n: ca.SX(self.centers[n]) for n in numbers}
-        return places | {n: p.coefficients[0] for n, p in zip(moving, jets_there, strict=True)}
+        world_centers = {n: ca.SX(self.centers[n]) for n in numbers}
+        return world_centers | {
+            n: p.coefficients[0] for n, p in zip(moving, jets_there, strict=True)
+        }
 
     def sample(self, q: np.ndarray) -> np.ndarray:
         """Return the centres of all balls in the world [m], shape (K, n, 3).
@@ -61,8 +63,8 @@ class RobotBalls:
     def _all(self) -> ca.Function:
         q = ca.SX.sym("q", self.chain.dimension)
         numbers = list(range(len(self.radii)))
-        places = self.places(q, numbers)
-        stacked = ca.densify(ca.vertcat(*[places[n] for n in numbers]))
+        world_centers = self.world_centers(q, numbers)
+        stacked = ca.densify(ca.vertcat(*[world_centers[n] for n in numbers]))
         return ca.Function("centers", [q], [stacked])
 
 
@@ -71,7 +73,7 @@ def cover(chain: SerialChain, scene: RobotScene) -> RobotBalls:
 
     Args:
         chain: The robot.
-        scene: The same for Drake.
+        scene: The robot and its cell in Drake.
     """
     links, shapes, centers, radii = [], [], [], []
     for k, shape in enumerate(scene.shapes):
@@ -90,10 +92,10 @@ def cover(chain: SerialChain, scene: RobotScene) -> RobotBalls:
 
 
 def ends(subject: Subject) -> dict[str, np.ndarray]:
-    """Return points of a serial robot's last link that its end effector lies between, by name.
+    """Return points of a serial robot's last link that bound its end effector, by name.
 
-    In the last link's frame [m], each (3,): of a robot whose tool is known the flange, and the tool
-    point as long as the tool is there; of others the last joint and the tool point.
+    In the last link's frame [m], each (3,): for a robot with known tool the flange, and the tool
+    point if the tool is attached; for others the last joint and the tool point.
 
     Args:
         subject: The robot.
@@ -107,11 +109,11 @@ def ends(subject: Subject) -> dict[str, np.ndarray]:
 
 
 def points_of_last_link(chain: SerialChain, points: Sequence[np.ndarray]) -> RobotBalls:
-    """Return points of a robot's last link as balls without extent.
+    """Return points of a robot's last link as balls of radius zero.
 
     Args:
         chain: The robot.
-        points: In the last link's frame [m], n of shape (3,).
+        points: Points in the last link's frame [m], n of shape (3,).
     """
     n = len(points)
     links = np.full(n, chain.dimension - 1)
@@ -121,10 +123,10 @@ def points_of_last_link(chain: SerialChain, points: Sequence[np.ndarray]) -> Rob
 def covering_balls(
     inspector: SceneGraphInspector, geometry: GeometryId
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return balls that cover a shape together, centres [m] (n, 3) and radii [m] (n,).
+    """Return balls that together cover a shape, centres [m] (n, 3) and radii [m] (n,).
 
-    In the shape's frame. Of anything else than spheres, capsules and cylinders the bounding box is
-    covered; what has none, a half space, has no balls.
+    In the shape's frame. Spheres, capsules and cylinders are covered themselves, other shapes by
+    their bounding box; a half space, which has none, has no balls.
 
     Args:
         inspector: Inspector of the scene graph.
@@ -137,11 +139,11 @@ def covering_balls(
         number = max(1, int(np.ceil(shape.length() / shape.radius())))
         pitch = shape.length() / number
         # the ends of a capsule are balls themselves
-        places = _middles(number + isinstance(shape, Capsule)) * pitch
-        # between two balls a surface parallel to the axis sinks in
+        offsets = _middles(number + isinstance(shape, Capsule)) * pitch
+        # between two balls their union is thinner than the shape
         radius = np.hypot(shape.radius(), pitch / 2.0)
-        centers = np.column_stack([np.zeros((places.size, 2)), places])
-        return centers, np.full(places.size, radius)
+        centers = np.column_stack([np.zeros((offsets.size, 2)), offsets])
+        return centers, np.full(offsets.size, radius)
     box = inspector.GetObbInGeometryFrame(geometry)
     if box is None:
         return np.zeros((0, 3)), np.zeros(0)
@@ -154,16 +156,16 @@ def covering_balls(
     return (box.pose() @ centers.T).T, radii
 
 
-def without_inner(balls: RobotBalls, numbers: list[int]) -> list[int]:
+def remove_inner(balls: RobotBalls, numbers: list[int]) -> list[int]:
     """Return those of some balls of one link that are not inside another of them."""
-    kept: list[int] = []
+    outer: list[int] = []
     for n in sorted(numbers, key=lambda n: -balls.radii[n]):
-        gaps = np.linalg.norm(balls.centers[kept] - balls.centers[n], axis=1)
-        if not np.any(balls.radii[kept] - gaps >= balls.radii[n]):
-            kept.append(n)
-    return kept
+        gaps = np.linalg.norm(balls.centers[outer] - balls.centers[n], axis=1)
+        if not np.any(balls.radii[outer] - gaps >= balls.radii[n]):
+            outer.append(n)
+    return outer
 
 
 def _middles(number: int) -> np.ndarray:
-    """Middles of as many unit cells around zero."""
+    """Return the centres of as many unit cells around zero."""
     return np.arange(number) - (number - 1) / 2.0

@@ -1,12 +1,12 @@
-"""How well a motion shows the base parameters, with analytic gradients.
+"""Criteria of a motion for identifying base parameters, with analytic gradients.
 
-The information matrix (2.76) of a motion stacks the base regressors of its samples. Its figure is
-``log det(X^T X)`` (2.79), to be as large as possible, or the condition number ``sigma_1 / sigma_n``
-of X, to be as small as possible. Both have gradients by X alone,
+The information matrix (2.76) of a motion stacks the base regressors of its samples. Its criterion
+is ``log det(X^T X)`` (2.79), to be maximized, or the condition number ``sigma_1 / sigma_n`` of X,
+to be minimized. The gradients of both with respect to X are,
 
     d log det(X^T X) = 2 <X (X^T X)^-1, dX>,     d log(sigma_i) = <u_i v_i^T / sigma_i, dX>
 
-and CasADi carries these matrices back through the regressor to the motion.
+and CasADi propagates these matrices back through the regressor to the motion.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,21 +25,21 @@ from pfsc_drake.errors import InputError
 
 Criterion = Literal["D", "condition"]
 CRITERIA: tuple[str, ...] = get_args(Criterion)
-# of one period, for figures that are compared
+# of one period, for comparable values
 REPORTED_SAMPLES = 1000
 _SINGULAR = 1e-13
 
 
 @dataclass(frozen=True)
 class InformationFigures:
-    """Figures of the information matrix X of one period, with REPORTED_SAMPLES samples.
+    """Values of the criteria for one period, with REPORTED_SAMPLES samples.
 
     They depend on the choice of base parameters and on their units.
 
     Attributes:
-        log_determinant: ``log det(X^T X)``; minus infinity where a parameter is not excited.
+        log_determinant: ``log det(X^T X)``; minus infinity if a parameter is not excited.
         condition_number: Condition number of X.
-        base_parameters: Their number n_b.
+        base_parameters: Number n_b of base parameters.
     """
 
     log_determinant: float
@@ -50,10 +50,10 @@ class InformationFigures:
 def information(
     regressor: Regressor, base: BaseParameters, trajectory: FourierTrajectory
 ) -> InformationFigures:
-    """Return the figures of a motion.
+    """Return the criteria of a motion.
 
     Args:
-        regressor: Regressor of the robot; with the sign of the velocities itself in Coulomb
+        regressor: Regressor of the robot, with the exact sign of the velocities in Coulomb
             friction.
         base: Its base parameters.
         trajectory: The motion.
@@ -74,7 +74,7 @@ def base_regressor_kernels(
     """Return the base regressor of one sample and its transposed derivative.
 
     Args:
-        regressor: With a smooth sign of the velocities.
+        regressor: Regressor with a smooth sign of the velocities.
         base: The base parameters.
 
     Returns:
@@ -93,11 +93,11 @@ def base_regressor_kernels(
 
 
 class SampledFunction:
-    """Evaluates a function K times at once, as machine code where that is possible.
+    """Evaluates a function for K samples together, as machine code if possible.
 
     Args:
-        function: SX inside, with dense results.
-        samples: Number K.
+        function: Function of SX with dense results.
+        samples: Number K of samples.
     """
 
     def __init__(self, function: ca.Function, samples: int) -> None:
@@ -132,24 +132,24 @@ class SampledFunction:
         Returns:
             One array (K, n) each; matrices by columns.
         """
-        for own, given in zip(self._arguments, arguments, strict=True):
-            own[:] = given.reshape(own.shape)
+        for own, values in zip(self._arguments, arguments, strict=True):
+            own[:] = values.reshape(own.shape)
         for call in self._calls:
             call()
         return self._results
 
 
 class ExcitationCost:
-    """The figure of a motion that a search makes as small as possible, with its gradient.
+    """Cost of a motion for the search, with its gradient.
 
-    ``-log det(X^T X)`` or ``log(sigma_1 / sigma_n)``, of as many samples as given but to the scale
-    of REPORTED_SAMPLES.
+    ``-log det(X^T X)`` or ``log(sigma_1 / sigma_n)``, for a number of samples but scaled to
+    REPORTED_SAMPLES.
 
     Args:
-        kernels: Those of :func:`base_regressor_kernels`, N joints and n_b base parameters.
+        kernels: Kernels of :func:`base_regressor_kernels`, N joints and n_b base parameters.
         period: Period of the motion [s].
-        harmonics: Harmonics of it, M of them.
-        samples: Per period.
+        harmonics: Harmonics of the motion, M of them.
+        samples: Number of samples per period.
         criterion: ``D`` or ``condition``.
 
     Raises:
@@ -180,18 +180,18 @@ class ExcitationCost:
         self._shift = self._size * np.log(REPORTED_SAMPLES / samples)
 
     def __call__(self, coefficients: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return the figure and its gradient.
+        """Return the cost and its gradient.
 
         Args:
-            coefficients: As :attr:`FourierTrajectory.coefficients`, shape (N, 2M + 1).
+            coefficients: Shape (N, 2M + 1), as in :attr:`FourierTrajectory.coefficients`.
 
         Returns:
-            The figure, infinite where a parameter is not excited at all, and the gradient, of the
-            shape of the coefficients.
+            The cost, infinite if a parameter is not excited at all, and the gradient, of the shape
+            of the coefficients.
         """
         motion = [basis @ coefficients.T for basis in self._bases]
         (columns,) = self._forward(*motion)
-        # the matrices of the samples stand by columns, one after the other
+        # the matrices of the samples are stored by columns, one after the other
         Y = columns.reshape(self._samples, self._size, self._dimension)
         X = Y.transpose(0, 2, 1).reshape(-1, self._size)
         value, S = self._log_determinant(X) if self._by_determinant else _log_condition(X)

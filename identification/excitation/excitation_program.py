@@ -1,4 +1,4 @@
-"""The optimization problem (2.79) of a robot, for other processes and for Drake's solvers."""
+"""Optimization problem (2.79) of a robot, for other processes and for Drake's solvers."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,13 +28,13 @@ from identification.model.regressor import Regressor
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 
-# of the largest velocity; Coulomb friction passes smoothly within, so that gradients exist
+# of the largest velocity; Coulomb friction is smooth within, so that gradients exist
 _SIGN_WIDTH = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class ExcitationProblem:
-    """The optimization problem (2.79) of one robot.
+    """Optimization problem (2.79) of one robot.
 
     Attributes:
         period: T_f [s].
@@ -42,7 +42,7 @@ class ExcitationProblem:
         limits: Limits of the joints.
         kernels: Kernels of the criterion, see :func:`base_regressor_kernels`.
         torque: ``(q, v, a) -> tau``, predicted torques of the drives.
-        posture: What the joint positions must keep to; None for nothing but the limits.
+        posture: Limits of postures; None for joint limits only.
         criterion: ``D`` or ``condition``.
     """
 
@@ -83,8 +83,8 @@ def excitation_problem(
         period: T_f [s].
         harmonics: Multiples of the fundamental frequency in use.
         criterion: ``D`` or ``condition``.
-        cell: What stands around a serial robot.
-        scene: The same for Drake; made anew if there is a cell alone.
+        cell: Environment of a serial robot.
+        scene: Robot and cell in Drake; created if omitted and there is a cell.
 
     Raises:
         InputError: If a value is out of range.
@@ -96,9 +96,9 @@ def excitation_problem(
     n = subject.dimension
     smooth = Regressor(subject, sign_width=_SIGN_WIDTH * float(limits.velocity.max()))
     base = base_parameters(Regressor(subject))
-    believed = believed_parameters(subject)
+    parameters = nominal_parameters(subject)
     q, v, a = (ca.SX.sym(name, n) for name in "qva")
-    tau = ca.densify(smooth.function(q, v, a) @ ca.DM(believed))
+    tau = ca.densify(smooth.function(q, v, a) @ ca.DM(parameters))
     posture: PostureLimits | None = None
     if subject.delta is not None:
         posture = delta_posture_limits(subject.delta)
@@ -115,21 +115,21 @@ def excitation_problem(
     )
 
 
-def believed_parameters(subject: Subject) -> np.ndarray:
-    """Return what a model says of a robot, with no friction where unknown, shape (n,)."""
+def nominal_parameters(subject: Subject) -> np.ndarray:
+    """Return the parameters of a robot's model, with zero for unknown friction, shape (n,)."""
     return np.nan_to_num(true_parameters(subject))
 
 
-def tightened(
+def tighten(
     problem: ExcitationProblem, share: float, margins: Mapping[str, float], margin: float = 0.0
 ) -> ExcitationProblem:
-    """Return the problem with narrower limits, for what solvers leave of them.
+    """Return the problem with narrower limits, to allow for the solver's tolerance.
 
     Args:
         problem: Problem of a robot.
-        share: Share of the joint limits that is left.
+        share: Remaining share of the joint limits.
         margins: Least values of posture limits by name, instead of zero [m or 1].
-        margin: Margin at those that are not named [m or 1].
+        margin: Least value of the others [m or 1].
     """
     posture = problem.posture
     if posture is not None:
@@ -137,12 +137,12 @@ def tightened(
         least = ca.DM([margins.get(name, margin) for name in posture.names])
         g = posture.function(q) - least
         posture = replace(posture, function=ca.Function("g", [q], [g], ["q"], ["g"]))
-    return replace(problem, limits=problem.limits.scaled(share), posture=posture)
+    return replace(problem, limits=problem.limits.shrink(share), posture=posture)
 
 
 Evaluated = Callable[[np.ndarray], np.ndarray]
 
-# a motion that shows a parameter not at all: worse than all others, but a number
+# cost of a motion without effect of a parameter: worse than all others, but finite
 _WORST = 1e6
 _TOLERANCE = 1e-4  # relative to the limits
 _MOST_MINOR_ITERATIONS = 100_000
@@ -157,8 +157,8 @@ class ExcitationProgram:
 
     Attributes:
         problem: Problem of the robot.
-        cost: To be as small as possible.
-        constraints: Beside those of positions, velocities and accelerations.
+        cost: Cost to minimize.
+        constraints: Constraints beside those of positions, velocities and accelerations.
     """
 
     def __init__(self, problem: ExcitationProblem, samples: int) -> None:
@@ -167,7 +167,7 @@ class ExcitationProgram:
             problem.kernels, problem.period, problem.harmonics, samples, problem.criterion
         )
         limits = problem.limits
-        # of order one for the solver: positions by their range, the rest by the velocities
+        # unknowns of order one for the solver: positions by their range, the rest by the velocities
         self._scale = np.repeat(limits.velocity[:, None], problem.shape[1], axis=1)
         self._scale[:, 0] = limits.reach
         self.constraints = _nonlinear_constraints(problem)
@@ -179,17 +179,16 @@ class ExcitationProgram:
         posture_times: np.ndarray,
         iterations: int,
     ) -> tuple[np.ndarray, float]:
-        """Return what SNOPT makes of a motion.
+        """Return SNOPT's solution from a motion.
 
         Args:
-            coefficients: Coefficients of the motion to start with, shape (N, 2M + 1); may violate
-                limits.
-            joint_times: When joint limits hold [s], shape (K,).
-            posture_times: When limits of torques and postures hold [s], shape (L,).
-            iterations: At most so many major ones.
+            coefficients: Coefficients of the initial motion, shape (N, 2M + 1); may violate limits.
+            joint_times: Times at which joint limits hold [s], shape (K,).
+            posture_times: Times at which limits of torques and postures hold [s], shape (L,).
+            iterations: Largest number of major iterations.
 
         Returns:
-            Coefficients, shape (N, 2M + 1), and the figure to be small.
+            Coefficients, shape (N, 2M + 1), and the cost.
         """
         program = MathematicalProgram()
         x = program.NewContinuousVariables(coefficients.size, "c")
@@ -241,12 +240,12 @@ class MotionConstraint:
     """Bounds of a function of the motion at one instant.
 
     Attributes:
-        function: Function of some of q, v, a, each (N,), to values (size,) and their derivatives
-            by each, one after the other, (size, N * number of arguments).
-        orders: Which of q, v, a.
+        function: Function of some of q, v, a, each (N,), to values (size,) and their derivatives by
+            each argument, one after the other, (size, N * number of arguments).
+        orders: Indices of its arguments among q, v, a.
         size: Number of values.
-        lower: Bound of all.
-        upper: Bound of all.
+        lower: Lower bound of all values.
+        upper: Upper bound of all values.
     """
 
     function: ca.Function
@@ -260,11 +259,11 @@ class MotionConstraint:
 
         Args:
             problem: Problem of the robot.
-            times: When it is to hold [s], shape (K,).
+            times: Times at which it must hold [s], shape (K,).
             scale: Scale of the coefficients, shape (N, 2M + 1).
 
         Returns:
-            Function of what a solver varies, shape (N * (2M + 1),), to values, shape (K * size,).
+            Function of the solver's variables, shape (N * (2M + 1),), to values, shape (K * size,).
         """
         bases = np.array(fourier_basis(times, problem.period, problem.harmonics))[self.orders]
         sampled = SampledFunction(self.function, len(times))
@@ -291,7 +290,7 @@ def _nonlinear_constraints(problem: ExcitationProblem) -> list[MotionConstraint]
         function = _with_derivatives(motion, share)
         constraints.append(MotionConstraint(function, [0, 1, 2], known.size, -1.0, 1.0))
     if problem.posture is not None:
-        # one by one, each is short enough for machine code
+        # one by one, so that each is short enough for machine code
         for value in ca.vertsplit(problem.posture.function(q)):
             function = _with_derivatives([q], value)
             constraints.append(MotionConstraint(function, [0], 1, 0.0, np.inf))

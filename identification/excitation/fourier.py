@@ -6,8 +6,8 @@ With the fundamental frequency ``w_f = 2 pi / T_f`` and the harmonics k in use, 
     q_i'(t)  =        sum_k a_ik cos(k w_f t)           + b_ik sin(k w_f t)
 
 which is Swevers' form of (2.78): the coefficients are amplitudes of the velocity. The dissertation
-prints the sum without the factors ``1 / (k w_f)``; its Tab. C.2 keeps the limits of Tab. C.1 with
-them alone.
+prints the sum without the factors ``1 / (k w_f)``; its Tab. C.2 satisfies the limits of Tab. C.1
+only with them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.output import write_text
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.yaml.fields import REQUIRED
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_file
 
-# of a number of samples from being an integer
+# tolerance of a number of samples from an integer
 _ROUNDING = 1e-6
 _MOST_HARMONICS = 100
 _DIGITS = 9  # of coefficients in a file
@@ -53,7 +53,7 @@ class FourierTrajectory:
     harmonics: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        """Check all."""
+        """Check all values."""
         check_period(self.period)
         check_harmonics(self.harmonics)
         q_0, a, b = (np.array(value, dtype=float) for value in (self.q_0, self.a, self.b))
@@ -73,7 +73,7 @@ class FourierTrajectory:
     def from_coefficients(
         cls, coefficients: np.ndarray, period: float, harmonics: Sequence[int]
     ) -> "FourierTrajectory":
-        """Return the trajectory of coefficients as :attr:`coefficients` gives them."""
+        """Return the trajectory of coefficients in the form of :attr:`coefficients`."""
         table = np.asarray(coefficients, dtype=float)
         return cls(table[:, 0], table[:, 1::2], table[:, 2::2], period, tuple(harmonics))
 
@@ -112,7 +112,7 @@ class FourierTrajectory:
             rate: Rate of samples [Hz].
 
         Raises:
-            InputError: If the period is no multiple of the sampling time.
+            InputError: If the period is not a multiple of the sampling time.
         """
         return np.arange(samples_per_period(self.period, rate)) / rate
 
@@ -128,10 +128,10 @@ class FourierTrajectory:
 
         Args:
             path: Path of the file, which is replaced.
-            robot: What it is for.
-            source: Where it is from.
+            robot: Name of the robot.
+            source: Source of the coefficients.
             joints: Names of the joints.
-            figures: Figures of its quality, by name.
+            figures: Values of its criteria, by name.
 
         Raises:
             InputError: If the file cannot be written.
@@ -151,7 +151,7 @@ class FourierTrajectory:
 
     @classmethod
     def load(cls, path: str | Path) -> "FourierTrajectory":
-        """Return the trajectory of a file that :meth:`save` wrote.
+        """Return the trajectory of a file from :meth:`save`.
 
         Raises:
             InputError: If the file cannot be read, a key is missing or unknown, or a value is out
@@ -169,15 +169,15 @@ class ExcitationFile:
     """Content of an excitation file; see :class:`FourierTrajectory`.
 
     Attributes:
-        robot: What it is for.
-        source: Where it is from.
+        robot: Name of the robot.
+        source: Source of the coefficients.
         joints: Names of the joints, or none.
         period: T_f [s].
         harmonics: Multiples of the fundamental frequency.
         q_0: ``[N]`` offsets [rad or m].
         a: ``[N, M]`` velocity amplitudes of the cosines [rad/s or m/s].
         b: ``[N, M]`` velocity amplitudes of the sines [rad/s or m/s].
-        figures: Figures of its quality, by name.
+        figures: Values of its criteria, by name.
     """
 
     period: float = field(default=1.0, metadata=REQUIRED)
@@ -214,16 +214,14 @@ def shipped_excitation(robot: str = "comau_racer_1_4", name: str = "excitation")
     known = sorted(path.stem for path in models_directory().glob(f"{robot}/excitation*.yaml"))
     if file.stem not in known:
         allowed = ", ".join(known) or "none for this robot"
-        raise InputError(
-            f"excitation {shortened(name)!r} of {shortened(robot)!r}: allowed: {allowed}"
-        )
+        raise InputError(f"excitation {shorten(name)!r} of {shorten(robot)!r}: allowed: {allowed}")
     return file
 
 
 def fourier_basis(
     t: ArrayLike, period: float, harmonics: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what the rows of coefficients are multiplied by, see :class:`FourierTrajectory`.
+    """Return the factors of the rows of coefficients, see :class:`FourierTrajectory`.
 
     Args:
         t: Times [s], shape (K,).
@@ -256,7 +254,7 @@ def samples_per_period(period: float, rate: float) -> int:
         rate: Rate of samples [Hz].
 
     Raises:
-        InputError: If it is no integer.
+        InputError: If it is not an integer.
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise InputError(f"sampling rate = {rate!r} Hz; must be a positive number")
@@ -270,16 +268,16 @@ def samples_per_period(period: float, rate: float) -> int:
 
 
 def check_period(period: float) -> None:
-    """Refuse a period that is no positive number."""
+    """Refuse a period that is not a positive number."""
     if not (np.isfinite(period) and period > 0.0):
         raise InputError(f"period = {period!r} s; must be a positive number")
 
 
 def check_harmonics(harmonics: Sequence[int]) -> None:
-    """Refuse harmonics that are none, twice there or no positive integers."""
+    """Refuse harmonics that are missing, repeated or not positive integers."""
     fit = all(k == int(k) and 1 <= k <= _MOST_HARMONICS for k in harmonics)
     if not len(harmonics) or not fit or len(set(harmonics)) != len(harmonics):
         raise InputError(
-            f"harmonics = {shortened(str(list(harmonics)))}; must be one or more different "
+            f"harmonics = {shorten(str(list(harmonics)))}; must be one or more different "
             f"integers from 1 to {_MOST_HARMONICS}"
         )

@@ -1,4 +1,4 @@
-"""Limits of a robot's joints, and how much of them a motion takes."""
+"""Limits of a robot's joints, and the shares of them that a motion uses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.model.subject import Subject
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 
-# of all joints, or by names of joints
-Given = ArrayLike | Mapping[str, ArrayLike]
+# for all joints, or by names of joints
+LimitValues = ArrayLike | Mapping[str, ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,10 +18,10 @@ class JointLimits:
     """Limits of N joints.
 
     Attributes:
-        position: Lower and upper ones [rad or m], shape (N, 2).
+        position: Lower and upper limits [rad or m], shape (N, 2).
         velocity: Magnitudes [rad/s or m/s], shape (N,).
         acceleration: Magnitudes [rad/s^2 or m/s^2], shape (N,).
-        effort: Magnitudes of the drives' torques [Nm or N], shape (N,); infinite where unknown.
+        effort: Magnitudes of the drives' torques [Nm or N], shape (N,); infinite if unknown.
     """
 
     position: np.ndarray
@@ -39,8 +39,8 @@ class JointLimits:
         """Distances from the middles to the limits [rad or m], shape (N,)."""
         return (self.position[:, 1] - self.position[:, 0]) / 2.0
 
-    def scaled(self, share: float) -> "JointLimits":
-        """Return limits of which a share is left, about the middles of the positions."""
+    def shrink(self, share: float) -> "JointLimits":
+        """Return a share of the limits, about the middles of the positions."""
         reach = share * self.reach
         return JointLimits(
             np.column_stack([self.middle - reach, self.middle + reach]),
@@ -51,9 +51,9 @@ class JointLimits:
 
 
 def chosen_limits(
-    subject: Subject, limits: "JointLimits | Mapping[str, Given] | None" = None
+    subject: Subject, limits: "JointLimits | Mapping[str, LimitValues] | None" = None
 ) -> JointLimits:
-    """Return a robot's limits, those of its model where no others are given.
+    """Return a robot's limits, from its model or as specified.
 
     Args:
         subject: The robot.
@@ -63,7 +63,7 @@ def chosen_limits(
 
     Raises:
         InputError: If a limit or joint is unknown, a value out of range, or one is neither in the
-            model nor given. Effort alone may be unknown.
+            model nor specified. Effort alone may be unknown.
     """
     n, names = subject.dimension, subject.joint_names
     if isinstance(limits, JointLimits):
@@ -76,11 +76,14 @@ def chosen_limits(
         "acceleration": subject.acceleration_limit,
         "effort": subject.effort_limit,
     }
-    given = dict(limits or {})
-    for key in given:
+    chosen = dict(limits or {})
+    for key in chosen:
         if key not in own:
-            raise InputError(f"limits: {shortened(key)!r}; must be one of {', '.join(own)}")
-    values = {key: _given(subject, key, given.get(key, array), array) for key, array in own.items()}
+            raise InputError(f"limits: {shorten(key)!r}; must be one of {', '.join(own)}")
+    values = {
+        key: _joint_values(subject, key, chosen.get(key, array), array)
+        for key, array in own.items()
+    }
     unbounded = np.flatnonzero(~np.isfinite(values["position"]).all(axis=1))
     if unbounded.size:
         _refuse_unknown(subject, "position", [names[i] for i in unbounded])
@@ -100,8 +103,8 @@ def chosen_limits(
     return JointLimits(**values)
 
 
-def _given(subject: Subject, key: str, value: Given, own: np.ndarray) -> np.ndarray:
-    """Return one kind of limits of all joints, of the shape of those of the model."""
+def _joint_values(subject: Subject, key: str, value: LimitValues, own: np.ndarray) -> np.ndarray:
+    """Return one kind of limits of all joints, in the shape of the model's."""
     if isinstance(value, Mapping):
         table = own.copy()
         for joint, entry in value.items():
@@ -120,17 +123,17 @@ def _given(subject: Subject, key: str, value: Given, own: np.ndarray) -> np.ndar
 
 
 def numbers(name: str, value: ArrayLike) -> np.ndarray:
-    """Return an array of what should be numbers; raises InputError that names it if it is not."""
+    """Return an array of numbers; raises InputError with the name for anything else."""
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"{name} = {shortened(repr(value))}; must be numbers") from None
+        raise InputError(f"{name} = {shorten(repr(value))}; must be numbers") from None
 
 
 def _joint(subject: Subject, joint: str, where: str) -> int:
     if joint not in subject.joint_names:
         raise InputError(
-            f"{where}: {subject.name} has no joint {shortened(str(joint))!r}; must be one of "
+            f"{where}: {subject.name} has no joint {shorten(str(joint))!r}; must be one of "
             f"{', '.join(subject.joint_names)}"
         )
     return subject.joint_names.index(joint)
@@ -145,7 +148,7 @@ def _refuse_unknown(subject: Subject, key: str, joints: Sequence[str]) -> None:
 def used_shares(
     limits: JointLimits, motion: tuple[np.ndarray, np.ndarray, np.ndarray], tau: np.ndarray
 ) -> Mapping[str, np.ndarray]:
-    """Return the largest share of each limit that a motion takes, 1 being the limit.
+    """Return the largest share of each limit that a motion uses, 1 being the limit.
 
     Args:
         limits: Limits of the robot.

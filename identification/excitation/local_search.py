@@ -1,7 +1,8 @@
-"""From one random motion to the local optimum next to it, within the limits at all times.
+"""Local search for an optimal motion from a random one, within the limits at all times.
 
-The solver knows of limits at some instants. Where its motion exceeds one in between, the instant of
-the worst excess is added and it goes on from there (exchange method of semi-infinite programming).
+The solver applies the limits at some instants. If its motion exceeds a limit in between, the
+instant of the worst excess is added and the search continues (exchange method of semi-infinite
+programming).
 """
 
 from dataclasses import dataclass
@@ -11,32 +12,32 @@ import numpy as np
 from identification.excitation.excitation_program import ExcitationProblem, ExcitationProgram
 from identification.excitation.fourier import fourier_basis
 
-# instants per period of the highest harmonic: at first, and where excesses are looked for
+# instants per period of the highest harmonic: initial ones, and for the detection of excesses
 _COARSE_JOINTS, _COARSE_POSTURES, _FINE = 10, 12, 100
 _SAMPLES = 20  # of the criterion per period of the highest harmonic
 _MOST_ROUNDS = 8
 
-_START_SHARE = 0.7  # of the joint limits that a random motion takes
-_START_OFFSET = 0.4  # of the reach, largest distance of its middle from that of the limits
+_START_SHARE = 0.7  # of the joint limits, used by a random motion
+_START_OFFSET = 0.4  # of the range, largest distance of its middle from that of the limits
 _POSTURES = 500
 _MOST_TRIALS = 4
-_FROM_NEAR = 0.4  # part of the way to a random motion
-# what may be missing of limits, relative, before an instant is added
+_FROM_NEAR = 0.4  # share of a random motion in a start near a known one
+# tolerated relative excess of a limit before an instant is added
 _ENOUGH = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class LocalOptimum:
-    """End of one local search.
+    """Result of one local search.
 
     Attributes:
-        seed: Seed of the random motion at its start.
+        seed: Seed of the initial random motion.
         coefficients: Coefficients of the motion, shape (N, 2M + 1).
-        value: The figure to be small, see :class:`ExcitationCost`.
-        excess: Largest excess of a limit, relative (of the position limits' range and so on) or in
-            m for clearances; not positive where all are kept.
-        limit: Which one.
-        rounds: How often the solver ran.
+        value: Cost, see :class:`ExcitationCost`.
+        excess: Largest excess of a limit, relative (to the range of positions and so on) or in m
+            for clearances; not positive if all are satisfied.
+        limit: Name of that limit.
+        rounds: Number of runs of the solver.
     """
 
     seed: int
@@ -48,7 +49,7 @@ class LocalOptimum:
 
 
 class LocalSearch:
-    """Searches of one robot's problem.
+    """Local searches for one robot's problem.
 
     Args:
         problem: Problem of the robot.
@@ -66,13 +67,13 @@ class LocalSearch:
         self._posture = None if posture is None else posture.function.map(len(self._fine))
 
     def run(self, seed: int, iterations: int, near: np.ndarray | None = None) -> LocalOptimum:
-        """Return the optimum next to a random motion.
+        """Return the local optimum from a random motion.
 
         Args:
             seed: Seed of the random motion.
-            iterations: Iterations of the solver, at most; a quarter of them once instants have
-                been added.
-            near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or nowhere.
+            iterations: Largest number of iterations of the solver; a quarter of them after instants
+                have been added.
+            near: Coefficients of a motion to start near, shape (N, 2M + 1); anywhere if omitted.
         """
         random = np.random.default_rng(seed)
         for _ in range(_MOST_TRIALS):
@@ -80,19 +81,19 @@ class LocalSearch:
             if near is not None:
                 start = near + _FROM_NEAR * (start - near)
             optimum = self.improve(start, seed, iterations)
-            # now and then the way to allowed postures ends with a joint at rest
+            # occasionally the search for allowed postures ends with a joint at rest
             if np.isfinite(optimum.value):
                 break
         return optimum
 
     def improve(self, coefficients: np.ndarray, seed: int, iterations: int) -> LocalOptimum:
-        """Return the optimum next to a motion.
+        """Return the local optimum from a motion.
 
         Args:
             coefficients: Coefficients of the motion, shape (N, 2M + 1).
-            seed: That it has come from.
-            iterations: Iterations of the solver, at most; a quarter of them once instants have
-                been added.
+            seed: Seed of its origin.
+            iterations: Largest number of iterations of the solver; a quarter of them after instants
+                have been added.
         """
         problem = self.problem
         joint_times = _instants(problem, _COARSE_JOINTS)
@@ -115,7 +116,7 @@ class LocalSearch:
     def _excesses(
         self, coefficients: np.ndarray
     ) -> tuple[list[tuple[str, np.ndarray]], list[tuple[str, np.ndarray]]]:
-        """Return by how much each limit is exceeded at all fine instants, each (K, n)."""
+        """Return the excess of each limit at all fine instants, each (K, n)."""
         limits = self.problem.limits
         q, v, a = (basis @ coefficients.T for basis in self._bases)
         joints = [
@@ -133,7 +134,7 @@ class LocalSearch:
         return joints, others
 
     def _with_peaks(self, times: np.ndarray, excesses: list[np.ndarray]) -> np.ndarray:
-        """Return instants with those added where a limit is exceeded most, for a while each."""
+        """Return instants with those of the largest excess of each limit added."""
         added = [times]
         for values in np.concatenate(excesses, axis=1).T:
             before, after = np.roll(values, 1), np.roll(values, -1)
@@ -149,8 +150,8 @@ def random_start(problem: ExcitationProblem, random: np.random.Generator) -> np.
     coefficients[:, 0] = middle
     coefficients[:, 1:] = random.normal(size=(problem.dimension, problem.shape[1] - 1))
     bases = fourier_basis(_instants(problem, _FINE), problem.period, problem.harmonics)
-    room = limits.reach - np.abs(middle - limits.middle)
-    largest = [room, limits.velocity, limits.acceleration]
+    margin = limits.reach - np.abs(middle - limits.middle)
+    largest = [margin, limits.velocity, limits.acceleration]
     shares = [
         np.abs(basis[:, 1:] @ coefficients[:, 1:].T).max(axis=0) / most
         for basis, most in zip(bases, largest, strict=True)
@@ -160,7 +161,7 @@ def random_start(problem: ExcitationProblem, random: np.random.Generator) -> np.
 
 
 def _random_posture(problem: ExcitationProblem, random: np.random.Generator) -> np.ndarray:
-    """Return the best of some random postures, in what it may not be below."""
+    """Return the best of some random postures, by their least margin."""
     limits = problem.limits
     offsets = _START_OFFSET * random.uniform(-1.0, 1.0, (_POSTURES, problem.dimension))
     postures = limits.middle + offsets * limits.reach

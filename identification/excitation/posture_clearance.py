@@ -1,8 +1,8 @@
-"""Where a robot may be, as smooth functions of its joint positions that must not be negative.
+"""Allowed postures of a robot, as smooth functions of its joint positions that must be >= 0.
 
-A search for motions needs gradients that exist everywhere. So shapes are covered by balls, corners
-of obstacles are rounded off and the least of many distances is a soft minimum; all of it errs on
-the safe side. What has been found is checked with the shapes themselves,
+A search for motions needs gradients everywhere. Therefore shapes are covered by balls, corners of
+obstacles are rounded and the least of many distances is a soft minimum; all of it is conservative.
+Results are verified with the shapes themselves,
 :class:`~identification.excitation.scene.RobotScene`.
 """
 
@@ -18,7 +18,7 @@ from identification.excitation.balls import (
     cover,
     ends,
     points_of_last_link,
-    without_inner,
+    remove_inner,
 )
 from identification.excitation.scene import WORLD, Cell, Obstacle, RobotScene
 from identification.model.subject import Subject
@@ -27,23 +27,23 @@ from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.kinematics import rod_motion
 
 _SOFT = 0.004  # m, scale of the soft minimum
-_ROUND = 0.02  # m, by which edges of obstacles are rounded off
+_ROUND = 0.02  # m, rounding of the obstacles' edges
 _POSTURES = 800
-# balls that never come nearer in random postures are left to the check at the end [m]
+# balls that are never nearer in random postures are left to the final verification [m]
 _NEAR = 0.06
-_ABOUT = 0.01  # m, of gaps that are about the least
-_TINY = 1e-9  # m, keeps roots differentiable
+_ABOUT = 0.01  # m, difference of gaps that count as the least
+_TINY = 1e-9  # m, to make roots differentiable
 _FULL_TURN = np.pi
 
 
 @dataclass(frozen=True, eq=False)
 class PostureLimits:
-    """What the joint positions of a robot must keep to.
+    """Limits of a robot's postures.
 
     Attributes:
-        function: ``g(q)``, CasADi function of a vector (N,) to (n,): zero or positive where the
-            robot may be.
-        names: What the elements are, n of them.
+        function: ``g(q)``, CasADi function of a vector (N,) to (n,): zero or positive for allowed
+            postures.
+        names: Names of the elements, n of them.
     """
 
     function: ca.Function
@@ -59,12 +59,12 @@ class PostureLimits:
 
 
 def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> PostureLimits | None:
-    """Return what a serial robot must keep to in its cell; None if there is nothing.
+    """Return the limits of a serial robot's postures in its cell; None if there are none.
 
     Args:
         subject: The robot.
-        cell: What stands around it.
-        scene: The same for Drake.
+        cell: Environment of the robot.
+        scene: Robot and cell in Drake.
     """
     chain = subject.chain
     assert chain is not None
@@ -78,14 +78,16 @@ def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> Po
     pairs = _near_each_other(balls, scene, sampled, cell.clearance)
     used = {*(n for _, numbers in near for n in numbers), *(n for p in pairs for n in p)}
     q = ca.SX.sym("q", chain.dimension)
-    at = balls.places(q, sorted(used))
+    at = balls.world_centers(q, sorted(used))
     elements: list[tuple[str, ca.SX]] = []
     if np.isfinite(cell.tool_above):
-        # so is what lies between them
+        # points between them are above, too
         tips = ends(subject)
-        places = points_of_last_link(chain, list(tips.values())).places(q, list(range(len(tips))))
-        for name, place in zip(tips, places.values(), strict=True):
-            elements.append((height_of(name), place[2] - cell.tool_above))
+        points = points_of_last_link(chain, list(tips.values())).world_centers(
+            q, list(range(len(tips)))
+        )
+        for name, point in zip(tips, points.values(), strict=True):
+            elements.append((height_of(name), point[2] - cell.tool_above))
     for obstacle, numbers in near:
         distances = [_distance(obstacle, at[n]) - balls.radii[n] for n in numbers]
         elements.append((f"clearance of {obstacle.name}", soft_min(distances) - cell.clearance))
@@ -103,15 +105,15 @@ def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> Po
 
 
 def height_of(name: str) -> str:
-    """Return the name of the limit of an end's height."""
+    """Return the name of the limit of a point's height."""
     return f"height of the {name}"
 
 
 def delta_posture_limits(robot: DeltaRobot) -> PostureLimits:
-    """Return what a DELTA robot must keep to: its workspace, see ``robot.delta.workspace``.
+    """Return the limits of a DELTA robot's postures, see ``robot.delta.workspace``.
 
-    The least singular value of the rods' directions U is bounded from below by
-    ``1 / |U^-1|_F = |det U| / |cof U|_F``, which is smooth.
+    The least singular value of the rods' directions U is bounded from below by the smooth function
+    ``1 / |U^-1|_F = |det U| / |cof U|_F``.
 
     Args:
         robot: The robot.
@@ -131,12 +133,12 @@ def delta_posture_limits(robot: DeltaRobot) -> PostureLimits:
 
 
 def soft_min(values: Sequence[ca.SX], scale: float = _SOFT) -> ca.SX:
-    """Return a smooth number that is at most the least of several, by up to scale * log(n)."""
+    """Return a smooth lower bound of the least of several numbers, within scale * log(n)."""
     return -scale * ca.logsumexp(ca.vertcat(*values) * (-1.0 / scale))
 
 
 def soft_max(x: ca.SX, y: ca.SX, width: float = _ROUND) -> ca.SX:
-    """Return a smooth number that is at most the larger of two, by up to half of a width."""
+    """Return a smooth lower bound of the larger of two numbers, within half of a width."""
     return (x + y + ca.sqrt((x - y) ** 2 + width**2) - width) / 2.0
 
 
@@ -170,7 +172,7 @@ def _near_obstacle(
     sampled: np.ndarray,
     clearance: float,
 ) -> list[int]:
-    """Return the balls that come nearest to an obstacle, without inner ones."""
+    """Return the balls nearest to an obstacle, without inner ones."""
     point = ca.SX.sym("p", 3)
     distance = ca.Function("d", [point], [_distance(obstacle, point)])
     count = len(balls.radii)
@@ -180,13 +182,13 @@ def _near_obstacle(
     gaps[:, (balls.links == WORLD) | np.isin(bodies, obstacle.beside)] = np.inf
     numbers = np.flatnonzero(_nearest(gaps, clearance)).tolist()
     per_link = [[n for n in numbers if balls.links[n] == i] for i in range(balls.chain.dimension)]
-    return [n for own in per_link for n in without_inner(balls, own)]
+    return [n for own in per_link for n in remove_inner(balls, own)]
 
 
 def _near_each_other(
     balls: RobotBalls, scene: RobotScene, sampled: np.ndarray, clearance: float
 ) -> list[tuple[int, int]]:
-    """Return the pairs of balls that come nearest, of shapes that must not touch."""
+    """Return the nearest pairs of balls of shapes that must not touch."""
     index = {shape.geometry: k for k, shape in enumerate(scene.shapes)}
     of_links: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for pair in scene.pairs:
@@ -205,14 +207,14 @@ def _near_each_other(
 
 
 def _nearest(gaps: np.ndarray, clearance: float) -> np.ndarray:
-    """Return which of some gaps are about the least ones in postures where that is small.
+    """Return which gaps are nearly the least ones in postures where the least gap is small.
 
-    Gaps that are small most of the time are so by design, or because balls are larger than what
-    they cover; there the check at the end is what matters.
+    Gaps that are small most of the time are so by design, or because balls are larger than their
+    shapes; for them the final verification decides.
 
     Args:
         gaps: Distances of each posture [m], shape (K, n).
-        clearance: That is asked for [m].
+        clearance: Required clearance [m].
 
     Returns:
         Shape (n,).

@@ -1,4 +1,4 @@
-"""An excitation in Meshcat: the robot in its cell and the way of its end effector."""
+"""Recording of an excitation in Meshcat: the robot in its cell and its end effector's path."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from diagrams.robots.model import read_robot
 from identification.excitation.balls import ends
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.run_in import ExcitationRun
-from identification.excitation.scene import Cell, left_out_tool, obstacle_shape
+from identification.excitation.scene import Cell, obstacle_shape, removed_tool_name
 from identification.model.subject import Subject, tool_frame_of
 from identification.output import write_text
 from pfsc_drake import jets
@@ -39,13 +39,13 @@ def record_excitation(
     Args:
         subject: The robot.
         motion: Motion of its joints.
-        path: File to write the page to, which is replaced; None for none.
-        cell: What stands around a serial robot.
+        path: File of the page, which is replaced; None for none.
+        cell: Environment of a serial robot.
         frame_rate: Frames per second [1/s].
 
     Raises:
-        InputError: If joints are too few or too many, the rate is no positive number or the file
-            cannot be written.
+        InputError: If joints are too few or too many, the rate is not positive or the file cannot
+            be written.
     """
     if not 0.0 < frame_rate < np.inf:
         raise InputError(f"frame_rate = {frame_rate!r} Hz; must be a positive number")
@@ -77,8 +77,8 @@ def record_excitation(
     builder.AddNamedSystem("robot_visualizer", visualizer)
     builder.Connect(add_source(builder, "positions", times, positions), port)
     trail = builder.AddNamedSystem("trail", TrailVisualizer("tool", _TRAIL, meshcat, period))
-    way = add_source(builder, "tool_point", times, tool_points)
-    builder.Connect(way, trail.GetInputPort("point"))
+    tool_point = add_source(builder, "tool_point", times, tool_points)
+    builder.Connect(tool_point, trail.GetInputPort("point"))
     page = record(builder.Build(), meshcat, duration, period)
     if path is not None:
         write_text(Path(path), page)
@@ -88,21 +88,21 @@ def record_excitation(
 def _serial_robot(
     subject: Subject, q: np.ndarray, meshcat: Meshcat, period: float
 ) -> tuple[RobotVisualizer, np.ndarray]:
-    """Return what draws a serial robot, and its plant's positions, shape (K, nq)."""
+    """Return the drawing of a serial robot, and its plant's positions, shape (K, nq)."""
     if subject.block is None:
-        raise InputError(f"{subject.name}: without a model there is nothing to draw")
+        raise InputError(f"{subject.name}: cannot be drawn without a model")
     plant, _ = read_robot(subject.block, subject.folder)
     tool = tool_frame_of(plant, subject.block)
     _, coordinates = chain_from_plant(plant, tool)
     drawing = draw_robot(plant, tool, subject.block, subject.folder)
-    parts = [part for part in drawing.parts if part.body.name() != left_out_tool(subject)]
+    parts = [part for part in drawing.parts if part.body.name() != removed_tool_name(subject)]
     states = np.concatenate([q, np.zeros_like(q)] * 2, axis=1)
     positions = [coordinates.plant_state(state)[: plant.num_positions()] for state in states]
     return RobotVisualizer(plant, parts, meshcat, period), np.array(positions)
 
 
 def _tool_points(subject: Subject, q: np.ndarray) -> np.ndarray:
-    """Return the end effector's places in many postures [m], shape (K, 3)."""
+    """Return the end effector's positions for a series of postures [m], shape (K, 3)."""
     joints = ca.SX.sym("q", subject.dimension)
     still = [jets.constant(joints[i], 1) for i in range(subject.dimension)]
     robot = subject.robot

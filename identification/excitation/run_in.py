@@ -1,9 +1,9 @@
-"""A periodic motion as a robot's controller runs it: from rest, some periods, to rest.
+"""A periodic motion for a robot's controller: from rest, some periods, to rest.
 
-The robot goes along the periodic motion from the first instant on, ever faster: the motion is
-``q(s(t))`` with the rate ``s'`` of its clock rising from 0 to 1 before the first period, and
-falling after the last. So postures, and with them position limits and clearances, are those of one
-period; where velocities and accelerations of the ramps are not, the ramps are made longer.
+The robot moves along the periodic motion from the first instant on, with increasing speed: the
+motion is ``q(s(t))`` with the rate ``s'`` of its clock rising from 0 to 1 before the first period,
+and falling after the last. Thus the postures, and with them position limits and clearances, are
+those of one period; if velocities and accelerations of the ramps are not, the ramps get longer.
 """
 
 from dataclasses import dataclass
@@ -31,8 +31,8 @@ class ExcitationRun:
 
     Attributes:
         trajectory: The periodic motion.
-        periods: How often it is run in full.
-        ramp: Time that run-in and run-out take, each [s].
+        periods: Number of full periods.
+        ramp: Duration of run-in and run-out, each [s].
     """
 
     trajectory: FourierTrajectory
@@ -59,7 +59,7 @@ class ExcitationRun:
         return q, v * rate, a * rate**2 + v * change
 
     def _clock(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return time on the periodic motion [s], its rate and the change of this [1/s]."""
+        """Return time on the periodic motion [s], its rate and the rate's derivative [1/s]."""
         full = self.periods * self.trajectory.period
         into, out = (np.clip(x / self.ramp, 0.0, 1.0) for x in (t, self.duration - t))
         within = np.clip(t - self.ramp, 0.0, full)
@@ -77,7 +77,7 @@ class ExcitationRun:
             t, shape (K,), and q, v, a, each of shape (K, N).
 
         Raises:
-            InputError: If the period is no multiple of the sampling time.
+            InputError: If the period is not a multiple of the sampling time.
         """
         samples_per_period(self.trajectory.period, rate)
         t = np.arange(round(self.duration * rate) + 1) / rate
@@ -86,16 +86,16 @@ class ExcitationRun:
     def export_csv(self, path: str | Path, rate: float, units: list[str] | None = None) -> None:
         """Write the motion for a robot's controller.
 
-        Columns ``t, q_1 .. q_N, v_1 .. v_N, a_1 .. a_N`` under lines that say the units and when
-        the periods begin; the first and the last row are at rest.
+        Columns ``t, q_1 .. q_N, v_1 .. v_N, a_1 .. a_N`` under lines with the units and the start
+        of the periods; the first and the last row are at rest.
 
         Args:
             path: Path of the file, which is replaced.
             rate: Rate of samples [Hz].
             units: Units of the joints' positions, N of ``rad`` or ``m``; all rad by default.
 
-        Raises:
-            InputError: If the period is no multiple of the sampling time, or the file cannot be
+        InputError: If the period is not a multiple of the sampling time, or the file cannot be
+            written.
                 written.
         """
         table = np.column_stack(self.sample(rate))
@@ -120,17 +120,17 @@ def rest_to_rest(
     periods: int = 5,
     rate: float = 1000.0,
 ) -> ExcitationRun:
-    """Return a run whose ramps are as short as the limits allow.
+    """Return a run with ramps as short as the limits allow.
 
     Args:
         trajectory: The periodic motion, within the limits.
         velocity: Largest magnitudes of the joint velocities [rad/s or m/s], shape (N,).
         acceleration: Largest magnitudes of the joint accelerations [per s^2], shape (N,).
-        periods: How often to run it in full.
+        periods: Number of full periods.
         rate: Rate of samples [Hz]; ramps are multiples of the sampling time.
 
     Raises:
-        InputError: If there is no period, or no ramp keeps the limits.
+        InputError: If there is no period, or no ramp is within the limits.
     """
     if periods < 1:
         raise InputError(f"periods = {periods}; must be 1 or more")
@@ -161,11 +161,11 @@ def run_of(
     Args:
         subject: The robot.
         trajectory: The periodic motion.
-        periods: How often to run it in full.
+        periods: Number of full periods.
         rate: Rate of samples [Hz].
 
     Raises:
-        InputError: If the motion is of another robot or leaves the position limits, or as of
+        InputError: If the motion belongs to another robot or leaves the position limits, or as in
             :func:`rest_to_rest`.
     """
     n = subject.dimension

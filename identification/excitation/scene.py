@@ -1,7 +1,7 @@
 """A serial robot and its cell in Drake's geometry engine: exact distances along a motion.
 
-Collision geometry is that of the model; a link without has its visual shapes for it. Meshes count
-as their convex hulls.
+Collision geometry comes from the model; links without it use their visual shapes. Meshes are
+replaced by their convex hulls.
 """
 
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.reading import read_model
 from pfsc_drake.robot.models.visuals import Shape, check_shape
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.serial.link_places import link_frames
+from pfsc_drake.robot.serial.link_points import link_frames
 from pfsc_drake.yaml.fields import REQUIRED
 from pfsc_drake.yaml.rules import Count, NotNegative, Parameters
 from pfsc_drake.yaml.typed import load_file
@@ -40,10 +40,10 @@ from pfsc_drake.yaml.typed import load_file
 
 @dataclass
 class Obstacle(Shape):
-    """A primitive that does not move, in the world frame; see :class:`Shape`.
+    """A static primitive in the world frame; see :class:`Shape`.
 
     Attributes:
-        name: For messages.
+        name: Name for messages.
         beside: Links of the model that are next to it by design and not checked against it.
     """
 
@@ -54,16 +54,16 @@ class Obstacle(Shape):
 
 @dataclass
 class Cell(Parameters):
-    """What a motion must keep clear of.
+    """Environment of a robot, with required clearances.
 
     Attributes:
-        obstacles: None of them may be touched.
-        tool_above: Least z of the end effector in the world [m], the flange where there is no tool;
+        obstacles: Obstacles.
+        tool_above: Least z of the end effector in the world [m], of the flange without a tool;
             minus infinity for any.
         clearance: Least distance between the robot and obstacles, and between links that are not
             neighbours [m].
-        self_collision: Whether links that are no neighbours are checked against each other.
-        joined: Pairs of links that are not, since joint limits keep them apart.
+        self_collision: Whether links that are not neighbours are checked against each other.
+        joined: Pairs of links that are not checked, because joint limits keep them apart.
     """
 
     obstacles: list[Obstacle] = field(default_factory=list)
@@ -82,7 +82,7 @@ class Cell(Parameters):
             raise InputError(f"tool_above = {self.tool_above}; must be a number [m]")
 
 
-WORLD = -1  # link of what does not move
+WORLD = -1  # link of static bodies
 # shapes that are near in each of so many postures are so by design
 _POSTURES = 100
 _FULL_TURN = np.pi  # of joints without limits
@@ -93,10 +93,10 @@ class PlacedShape:
     """A shape of the robot.
 
     Attributes:
-        geometry: Its identifier.
-        link: Index of the chain's link that carries it, from 0; ``WORLD`` for the base.
+        geometry: Identifier.
+        link: Index of its link in the chain, from 0; ``WORLD`` for the base.
         body: Name of its body.
-        X_LG: Its pose in the chain's link frame, in the world for the base.
+        X_LG: Pose in the chain's link frame, in the world for the base.
     """
 
     geometry: GeometryId
@@ -112,7 +112,7 @@ class Pair:
     Attributes:
         first: A shape of the robot.
         second: Another one, or an obstacle.
-        name: Names of both, for people.
+        name: Names of both, for messages.
     """
 
     first: GeometryId
@@ -125,16 +125,16 @@ class RobotScene:
 
     Args:
         subject: The robot; read from its model once more, with geometry.
-        cell: What stands around it.
+        cell: Environment of the robot.
 
     Attributes:
-        shapes: Those of the robot.
-        obstacles: Those of the cell, with their identifiers.
-        pairs: What must not touch.
-        warnings: What cannot be checked, one sentence each.
+        shapes: Shapes of the robot.
+        obstacles: Obstacles of the cell, with their identifiers.
+        pairs: Pairs that must not touch.
+        warnings: Omitted checks, one sentence each.
 
     Raises:
-        InputError: If ``beside`` of an obstacle names no link, or the robot is no serial one.
+        InputError: If ``beside`` of an obstacle names no link, or the robot is not a serial one.
     """
 
     def __init__(self, subject: Subject, cell: Cell) -> None:
@@ -161,7 +161,7 @@ class RobotScene:
 
     @property
     def inspector(self) -> SceneGraphInspector:
-        """What the scene graph knows of the shapes."""
+        """Inspector of the scene graph's shapes."""
         return self._scene.model_inspector()
 
     def distances(self, q: np.ndarray, numbers: np.ndarray | None = None) -> np.ndarray:
@@ -169,7 +169,7 @@ class RobotScene:
 
         Args:
             q: Joint positions [rad or m], shape (K, N).
-            numbers: Which of the pairs, n of them; all by default.
+            numbers: Numbers of the pairs, n of them; all by default.
         """
         plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
         scene_context = self._scene.GetMyMutableContextFromRoot(self._context)
@@ -193,12 +193,12 @@ class RobotScene:
         return self._scene.RegisterGeometry(source, frame, instance)
 
     def _find_shapes(self, subject: Subject) -> list[PlacedShape]:
-        """Collect the shapes of the chain's links and give proximity to visual ones."""
+        """Collect the shapes of the chain's links and assign proximity roles to visual ones."""
         plant, inspector = self._plant, self.inspector
         plain = plant.CreateDefaultContext()
         groups = [(WORLD, plant.world_frame())]
         groups += list(enumerate(link_frames(plant, self._coordinates)))
-        left_out = left_out_tool(subject)
+        left_out = removed_tool_name(subject)
         found = []
         for link, frame in groups:
             by_role: dict[Role, list[PlacedShape]] = {Role.kProximity: [], Role.kIllustration: []}
@@ -250,7 +250,7 @@ class RobotScene:
                 raise InputError(f"cell: {key} = '{name}'; must be one of {known}")
 
     def _drop_joined(self, position_limits: np.ndarray, clearance: float) -> None:
-        """Take out pairs that are too near in all of some random postures."""
+        """Remove pairs that are too near in all of some random postures."""
         if not self.pairs:
             return
         lower, upper = np.clip(position_limits, -_FULL_TURN, _FULL_TURN).T
@@ -264,7 +264,7 @@ def cell_of(subject: Subject, cell: Cell | str | Path | None) -> Cell:
 
     Args:
         subject: The robot.
-        cell: One, or its file; None for the one shipped with the robot's model, or an empty one.
+        cell: A cell, or its file; None for the one shipped with the robot's model, or an empty one.
 
     Raises:
         InputError: If the file cannot be read or does not fit; one line that names it.
@@ -291,8 +291,8 @@ def obstacle_shape(obstacle: Obstacle) -> tuple[RigidTransform, DrakeShape]:
     return pose, kind(obstacle.radius, length)
 
 
-def left_out_tool(subject: Subject) -> str:
-    """Return the name of the body that the subject is without."""
+def removed_tool_name(subject: Subject) -> str:
+    """Return the name of the tool's body that the subject excludes."""
     if subject.tool or subject.parameters is None:
         return ""
     return subject.parameters.tool.name

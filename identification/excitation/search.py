@@ -1,4 +1,4 @@
-"""The best excitation of a robot that can be found: local searches from many motions."""
+"""Search for the best excitation of a robot: local searches from many motions."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -10,12 +10,12 @@ import numpy as np
 from identification.excitation.criterion import InformationFigures, information
 from identification.excitation.excitation_program import (
     ExcitationProblem,
-    believed_parameters,
     excitation_problem,
-    tightened,
+    nominal_parameters,
+    tighten,
 )
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.limits import Given, JointLimits, chosen_limits
+from identification.excitation.limits import JointLimits, LimitValues, chosen_limits
 from identification.excitation.local_search import LocalOptimum, LocalSearch
 from identification.excitation.scene import Cell, RobotScene, cell_of
 from identification.excitation.verification import (
@@ -31,30 +31,30 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from reporting.processes import side_by_side
 
-# what is kept of limits for what solvers leave of them
+# remaining share of the limits, to allow for the solver's tolerance
 _SHARE, _MARGIN = 0.998, 0.002
-# of the drives' limits; the rest is for the servo, and for a robot that is not as it is believed
+# of the drives' limits; the rest is for the servo and for model errors
 _EFFORT = 0.9
 _MOST_REPAIRS = 3
-_REPAIR = 1.5  # times what was missing
+_REPAIR = 1.5  # factor of the excess
 _ITERATIONS = 40  # of a repair
-_BEST = 2  # motions that others are tried near to
-_FAR = 0.02  # excess that no repair takes away
+_BEST = 2  # motions that further starts are near to
+_FAR = 0.02  # excess that repairs cannot remove
 
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What a search has found.
+    """Result of a search.
 
     Attributes:
-        trajectory: The best motion that keeps all limits.
+        trajectory: The best motion within all limits.
         criterion: ``D`` or ``condition``.
-        information: Its figures.
-        verification: How much of the limits it takes.
-        values: Figure of each local search from the best on, ``log det(X^T X)`` or the condition
-            number, of fewer samples than ``information``; those outside the limits come last.
-        seconds: How long the search took [s].
-        warnings: What was not checked, one sentence each.
+        information: Values of its criteria.
+        verification: Shares of the limits that it uses.
+        values: Criterion of each local search from the best on, ``log det(X^T X)`` or the condition
+            number, for fewer samples than ``information``; those outside the limits come last.
+        seconds: Duration of the search [s].
+        warnings: Omitted checks, one sentence each.
     """
 
     trajectory: FourierTrajectory
@@ -67,7 +67,7 @@ class SearchResult:
 
     @property
     def figures(self) -> dict[str, float]:
-        """Figures of the motion, for its file."""
+        """Values of the motion's criteria, for its file."""
         return {
             "log_determinant": round(self.information.log_determinant, 3),
             "condition_number": round(self.information.condition_number, 1),
@@ -77,19 +77,19 @@ class SearchResult:
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """How an excitation is searched for.
+    """Options of the search for an excitation.
 
     Attributes:
         criterion: ``D`` for the largest ``log det(X^T X)`` (2.79), ``condition`` for the smallest
             condition number of X.
         harmonics: Multiples of the fundamental frequency in use.
         period: T_f [s].
-        starts: Number of motions to start from: half of them random, the others in two rounds near
-            the best ones that have been found.
+        starts: Number of initial motions: half of them random, the others in two rounds near the
+            best ones so far.
         seed: Seed of the first of them.
-        iterations: Iterations of the solver per start, at most; a quarter of them whenever it goes
-            on.
-        workers: Number of processes; one for each core by default, 1 for no others than this.
+        iterations: Largest number of the solver's iterations per start; a quarter of them when it
+            continues.
+        workers: Number of processes; one for each core by default; with 1, this process.
     """
 
     criterion: str = "D"
@@ -104,23 +104,23 @@ class SearchOptions:
 def search(
     subject: Subject,
     options: SearchOptions | None = None,
-    limits: JointLimits | Mapping[str, Given] | None = None,
+    limits: JointLimits | Mapping[str, LimitValues] | None = None,
     cell: Cell | str | Path | None = None,
     progress: Progress | None = None,
 ) -> SearchResult:
-    """Return an excitation that shows the base parameters of a robot as well as possible.
+    """Return an excitation that is optimal for the base parameters of a robot.
 
     Args:
         subject: The robot.
-        options: How it is searched for.
-        limits: Limits of the joints where not those of the model, see
+        options: Options of the search.
+        limits: Limits of the joints that differ from the model's, see
             :func:`~identification.excitation.limits.chosen_limits`.
-        cell: What stands around a serial robot; None for what is shipped with it.
-        progress: Receives the fraction done and the best figure so far.
+        cell: Environment of a serial robot; None for the shipped one.
+        progress: Receives the completed fraction and the best value so far.
 
     Raises:
-        InputError: If a value is out of range, the harmonics do not show all parameters, or no
-            motion keeps all limits.
+        InputError: If a value is out of range, the harmonics do not excite all parameters, or no
+            motion is within all limits.
     """
     begin, options = time.perf_counter(), options or SearchOptions()
     criterion, starts, iterations = options.criterion, options.starts, options.iterations
@@ -143,10 +143,10 @@ def search(
     )
     regressor = Regressor(subject)
     base = base_parameters(regressor)
-    believed = believed_parameters(subject)
+    parameters = nominal_parameters(subject)
     check_postures(subject, problem)
     check_excited(subject, problem, base)
-    narrower = tightened(problem, _SHARE, {}, _MARGIN)
+    narrower = tighten(problem, _SHARE, {}, _MARGIN)
     found: list[LocalOptimum] = []
     with side_by_side(options.workers, starts) as run:
         for count in (starts - 2 * (starts // 4), starts // 4, starts // 4):
@@ -155,12 +155,12 @@ def search(
             tasks = [(first + i, iterations, near[i % len(near)]) for i in range(count)]
             for optimum in run(_search_from, narrower, tasks):
                 found.append(optimum)
-                best = _said(criterion, min(found, key=_rank).value)
+                best = _figure_text(criterion, min(found, key=_rank).value)
                 tell(len(found) / (starts + 1), f"{len(found)} of {starts} starts, {best}")
             found.sort(key=_rank)
     tell(starts / (starts + 1), "checking all limits")
     trajectory, verification = _first_that_keeps_all(
-        found, narrower, lambda motion: verify(regressor, believed, joints, motion, cell, scene)
+        found, narrower, lambda motion: verify(regressor, parameters, joints, motion, cell, scene)
     )
     return SearchResult(
         trajectory,
@@ -176,12 +176,12 @@ def search(
 def _search_from(
     problem: ExcitationProblem, start: tuple[int, int, np.ndarray | None]
 ) -> LocalOptimum:
-    """Search from a seed, by a number of iterations, near to coefficients or nowhere."""
+    """Search from a seed, by a number of iterations, near to coefficients or anywhere."""
     return LocalSearch(problem).run(*start)
 
 
 def _unchecked(subject: Subject, cell: Cell, scene: RobotScene | None) -> list[str]:
-    """Return what was not checked, one sentence each."""
+    """Return the omitted checks, one sentence each."""
     if scene is None:
         return []
     none = f"{subject.name}: no obstacles are known; links are checked against each other alone"
@@ -197,12 +197,12 @@ def _first_that_keeps_all(
     problem: ExcitationProblem,
     check: Callable[[FourierTrajectory], Verification],
 ) -> tuple[FourierTrajectory, Verification]:
-    """Return the best motion that keeps all limits, if need be after some repairs."""
-    complaint = "no local search came to an end"
+    """Return the best motion within all limits, if necessary after some repairs."""
+    complaint = "no local search has finished"
     for optimum in found:
         if not np.isfinite(optimum.value):
             continue
-        trajectory, verification = _repaired(optimum, problem, check)
+        trajectory, verification = _repair(optimum, problem, check)
         if verification.keeps_all:
             return trajectory, verification
         if complaint.startswith("no "):
@@ -213,12 +213,12 @@ def _first_that_keeps_all(
     )
 
 
-def _repaired(
+def _repair(
     optimum: LocalOptimum,
     problem: ExcitationProblem,
     check: Callable[[FourierTrajectory], Verification],
 ) -> tuple[FourierTrajectory, Verification]:
-    """Return a motion within narrower and narrower limits, until it keeps the actual ones."""
+    """Return a motion within narrower and narrower limits, until it satisfies the actual ones."""
     share, margins = 1.0, dict.fromkeys(problem.posture.names if problem.posture else (), 0.0)
     coefficients = optimum.coefficients
     for repair in range(_MOST_REPAIRS + 1):
@@ -232,17 +232,17 @@ def _repaired(
         share -= _REPAIR * max(excess, 0.0)
         for name in margins:
             margins[name] += _REPAIR * max(verification.missing(name), 0.0)
-        narrower = tightened(problem, share, margins)
+        narrower = tighten(problem, share, margins)
         local = LocalSearch(narrower)
         coefficients = local.improve(coefficients, optimum.seed, _ITERATIONS).coefficients
     return trajectory, verification
 
 
 def _figure(criterion: str, value: float) -> float:
-    """Return a criterion as people know it."""
+    """Return a criterion in its usual form."""
     return -value if criterion == "D" else float(np.exp(value))
 
 
-def _said(criterion: str, value: float) -> str:
+def _figure_text(criterion: str, value: float) -> str:
     name = "log det" if criterion == "D" else "condition number"
     return f"best {name} {_figure(criterion, value):.6g}"

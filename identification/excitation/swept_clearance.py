@@ -1,8 +1,8 @@
-"""Distances between a robot and what is around it, of all postures of a motion.
+"""Distances between a robot and its environment, for all postures of a motion.
 
-Drake's engine knows the distances at instants. In between, two shapes come nearer no faster than
-the joints between them turn times how far the shapes reach from their axes. Where that leaves room
-for less distance than is asked for, the interval is divided.
+Drake's engine computes the distances at instants. In between, two shapes approach no faster than
+the joints between them turn times the reach of the shapes from their axes. If that does not exclude
+less than the required distance, the interval is divided.
 """
 
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from pfsc_drake.robot.serial.chain import SerialChain
 
 _INSTANTS = 400  # per period, at first
 _SHORTEST = 2e-6  # of a period, intervals that are not divided further
-_ROUNDING = 1.02  # levers are those at instants
+_ROUNDING = 1.02  # levers are evaluated at instants only
 
 
 @dataclass(frozen=True)
 class SweptClearance:
-    """What is known of the distances along a motion.
+    """Distances along a motion.
 
     Attributes:
-        least: Least distance at all instants that were looked at [m].
+        least: Least distance at all evaluated instants [m].
         guaranteed: No distance is less, at any time [m].
-        pair: Names of what is nearest; empty if there is nothing to touch.
-        time: When it is [s].
-        instants: How many were looked at.
+        pair: Names of the nearest shapes; empty without pairs.
+        time: Time of the least distance [s].
+        instants: Number of evaluated instants.
     """
 
     least: float
@@ -49,10 +49,10 @@ def swept_clearance(
 
     Args:
         chain: The robot.
-        scene: The same with its cell for Drake.
+        scene: The robot with its cell in Drake.
         trajectory: Its motion.
-        required: Distance that is asked for [m]; where it is far more, there is no need to know.
-        tolerance: Intervals are divided until no less than so much below is guaranteed [m].
+        required: Required distance [m]; far larger distances are not evaluated exactly.
+        tolerance: Intervals are divided until the guaranteed distance is that close to it [m].
     """
     if not scene.pairs:
         return SweptClearance(np.inf, np.inf, "", 0.0, 0)
@@ -65,14 +65,14 @@ def swept_clearance(
     goal = required - tolerance
     near = np.any(bounds < goal, axis=0)
     guaranteed = float(bounds[:, ~near].min(initial=np.inf))
-    # what is far apart in all intervals is never looked at again
+    # pairs that are far apart in all intervals are never evaluated again
     pairs, weights = np.flatnonzero(near), weights[near]
     left, right, bounds = t[:-1], t[1:], bounds[:, near]
     at_left, at_right = distances[:-1, near], distances[1:, near]
     instants = len(t)
     while pairs.size:
         lowest = bounds.min(axis=1)
-        # nothing is gained where an instant falls short itself, or in parts that short
+        # dividing does not help if an instant itself falls short, or in such short intervals
         known = (lowest >= goal) | (np.minimum(at_left, at_right).min(axis=1) < goal)
         known |= right - left < _SHORTEST * trajectory.period
         guaranteed = min(guaranteed, float(lowest[known].min(initial=np.inf)))
@@ -97,7 +97,7 @@ def _nearest(
     distances: np.ndarray,
     pairs: np.ndarray | None = None,
 ) -> tuple[float, float, str]:
-    """Return the least of some distances [m], when it is [s] and of what."""
+    """Return the least of some distances [m], its time [s] and its pair."""
     row, column = np.unravel_index(np.argmin(distances), distances.shape)
     pair = scene.pairs[int(column) if pairs is None else int(pairs[column])]
     return float(distances[row, column]), float(times[row]), pair.name
@@ -111,31 +111,31 @@ def _between(
     at_right: np.ndarray,
     weights: np.ndarray,
 ) -> np.ndarray:
-    """Return what distances are at least within intervals [m], shape (K, pairs).
+    """Return lower bounds of distances within intervals [m], shape (K, pairs).
 
     Args:
         trajectory: The motion.
-        left: Their beginnings [s], shape (K,).
-        right: Their ends [s], shape (K,).
+        left: Beginnings of the intervals [s], shape (K,).
+        right: Ends of the intervals [s], shape (K,).
         at_left: Distances there [m], shape (K, pairs).
         at_right: Distances there [m], shape (K, pairs).
-        weights: How much each joint can change each distance [m/rad or 1], shape (pairs, N).
+        weights: Influence of each joint on each distance [m/rad or 1], shape (pairs, N).
     """
     length = (right - left)[:, None]
     speeds = [np.abs(trajectory.motion(t)[1]) for t in (left, right)]
     w = 2.0 * np.pi / trajectory.period * np.array(trajectory.harmonics)
     acceleration = np.hypot(trajectory.a, trajectory.b) @ w
     speed = np.maximum(*speeds) + acceleration * length / 2.0
-    # down with one slope from the left, up with the same to the right
+    # falling with one slope from the left, and with the same from the right
     return (at_left + at_right - length * (speed @ weights.T)) / 2.0
 
 
 def _reach_between(chain: SerialChain, scene: RobotScene, q: np.ndarray) -> np.ndarray:
-    """Return how fast pairs of shapes can come nearer per speed of each joint [m or 1].
+    """Return the largest approach of pairs of shapes per speed of each joint [m or 1].
 
     Args:
         chain: The robot, N joints.
-        scene: The same for Drake.
+        scene: Robot and cell in Drake.
         q: Joint positions of the motion, shape (K, N).
 
     Returns:
@@ -147,8 +147,8 @@ def _reach_between(chain: SerialChain, scene: RobotScene, q: np.ndarray) -> np.n
     points = np.concatenate([np.zeros((n, 3)), axes])
     links, none = np.tile(np.arange(n), 2), np.zeros(2 * n)
     on_axes = RobotBalls(chain, links, np.full(2 * n, -1), points, none)
-    places = on_axes.sample(q)
-    origins, directions = places[:, :n], places[:, n:] - places[:, :n]
+    centers = on_axes.sample(q)
+    origins, directions = centers[:, :n], centers[:, n:] - centers[:, :n]
     lever = np.empty((len(balls.radii), n))
     for j, link in enumerate(chain.links):
         arm = balls.sample(q) - origins[:, None, j]

@@ -1,7 +1,7 @@
-"""What can be said against a search before it starts, and whether its motion keeps all limits.
+"""Checks before a search, and verification of the limits of its motion.
 
-Joint limits hold between samples, too: by a bound of the second derivative. Torques are those of
-the model with the sign of the velocities itself. Distances are those of Drake's engine, see
+Joint limits hold between samples, too: by a bound of the second derivative. Torques are computed by
+the model with the exact sign of the velocities. Distances are computed by Drake's engine, see
 :mod:`~identification.excitation.swept_clearance`.
 """
 
@@ -33,14 +33,14 @@ _TAKES_PART = 0.2  # of the largest element of a direction
 
 
 def check_postures(subject: Subject, problem: ExcitationProblem) -> None:
-    """Refuse limits that leave a robot nowhere to be.
+    """Refuse limits without allowed postures.
 
     Args:
         subject: The robot.
         problem: Its problem.
 
     Raises:
-        InputError: If none of many random postures keeps all limits; it names what is hardest.
+        InputError: If none of many random postures is within all limits; it names the hardest one.
     """
     lower, upper = problem.limits.position.T
     random = np.random.default_rng(0)
@@ -56,15 +56,15 @@ def check_postures(subject: Subject, problem: ExcitationProblem) -> None:
     if np.any(table.max(axis=1) <= 0.0):
         return
     hardest = int(np.argmax(np.mean(table > 0.0, axis=0)))
-    kept = 100.0 * float(np.mean(table[:, hardest] <= 0.0))
+    percentage = 100.0 * float(np.mean(table[:, hardest] <= 0.0))
     raise InputError(
         f"{subject.name}: none of {_POSTURES} random postures keeps all limits; hardest to keep is "
-        f"the {names[hardest]}: {kept:.2g} % do, the least excess is {table[:, hardest].min():.3g}"
+        f"the {names[hardest]}: {percentage:.2g} % do, least excess {table[:, hardest].min():.3g}"
     )
 
 
 def check_excited(subject: Subject, problem: ExcitationProblem, base: BaseParameters) -> None:
-    """Refuse harmonics with which random motions do not show all parameters.
+    """Refuse harmonics with which random motions do not excite all parameters.
 
     Args:
         subject: The robot.
@@ -72,7 +72,7 @@ def check_excited(subject: Subject, problem: ExcitationProblem, base: BaseParame
         base: Its base parameters.
 
     Raises:
-        InputError: If some are not shown; it names them.
+        InputError: If some are not excited; it names them.
     """
     t = np.arange(_SAMPLES) * problem.period / _SAMPLES
     bases = fourier_basis(t, problem.period, problem.harmonics)
@@ -95,46 +95,46 @@ def check_excited(subject: Subject, problem: ExcitationProblem, base: BaseParame
     shown = np.abs(direction[order]) > _TAKES_PART * np.abs(direction).max()
     names = ", ".join(base.short_names[i] for i in order[shown])
     raise InputError(
-        f"harmonics = {list(problem.harmonics)}: too few to show all {base.rank} base parameters "
-        f"of {subject.name}; not told apart: {names}; more harmonics are needed"
+        f"harmonics = {list(problem.harmonics)}: too few to excite all {base.rank} base parameters "
+        f"of {subject.name}; not distinguished: {names}; more harmonics are needed"
     )
 
 
 _INSTANTS = 10_000  # per period
-# what counts as the limit, relative to it
+# tolerance at the limit, relative to it
 _ROUNDING = 1e-9
 _UNSURE = 0.002  # m, of distances between instants
 
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """How much of the limits one period of a motion takes.
+    """Shares of the limits that one period of a motion uses.
 
     Attributes:
-        shares: ``position`` (of the way from the middle to a limit), ``velocity``,
+        shares: ``position`` (of the distance from the middle to a limit), ``velocity``,
             ``acceleration``, ``effort``: largest share per joint, 1 being the limit, each (N,).
         margins: Least distances to the other limits by name [m or 1]: heights above the cell's
-            ``tool_above``; of a DELTA robot what its workspace asks for.
-        clearance: Distances to obstacles and between links; None of robots without.
-        asked: Distance that is asked for [m].
-        problems: What is not kept, one sentence each.
+            ``tool_above``; for a DELTA robot the limits of its workspace.
+        clearance: Distances to obstacles and between links; None for robots without.
+        required: Required distance [m].
+        problems: Violated limits, one sentence each.
     """
 
     shares: Mapping[str, np.ndarray]
     margins: Mapping[str, float]
     clearance: SweptClearance | None
-    asked: float
+    required: float
     problems: list[str]
 
     def missing(self, name: str) -> float:
-        """Return by how much a posture limit falls short [m or 1]; distances are one for all."""
+        """Return the violation of a posture limit [m or 1]; distances count as one limit."""
         if name in self.margins:
             return -self.margins[name]
-        return 0.0 if self.clearance is None else self.asked - self.clearance.guaranteed
+        return 0.0 if self.clearance is None else self.required - self.clearance.guaranteed
 
     @property
     def keeps_all(self) -> bool:
-        """Whether all limits are kept."""
+        """Whether all limits are satisfied."""
         return not self.problems
 
 
@@ -146,16 +146,16 @@ def verify(
     cell: Cell,
     scene: RobotScene | None,
 ) -> Verification:
-    """Return how much of the limits a motion takes.
+    """Return the shares of the limits that a motion uses.
 
     Args:
-        regressor: Regressor of the robot; with the sign of the velocities itself in Coulomb
+        regressor: Regressor of the robot, with the exact sign of the velocities in Coulomb
             friction.
-        parameters: Believed ones, for the torques, shape (n,).
+        parameters: Parameters of the nominal model, for the torques, shape (n,).
         limits: Limits of the joints.
         trajectory: The motion.
-        cell: What stands around a serial robot.
-        scene: The same for Drake; None of a robot without shapes.
+        cell: Environment of a serial robot.
+        scene: Robot and cell in Drake; None for a robot without shapes.
     """
     subject = regressor.subject
     t = np.arange(_INSTANTS) * trajectory.period / _INSTANTS
@@ -172,7 +172,7 @@ def verify(
         for j in np.flatnonzero(share > 1.0 + _ROUNDING)
     ]
     margins: dict[str, float] = {}
-    clearance, asked = None, cell.clearance
+    clearance, required = None, cell.clearance
     if subject.delta is not None:
         workspace = delta_posture_limits(subject.delta)
         least = workspace.values(motion[0]).min(axis=0)
@@ -180,21 +180,21 @@ def verify(
     elif scene is not None and subject.chain is not None:
         if np.isfinite(cell.tool_above):
             tips = ends(subject)
-            places = points_of_last_link(subject.chain, list(tips.values())).sample(motion[0])
-            heights = places[..., 2].min(axis=0) - cell.tool_above
+            points = points_of_last_link(subject.chain, list(tips.values())).sample(motion[0])
+            heights = points[..., 2].min(axis=0) - cell.tool_above
             margins = dict(zip(map(height_of, tips), heights.tolist(), strict=True))
-        clearance = swept_clearance(subject.chain, scene, trajectory, asked, _UNSURE)
-        if clearance.least < asked - _ROUNDING or clearance.guaranteed < asked - _UNSURE:
+        clearance = swept_clearance(subject.chain, scene, trajectory, required, _UNSURE)
+        if clearance.least < required - _ROUNDING or clearance.guaranteed < required - _UNSURE:
             problems.append(
                 f"distance of {clearance.pair}: {clearance.least:.4g} m at t = "
-                f"{clearance.time:.4g} s; {asked:g} m are asked for"
+                f"{clearance.time:.4g} s; {required:g} m are required"
             )
     problems += [
         f"{name}: falls short by {-margin:.4g}"
         for name, margin in margins.items()
         if margin < -_ROUNDING
     ]
-    return Verification(shares, margins, clearance, asked, problems)
+    return Verification(shares, margins, clearance, required, problems)
 
 
 def _between_samples(trajectory: FourierTrajectory, step: float) -> np.ndarray:

@@ -1,1 +1,1 @@
-"""What was measured of a robot: records, their files and checks, periods, a simulated robot."""
+"""Measurements of a robot: records, their files and checks, periods, a simulated robot."""

@@ -1,4 +1,4 @@
-"""From named signals with units, whatever file they are from, to a record."""
+"""Records from named signals with units, for any kind of file."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.measurement.record import REQUIRED_SIGNALS, SIGNALS, Record
 from identification.model.subject import Subject
-from pfsc_drake.errors import InputError, in_one_line, shortened, suggestion
+from pfsc_drake.errors import InputError, in_one_line, shorten, suggestion
 
 _TURN = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "rev": 2.0 * np.pi}
 _LENGTH = {"m": 1.0, "mm": 1e-3}
@@ -37,36 +37,36 @@ _OF_SIGNAL = {
 
 
 def si_unit(signal: str, joint_unit: str) -> str:
-    """Return the unit that records have.
+    """Return a signal's unit in records.
 
     Args:
-        signal: One of a record's, or ``t``.
+        signal: Signal of a record, or ``t``.
         joint_unit: ``rad`` or ``m``.
     """
     return "s" if signal == "t" else next(iter(_OF_SIGNAL[signal][joint_unit]))
 
 
 def to_si(signal: str, joint_unit: str, unit: str, scale: float | None, where: str) -> float:
-    """Return what to multiply a signal by to have it in SI units on the joint side.
+    """Return the factor of a signal to SI units on the joint side.
 
     Args:
-        signal: One of a record's, or ``t``.
+        signal: Signal of a record, or ``t``.
         joint_unit: ``rad`` or ``m``.
-        unit: As the file states it.
-        scale: SI units per unit of the file, for one that does not say what it is, as
-            ``counts`` or ``A``; None if not given.
+        unit: Unit in the file.
+        scale: SI units per unit of the file, for a unit without fixed size, such as ``counts`` or
+            ``A``; None for others.
         where: File and name of the signal, for messages.
 
     Raises:
-        InputError: If the unit is not one of the signal's and there is no scale, or if there is
-            one though the unit needs none.
+        InputError: If the unit is not one of the signal's and there is no scale, or if there is one
+            although the unit needs none.
     """
     known: Mapping[str, float] = _TIME if signal == "t" else _OF_SIGNAL[signal][joint_unit]
     if unit in known:
         if scale is not None:
             raise InputError(
                 f"{where}: unit [{unit}] with a scale of {scale:g}; a scale is allowed only for "
-                "units that do not say what they are, as [counts]"
+                "units without fixed size, such as [counts]"
             )
         return known[unit]
     if scale is None:
@@ -87,15 +87,15 @@ _MOST_NAMES = 12
 
 @dataclass(frozen=True)
 class Reading:
-    """What a person says about a file that it does not say itself.
+    """Names and units that a file lacks or spells otherwise.
 
     Signals are named as in :mod:`~identification.measurement.files`: ``q`` for all joints,
     ``q_2`` or ``q_<joint name>`` for one.
 
     Attributes:
-        names: Signal by name in the file, for files that use other names; whatever else
-            is in such a file is left out.
-        units: Unit by signal, for files that state none.
+        names: Signal by name in the file, for files with other names; all other columns of such a
+            file are left out.
+        units: Unit by signal, for files without units.
         scale: SI units per unit of the file by signal, for units like ``counts`` or ``A``.
     """
 
@@ -105,13 +105,13 @@ class Reading:
 
 
 class RawSignal(NamedTuple):
-    """A signal as a file has it.
+    """A signal from a file.
 
     Attributes:
-        name: In the file.
+        name: Name in the file.
         values: Shape (K,), or (K, m) for several joints.
-        units: One for each of its columns; empty where the file states none.
-        joints: Whose they are, by name or number; empty where the file does not say.
+        units: One for each column; empty if the file has none.
+        joints: Joints by name or number; empty if the file has none.
     """
 
     name: str
@@ -121,7 +121,7 @@ class RawSignal(NamedTuple):
 
 
 def parse_name(name: str) -> tuple[str, str] | None:
-    """Return signal and joint, empty for all joints, that a name stands for; None if nothing."""
+    """Return the signal and joint of a name, joint empty for all joints; None if unknown."""
     if name == TIME:
         return TIME, ""
     found = _NAME.fullmatch(name)
@@ -135,18 +135,18 @@ def make_record(
     reading: Reading,
     source: str,
 ) -> Record:
-    """Return the record that signals of a file make.
+    """Return the record of a file's signals.
 
     Args:
-        signals: What is in the file.
-        robot: Whose signals they are.
+        signals: Signals of the file.
+        robot: Robot of the signals.
         period: Period of the motion [s], or None.
-        reading: What the file does not say.
+        reading: Names and units that the file lacks.
         source: Name of the file.
 
     Raises:
-        InputError: If a signal is unknown, missing, there twice, or of another robot, or its
-            unit is not stated or not one of its own.
+        InputError: If a signal is unknown, missing, repeated, or of another robot, or its unit is
+            missing or not one of its own.
     """
     table = _Table(robot, reading, source)
     for signal in signals:
@@ -161,13 +161,13 @@ class _Table:
         self._robot, self._reading, self._source = robot, reading, source
         self._columns: dict[tuple[str, int], np.ndarray] = {}
         self._without_unit: list[tuple[str, int]] = []
-        self._problems: list[str] = []  # as they go on behind the file's name
+        self._problems: list[str] = []  # as continuations of the file's name
         self._unused = {
             option: set(getattr(reading, option)) for option in ("names", "units", "scale")
         }
 
     def add(self, raw: RawSignal) -> None:
-        """Add what is in a signal of the file."""
+        """Add a signal of the file."""
         self._unused["names"].discard(raw.name)
         name = self._reading.names.get(raw.name, raw.name)
         parsed = parse_name(name)
@@ -177,7 +177,7 @@ class _Table:
             joints = range(len(self._robot.joint_names))
             known = [self._label(signal, i) for signal in SIGNALS for i in joints]
             self._problems.append(
-                f": '{shortened(name)}' is unknown; allowed: t, "
+                f": '{shorten(name)}' is unknown; allowed: t, "
                 f"{', '.join(f'{signal}_1' for signal in SIGNALS)} and so on, or names that are "
                 f"said to mean these{suggestion(name, known)}"
             )
@@ -199,7 +199,7 @@ class _Table:
                 self._problems.append(f", {error}")
 
     def _joint(self, raw: RawSignal, name: str, joint: str, column: int, width: int) -> int:
-        """Return whose column it is, from 0."""
+        """Return the joint of a column, from 0."""
         names, n = list(self._robot.joint_names), len(self._robot.joint_names)
         if not joint:
             if raw.joints:
@@ -217,7 +217,7 @@ class _Table:
         if joint.isdecimal() and 1 <= int(joint) <= n:
             return int(joint) - 1
         raise InputError(
-            f"{self._source}: {name} is of joint '{shortened(joint)}'; {self._robot.name} has the "
+            f"{self._source}: {name} is of joint '{shorten(joint)}'; {self._robot.name} has the "
             f"joints 1 to {n}: {', '.join(names[:_MOST_NAMES])}"
         )
 
@@ -225,21 +225,21 @@ class _Table:
         return TIME if signal == TIME else f"{signal}_{index + 1}"
 
     def _option(self, option: str, signal: str, index: int) -> str | float | None:
-        """Return what a person says of a column."""
+        """Return the user's option for a column."""
         values: Mapping[str, str | float] = getattr(self._reading, option)
         own = f"{signal}_{self._robot.joint_names[index]}"
         for key in (self._label(signal, index), own, signal):
-            # q of a joint 'motor_2' is no q_motor of joint 2
+            # q of a joint 'motor_2' is not q_motor of joint 2
             if key in values and (parse_name(key) or ("",))[0] == signal:
                 self._unused[option].discard(key)
                 return values[key]
         return None
 
     def _factor(self, signal: str, index: int, stated: str) -> float:
-        label, given = self._label(signal, index), self._option("units", signal, index)
-        if stated and given and stated != given:
-            raise InputError(f"{label}: the file says [{stated}]; a unit of [{given}] was given")
-        unit = str(given or stated)
+        label, option = self._label(signal, index), self._option("units", signal, index)
+        if stated and option and stated != option:
+            raise InputError(f"{label}: the file says [{stated}]; a unit of [{option}] was given")
+        unit = str(option or stated)
         scale = self._option("scale", signal, index)
         if not unit and scale is None:
             self._without_unit.append((signal, index))
@@ -248,15 +248,15 @@ class _Table:
         return to_si(signal, joint_unit, unit, None if scale is None else float(scale), label)
 
     def _refuse(self, problems: Sequence[str]) -> None:
-        """Refuse all that is wrong in one line, if anything is."""
+        """Refuse all problems in one line, if there are any."""
         if len(problems) == 1:
             raise InputError(f"{self._source}{problems[0]}")
         if problems:
-            told = [problem.lstrip(":, ") for problem in problems]
-            raise InputError(f"{self._source}: {in_one_line(told)}")
+            lines = [problem.lstrip(":, ") for problem in problems]
+            raise InputError(f"{self._source}: {in_one_line(lines)}")
 
     def _unstated(self) -> list[str]:
-        """Return what to say of columns whose unit is known to nobody, all of them together."""
+        """Return the message about columns with unknown units, for all of them together."""
         if self._without_unit:
             labels = ", ".join(self._label(*column) for column in self._without_unit)
             alike = len(set(self._robot.joint_units)) == 1
@@ -307,7 +307,7 @@ class _Table:
 
     def _unused_options(self) -> list[str]:
         return [
-            f": {option} of '{shortened(sorted(keys)[0])}' given, which the file does not have; "
+            f": {option} of '{shorten(sorted(keys)[0])}' given, which the file does not have; "
             "must be of something in it"
             for option, keys in self._unused.items()
             if keys

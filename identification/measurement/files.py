@@ -1,11 +1,11 @@
 """Records as files: CSV, HDF5 and MATLAB's MAT.
 
-All of them hold the time ``t`` and per joint ``q`` and ``tau``, optionally ``v``, ``a``
+All of them contain the time ``t`` and per joint ``q`` and ``tau``, optionally ``v``, ``a``
 and ``q_motor``, with their units:
 
 - CSV: a column for each joint under a line of names and units, ``t [s], q_1 [rad], tau_1
-  [Nm]``; a joint's own name may stand for its number, ``q_elbow [deg]``. The comment ``# period
-  [s] = 10`` states the period.
+  [Nm]``; a joint's own name may replace its number, ``q_elbow [deg]``. The comment ``# period
+  [s] = 10`` contains the period.
 - HDF5: datasets ``t``, ``q`` ... of shape (K, N), or of single joints, with the attributes ``unit``
   (one, or one for each column) and, if there are other columns than N in the robot's order,
   ``labels`` (joints by name or number); attribute ``period`` of the file [s].
@@ -28,9 +28,9 @@ from identification.measurement.record import SIGNALS, Record, check_record
 from identification.measurement.synchronization import check_velocities
 from identification.model.subject import Subject
 from identification.output import write_bytes
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 from pfsc_drake.geometry.files.number_table import read_numbers, read_regular_file, unreadable
-from reporting.hdf5_reading import opened
+from reporting.hdf5_reading import open_hdf5
 
 _HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 _PERIOD = re.compile(r"#\s*period\s*\[s\]\s*=\s*(\S+)\s*")
@@ -52,10 +52,10 @@ def read_record(
     """Read a record and check it.
 
     Args:
-        path: Path of a file as described above; its suffix says of which kind it is.
-        robot: Whose record it is.
+        path: Path of a file as described above; its suffix decides its kind.
+        robot: Robot of the record.
         period: Period of the motion [s], if the file does not state it.
-        reading: What the file says in other words or not at all.
+        reading: Names and units that the file lacks or spells otherwise.
         still: Whether the links may stand still, as those of locked joints do.
 
     Returns:
@@ -63,8 +63,8 @@ def read_record(
         and :func:`~identification.measurement.synchronization.check_velocities`.
 
     Raises:
-        InputError: If the file cannot be read, signals are missing, unknown or without a unit,
-            or the record is not sound.
+        InputError: If the file cannot be read, signals are missing, unknown or without a unit, or
+            the record is not valid.
     """
     readers: dict[str, Callable[[Path], Raw]] = {
         "csv": _read_csv,
@@ -85,18 +85,18 @@ def write_record(path: str | Path, record: Record, robot: Subject) -> None:
     """Write a record with all its signals.
 
     Args:
-        path: Path of the file; its suffix says of which kind it is to be.
+        path: Path of the file; its suffix decides its kind.
         record: The record.
-        robot: Whose it is.
+        robot: Robot of the record.
 
     Raises:
-        InputError: If the suffix is of no known kind, or there can be no such file.
-        WriteError: If the disk takes no more.
+        InputError: If the suffix is of no known kind, or the path is not possible.
+        WriteError: If the disk is full.
     """
     kind = _kind(path)
     signals = {s: getattr(record, s) for s in SIGNALS if getattr(record, s) is not None}
     units = {s: [si_unit(s, unit) for unit in robot.joint_units] for s in signals}
-    file = BytesIO()  # HDF5 has words of its own for a full disk
+    file = BytesIO()  # HDF5 reports a full disk in its own words
     if kind == "csv":
         _write_csv(file, record, signals, units)
     elif kind == "hdf5":
@@ -121,12 +121,12 @@ def _kind(path: str | Path) -> str:
 def _read_csv(path: Path) -> Raw:
     headers: list[tuple[str, str]] = []
 
-    def check_header(place: str, names: list[str]) -> None:
+    def check_header(location: str, names: list[str]) -> None:
         for name in names:
             found = _HEADER.fullmatch(name)
             if found is None:
                 raise InputError(
-                    f"{place}: column '{shortened(name)}'; must be a name and a unit, as "
+                    f"{location}: column '{shorten(name)}'; must be a name and a unit, as "
                     "'q_1 [rad]'"
                 )
             headers.append((found["name"].strip(), (found["unit"] or "").strip()))
@@ -153,12 +153,12 @@ def _number(value: Any, where: str) -> float:
     try:
         return float(np.asarray(value).item())
     except (TypeError, ValueError):
-        raise InputError(f"{where}: {shortened(repr(value))}; must be a number") from None
+        raise InputError(f"{where}: {shorten(repr(value))}; must be a number") from None
 
 
 def _read_hdf5(path: Path) -> Raw:
     read_regular_file(path, "HDF5")
-    with opened(path, "HDF5 file") as content:
+    with open_hdf5(path, "HDF5 file") as content:
         period = content.file.attrs.get("period")
         signals = [
             RawSignal(
@@ -178,7 +178,7 @@ def _read_mat(path: Path) -> Raw:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:
         raise unreadable(path, "MAT", "of MATLAB version 7.3; save it with '-v7'") from None
-    except Exception:  # whatever is in a file that is none
+    except Exception:  # of any kind for other files
         raise unreadable(path, "MAT", "not a MAT file") from None
     units, joints = content.get("units", {}), _words(content.get("joint_names"))
     if not isinstance(units, dict):
@@ -204,7 +204,7 @@ def _numbers(values: Any, where: str) -> np.ndarray:
 
 
 def _words(value: Any) -> list[str]:
-    """Return one word or several as text; none where there is nothing."""
+    """Return one word or several as text; none if there is nothing."""
     if value is None:
         return []
     words = [value] if isinstance(value, str | bytes) else np.asarray(value).ravel().tolist()

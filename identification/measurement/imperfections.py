@@ -1,4 +1,4 @@
-"""What is wrong with a simulated measurement, as it is with a real one."""
+"""Imperfections of a simulated measurement, as in a real one."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from pfsc_drake.yaml.typed import load_file
 
 @dataclass
 class MeasurementFile:
-    """Content of ``models/<robot>/measurement.yaml``: how well a robot is measured.
+    """Content of ``models/<robot>/measurement.yaml``: quality of a robot's measurement.
 
     Attributes:
         torque_noise: ``[N]`` standard deviations of one torque sample [Nm or N].
@@ -39,11 +39,11 @@ class Imperfections:
         position_noise: Standard deviation of white noise on the recorded positions [rad or m],
             beside the increments.
         disturbance: Standard deviation of a coloured torque that acts on the joints beside the
-            drives, as the ripple of gears does, in units of ``torque_noise``.
+            drives, like the ripple of gears, in units of ``torque_noise``.
         disturbance_time: Its correlation time [s] (first-order autoregressive process).
         coulomb_spread: Relative standard deviation of ``f_c`` from run to run, for each joint.
-        viscous_spread: The same of ``f_v``.
-        drift: How friction changes within a run, if it does.
+        viscous_spread: The same for ``f_v``.
+        drift: Change of friction within a run, if any.
 
     Raises:
         InputError: If a value is negative or not finite.
@@ -69,10 +69,10 @@ class Imperfections:
             raise InputError(f"disturbance_time = {self.disturbance_time} s; must be positive")
 
     def realistic(self) -> "Imperfections":
-        """Return the same with what makes parameters scatter from run to run as in Tab. C.3.
+        """Return the imperfections for a spread of parameters between runs as in Tab. C.3.
 
-        A coloured disturbance of 0.2 times the noise, and 2.5 % spread of the Coulomb and 6 % of
-        the viscous friction.
+        They add a coloured disturbance of 0.2 times the noise, and a spread of 2.5 % of the Coulomb
+        and 6 % of the viscous friction.
         """
         return replace(self, disturbance=0.2, coulomb_spread=0.025, viscous_spread=0.06)
 
@@ -80,7 +80,7 @@ class Imperfections:
         """Refuse imperfections of another robot.
 
         Raises:
-            InputError: If they are not of that many joints.
+            InputError: If they have another number of joints.
         """
         for name in ("torque_noise", "encoder_increments"):
             size = getattr(self, name).size
@@ -93,7 +93,7 @@ class Imperfections:
         ``w_k = c w_{k-1} + sqrt(1 - c^2) e_k`` with ``c = exp(-step / disturbance_time)``.
 
         Args:
-            samples: How many.
+            samples: Number of samples.
             step: Sampling time [s].
             random: Random numbers.
         """
@@ -120,13 +120,13 @@ class Imperfections:
 
 
 def shipped_imperfections(robot: str) -> Imperfections:
-    """Return noise and encoders of a shipped robot, without anything else.
+    """Return noise and encoders of a shipped robot, without other imperfections.
 
     Args:
-        robot: Its name.
+        robot: Name of the robot.
 
     Raises:
-        InputError: If none are shipped for a robot of that name.
+        InputError: If there are none for a robot of that name.
     """
     folder = models_directory() / robot
     file = folder / "measurement.yaml"

@@ -1,4 +1,4 @@
-"""Averages over the periods of a motion, and its derivatives without error, Sec. 2.5.2."""
+"""Averages over the periods of a motion, and its exact derivatives, Sec. 2.5.2."""
 
 from dataclasses import dataclass
 
@@ -8,9 +8,9 @@ from identification.measurement.record import Record, check_sampling
 from pfsc_drake.errors import InputError
 
 HARMONICS_KEPT = 20  # f_g = 20 / T_f, Sec. C.2
-_WHOLE = 1e-6  # of a sampling time, by which a period may miss a whole number of them
-_FEWEST_PERIODS = 2  # after those that are skipped, so that they have a spread
-_REPEATS = 0.02  # of the travel, by which periods of the positions may differ
+_WHOLE = 1e-6  # of a sampling time, tolerance of a period as a multiple of it
+_FEWEST_PERIODS = 2  # after the skipped ones, so that they have a spread
+_REPEATS = 0.02  # of the travel, tolerated difference of positions between periods
 _ROUNDING = 1e-9
 
 
@@ -19,15 +19,15 @@ class AveragedMotion:
     """One period of a motion, averaged over P periods, at K instants; N joints.
 
     Attributes:
-        t: From the start of a period [s], shape (K,).
-        q: Positions without what is above the bandwidth [rad or m], shape (K, N).
+        t: Times from the start of a period [s], shape (K,).
+        q: Positions, filtered to the bandwidth [rad or m], shape (K, N).
         v: Their derivatives, shape (K, N).
         a: Their second derivatives, shape (K, N).
         tau: Mean torques, not filtered [Nm or N], shape (K, N).
         torque_variance: Variance of one measured torque, from the spread over the periods,
             shape (N,) [(Nm)^2 or N^2]: the diagonal of the covariance of the torques in (2.80).
-        position_variance: The same of one measured position, shape (N,).
-        tau_periods: The torques that were averaged, shape (P, K, N).
+        position_variance: The same for one measured position, shape (N,).
+        tau_periods: Torques of the single periods, shape (P, K, N).
         period: ``T_f`` [s].
         bandwidth_hz: ``f_g`` [Hz].
         joint_names: N names.
@@ -47,12 +47,12 @@ class AveragedMotion:
 
     @property
     def periods(self) -> int:
-        """Number P of periods that were averaged."""
+        """Number P of averaged periods."""
         return len(self.tau_periods)
 
     @property
     def mean_torque_variance(self) -> np.ndarray:
-        """Variance of ``tau``, P times below that of one measurement, shape (N,)."""
+        """Variance of ``tau``, smaller than the one of a measurement by P, shape (N,)."""
         return self.torque_variance / self.periods
 
 
@@ -64,21 +64,21 @@ def average(
 ) -> AveragedMotion:
     """Average a record over its periods, and differentiate its positions.
 
-    Incomplete periods at the end are left out. The spread over the periods, whose sum of
-    squares has (P - 1) K degrees of freedom, tells the variance of one measurement whatever
+    Incomplete periods at the end are left out. The spread over the periods, whose sum of squares
+    has (P - 1) K degrees of freedom, is an estimate of the variance of one measurement, whatever
     the mean is.
 
     Args:
         record: Signals at an even rate that divides the period.
         period: ``T_f`` [s]; by default the record's.
-        skip: Periods at the start that are left out, in which the motion is still settling.
-        bandwidth_hz: ``f_g``, above which the positions are taken for noise [Hz]; by default
+        skip: Periods at the start to leave out, in which the motion has not settled.
+        bandwidth_hz: ``f_g``, highest frequency of the positions [Hz]; by default
             ``20 / T_f``.
 
     Raises:
-        InputError: If the period is not known or no multiple of the sampling time, fewer than
-            two periods are left, the motion does not repeat itself with this period, or
-            the bandwidth is not between that of the period and half the sampling rate.
+        InputError: If the period is not known or not a multiple of the sampling time, fewer than
+            two periods are left, the motion does not repeat itself with this period, or the
+            bandwidth is not between the period's frequency and half the sampling rate.
     """
     check_sampling(record)
     period, count = _samples_per_period(record, period)
@@ -116,12 +116,12 @@ def differentiate(
     """Return a periodic signal below a bandwidth, and its first two derivatives.
 
     The discrete Fourier transform is multiplied by ``i omega`` and ``-omega^2`` and set to zero
-    above the bandwidth, which is exact for signals that have nothing there, Sec. 2.5.2.
+    above the bandwidth, which is exact for signals without higher frequencies, Sec. 2.5.2.
 
     Args:
         q: One period, evenly sampled, shape (K, N).
         period: ``T_f`` [s].
-        bandwidth_hz: ``f_g``, the highest frequency that is kept [Hz].
+        bandwidth_hz: ``f_g``, highest remaining frequency [Hz].
 
     Returns:
         Three arrays of shape (K, N).
@@ -133,8 +133,8 @@ def differentiate(
     highest = 0.5 * count / period
     if not 1.0 / period * (1.0 - _ROUNDING) <= bandwidth_hz < highest:
         raise InputError(
-            f"bandwidth = {bandwidth_hz:g} Hz; must be from {1.0 / period:g} Hz, that of the "
-            f"period, to below {highest:g} Hz, half the sampling rate"
+            f"bandwidth = {bandwidth_hz:g} Hz; must be from {1.0 / period:g} Hz, the period's, to "
+            f"below {highest:g} Hz, half the sampling rate"
         )
     frequencies = np.arange(count // 2 + 1) / period
     keep = frequencies <= bandwidth_hz * (1.0 + _ROUNDING)
@@ -145,20 +145,20 @@ def differentiate(
 
 
 def _samples_per_period(record: Record, period: float | None) -> tuple[float, int]:
-    given = record.period if period is None else period
-    if given is None:
+    length = record.period if period is None else period
+    if length is None:
         raise InputError(f"{record.source}: the period of the motion is not known; give one in s")
-    if not 0.0 < given < np.inf:
-        raise InputError(f"{record.source}: period = {given} s; must be positive and finite")
-    samples = given / record.sampling_time
+    if not 0.0 < length < np.inf:
+        raise InputError(f"{record.source}: period = {length} s; must be positive and finite")
+    samples = length / record.sampling_time
     count = round(samples)
     # rounding of the times in a file adds up over no more than the record
     if count < 1 or abs(samples - count) > max(_WHOLE * samples, _WHOLE):
         raise InputError(
-            f"{record.source}: period = {given:g} s is {samples:.6g} sampling times of "
+            f"{record.source}: period = {length:g} s is {samples:.6g} sampling times of "
             f"{record.sampling_time:.6g} s; must be a whole number of them"
         )
-    return float(given), count
+    return float(length), count
 
 
 def _check_repetition(record: Record, q: np.ndarray, period: float) -> None:
@@ -185,7 +185,7 @@ _SURE = 5.0  # standard deviations
 
 @dataclass(frozen=True, eq=False)
 class FrictionTrend:
-    """By how much friction grew from the first to the last period that was averaged; N joints.
+    """Change of friction from the first to the last averaged period; N joints.
 
     Attributes:
         coulomb: Change of ``f_c`` [Nm or N], shape (N,).
@@ -209,14 +209,14 @@ class FrictionTrend:
 
 
 def friction_trend(motion: AveragedMotion) -> FrictionTrend:
-    """Return how friction changed from period to period.
+    """Return the change of friction from period to period.
 
-    What differs between the periods of a motion that repeats itself is no inertia and no
-    gravity. The torques of period p are fitted, with the same means for all of them, by::
+    Differences between the periods of a repetitive motion do not come from inertia or gravity. The
+    torques of period p are fitted, with the same means for all of them, by::
 
         tau_p(t) = tau(t) + (p - p_mean) (c sign(v(t)) + d v(t))
 
-    and noise, that is taken for white; a coloured disturbance makes the deviations too small.
+    and noise, which is assumed white; a coloured disturbance makes the deviations too small.
 
     Args:
         motion: P periods, P at least 2.
@@ -234,13 +234,13 @@ def friction_trend(motion: AveragedMotion) -> FrictionTrend:
         shape = np.column_stack([np.sign(v), v])
         normal = shape.T @ shape
         if np.linalg.matrix_rank(shape) < shape.shape[1]:
-            raise InputError(f"{name} does not move to and fro; must, to tell how friction changes")
+            raise InputError(f"{name} must move to and fro to show changes of friction")
         x = np.linalg.solve(normal, shape.T @ slope[:, j]) / weight
         around = motion.tau_periods[..., j] - motion.tau[:, j] - np.outer(steps, shape @ x)
         variance = np.sum(around**2) / ((periods - 1) * count - shape.shape[1])
         covariance = variance / weight * np.linalg.inv(normal)
         found[j], deviations[j] = x, np.sqrt(np.diag(covariance))
-        # without any noise nothing is left to compare with
+        # without any noise there is no reference for the comparison
         distance = x @ normal @ x * weight
         sure[j] = np.sqrt(distance / variance) if variance > 0.0 else (np.inf if x.any() else 0.0)
     found, deviations = (periods - 1) * found, (periods - 1) * deviations

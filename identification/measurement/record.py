@@ -1,4 +1,4 @@
-"""What was measured of a robot while it moved, and whether that is sound."""
+"""Records of a moving robot, and checks of their validity."""
 
 from dataclasses import dataclass
 
@@ -11,16 +11,16 @@ from pfsc_drake.errors import InputError
 SIGNALS = ("q", "tau", "v", "a", "q_motor")
 REQUIRED_SIGNALS = ("q", "tau")
 _FEWEST_SAMPLES = 10
-_JITTER = 0.1  # of the sampling time, by which samples may be off an even grid
+_JITTER = 0.1  # of the sampling time, tolerated deviation of samples from an even grid
 _DEGREES = 180.0 / np.pi
-# by which positions and velocities may be beyond their limits: part of them, plus
+# tolerances of positions and velocities beyond their limits: part of them, plus
 _BEYOND, _SLACK = 0.02, 0.02  # rad or m
-_STRETCH = 0.02  # s, over which difference quotients are compared with velocity limits
+_STRETCH = 0.02  # s, interval of difference quotients for comparison with velocity limits
 # a number beyond its limit by more than this has another unit
 _OTHER_UNIT = 5.0
-_FAR = 3.0  # times the largest limit, from where on another unit is thought of
-_REACHES = 1e-3  # part of a limit by which a clipped torque may miss it
-# samples at the extreme value that make a plateau, and how much longer than the steps next to it;
+_FAR = 3.0  # times the largest limit, from which on another unit is suspected
+_REACHES = 1e-3  # part of a limit, tolerance of a clipped torque
+# samples at the extreme value in a plateau, and its least length compared to the steps next to it;
 # the top of a parabola that is rounded to steps is up to 5 times as long as these
 _PLATEAU, _FLAT = 5, 10.0
 
@@ -38,10 +38,10 @@ class Record:
         v: Velocities, if measured, shape (K, N).
         a: Accelerations, if measured, shape (K, N).
         q_motor: Positions of the motors on the joint side, if measured [rad or m], shape (K, N).
-        source: Where it is from, for messages.
+        source: Source of the record, for messages.
 
     Raises:
-        InputError: If shapes differ, a value is no finite number, time does not increase, or the
+        InputError: If shapes differ, a value is NaN or infinite, time does not increase, or the
             period is not positive.
     """
 
@@ -110,25 +110,25 @@ class Record:
 
     @property
     def duration(self) -> float:
-        """Time that the samples stand for, each one sampling time [s]."""
+        """Duration of all samples, each one sampling time [s]."""
         return self.t.size * self.sampling_time
 
 
 def check_record(record: Record, robot: Subject, still: bool = False) -> None:
-    """Refuse a record that is not sound or cannot be of the robot.
+    """Refuse a record that is not valid or cannot belong to the robot.
 
-    That is: gaps in time, samples that are not evenly spaced, other joints than the robot's,
-    positions and velocities far beyond its limits (and whether degrees or millimetres explain
-    that), signals that are constant, and torques that are clipped. See
+    The checks are: gaps in time, samples that are not evenly spaced, other joints than the robot's,
+    positions and velocities far beyond its limits (with a hint at degrees or millimetres), constant
+    signals, and clipped torques. See
     :mod:`~identification.measurement.synchronization` for signals that do not fit together.
 
     Args:
         record: The record.
-        robot: Whose it is said to be.
+        robot: Expected robot of the record.
         still: Whether the links may stand still, as those of locked joints do.
 
     Raises:
-        InputError: The first that is found, with joint, time and value.
+        InputError: With joint, time and value of the first problem.
     """
     if list(record.joint_names) != list(robot.joint_names):
         raise InputError(
@@ -142,7 +142,7 @@ def check_record(record: Record, robot: Subject, still: bool = False) -> None:
 
 
 def check_sampling(record: Record) -> None:
-    """Refuse gaps in time and samples that are not evenly spaced; says where."""
+    """Refuse gaps in time and samples that are not evenly spaced; names the time."""
     t, steps = record.t, np.diff(record.t)
     usual = float(np.median(steps))
     k = int(np.argmax(steps > 1.5 * usual))
@@ -189,7 +189,7 @@ def _check_positions(record: Record, robot: Subject, still: bool) -> None:
 def _explanation(
     positions: np.ndarray, lower: np.ndarray, upper: np.ndarray, robot: Subject, joint: int
 ) -> str:
-    """Return what may be the matter with positions beyond the limits."""
+    """Return a possible reason for positions beyond the limits."""
     revolute = robot.joint_units[joint] == "rad"
     factor, unit = (_DEGREES, "deg") if revolute else (1e3, "mm")
     alike = np.array([u == robot.joint_units[joint] for u in robot.joint_units])
@@ -255,7 +255,7 @@ def _check_torques(record: Record, robot: Subject) -> None:
                 raise InputError(
                     f"{record.source}: tau of {name} is clipped at {extreme:.5g} {unit}: constant "
                     f"for {length} samples from t = {record.t[begin]:.6g} s; must be the torque "
-                    "that acts (move more slowly, or raise the limit of what records it)"
+                    "that acts (move more slowly, or raise the limit of the recorder)"
                 )
             begin, count = _pile(tau, extreme)
             if count:
@@ -263,12 +263,12 @@ def _check_torques(record: Record, robot: Subject) -> None:
                     f"{record.source}: tau of {name} is clipped at {extreme:.5g} {unit}: there in "
                     f"{count} samples, first at t = {record.t[begin]:.6g} s, and hardly ever just "
                     "below; must be the torque that acts (move more slowly, or raise the limit of "
-                    "what records it)"
+                    "the recorder)"
                 )
 
 
 def _plateau(values: np.ndarray, extreme: float) -> tuple[int, int]:
-    """Return where a signal stays at an extreme value for long, and for how many samples, or 0."""
+    """Return the start of a long plateau at an extreme value, and its number of samples, or 0."""
     begins, lengths = _runs(values)
     at = np.flatnonzero(np.abs(values[begins] - extreme) <= 1e-9 * np.ptp(values))
     longest = at[np.argmax(lengths[at])]
@@ -281,10 +281,10 @@ def _plateau(values: np.ndarray, extreme: float) -> tuple[int, int]:
 
 
 def _pile(values: np.ndarray, extreme: float) -> tuple[int, int]:
-    """Return where a noisy signal first is at an extreme value that it often has, and how often.
+    """Return the first sample of a noisy signal at a frequent extreme value, and their number.
 
-    Clipping after the noise leaves no plateaus, but many samples at the limit. Both are 0 where
-    the values next to it are as frequent, as in signals that are rounded.
+    Clipping after the noise leaves no plateaus, but many samples at the limit. Both are 0 if values
+    next to it are as frequent, as in rounded signals.
     """
     digit = 1e-9 * np.ptp(values)
     levels, counts = np.unique(np.round(np.abs(values - extreme) / digit), return_counts=True)
@@ -295,6 +295,6 @@ def _pile(values: np.ndarray, extreme: float) -> tuple[int, int]:
 
 
 def _runs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where runs of equal values begin and how long they are."""
+    """Return the starts of runs of equal values, and their lengths."""
     begins = np.flatnonzero(np.append(True, np.diff(values) != 0.0))
     return begins, np.diff(np.append(begins, values.size))

@@ -1,4 +1,4 @@
-"""The controller that moves a robot along an excitation: PD with feed-forward, at 1 kHz."""
+"""Controller of a robot along an excitation: PD with feed-forward, at 1 kHz."""
 
 from dataclasses import dataclass
 
@@ -13,30 +13,30 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.serial.rigid_rotors import rigid_mass_matrix, rigid_torque_function
 
-# postures along a motion in which the inertias are looked at
+# postures along a motion for the evaluation of inertias
 _POSTURES = 50
 
 
 @dataclass(frozen=True)
 class Servo:
-    """A position controller for each joint, as robots have it.
+    """A position controller for each joint, as in industrial robots.
 
     ``tau_d = sat(tau_ff + K_p (q_d - q) + K_d (q_d' - q'))`` with ``K_p = J omega^2``,
-    ``K_d = 2 zeta J omega`` for the least inertia J that a drive feels, and the torque ``tau_ff``
-    of a rigid robot and its friction, ``f_c sign(q_d') + f_v q_d'``. The feedback acts at the ticks
-    and is held in between, on the difference quotient of the encoder's positions; the drives
-    carry on ``tau_ff`` between the ticks.
+    ``K_d = 2 zeta J omega`` for the least inertia J at a drive, and the feed-forward torque
+    ``tau_ff`` of a rigid robot with friction, ``f_c sign(q_d') + f_v q_d'``. The feedback acts at
+    the ticks and is held in between, on the difference quotient of the encoder's positions; the
+    drives interpolate ``tau_ff`` between the ticks.
 
-    Friction that is not fed forward holds the robot back at every reversal until the deviation has
+    Without feed-forward of friction the robot sticks at every reversal until the deviation has
     grown by ``2 f_c / K_p``. The motion then has edges, which the bandwidth of
-    :func:`~identification.measurement.periods.average` takes away, and parameters of light
-    joints with much friction are biased.
+    :func:`~identification.measurement.periods.average` removes, and parameters of light joints with
+    much friction are biased.
 
     Attributes:
         bandwidth: ``omega`` [rad/s].
         damping: ``zeta``.
-        feedforward: Weight of the rigid robot's torque: 1 for the robot's own, 0 for none.
-        friction: Weight of the friction's: 1 for what it usually is, 0 for none.
+        feedforward: Weight of the rigid robot's torque: 1 for the full torque, 0 for none.
+        friction: Weight of the friction torque: 1 for its usual value, 0 for none.
         period: Sampling time [s].
 
     Raises:
@@ -72,9 +72,9 @@ class Servo:
 
 
 def drive_inertia(subject: Subject, q: np.ndarray) -> np.ndarray:
-    """Return the least inertia that each drive feels along a motion, shape (N,) [kg m^2 or kg].
+    """Return the least inertia at each drive along a motion, shape (N,) [kg m^2 or kg].
 
-    That is with all other joints free, ``1 / (D^-1)_ii``.
+    It is the inertia with all other joints free, ``1 / (D^-1)_ii``.
 
     Args:
         subject: The robot.
@@ -128,7 +128,7 @@ _APART = 1e-9  # s, least distance of two changes
 def add_samples(
     builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndarray
 ) -> OutputPort:
-    """Return values that hold from their instants on.
+    """Return a source of values that are held from their instants on.
 
     Args:
         builder: Builder of the diagram.
@@ -138,12 +138,12 @@ def add_samples(
     """
     # the last value of such a trajectory only ends it
     ends = np.append(t, 2.0 * t[-1] - t[-2])
-    held = PiecewisePolynomial.ZeroOrderHold(ends, np.vstack([values, values[-1]]).T)
-    return builder.AddNamedSystem(name, TrajectorySource(held)).get_output_port()
+    trajectory = PiecewisePolynomial.ZeroOrderHold(ends, np.vstack([values, values[-1]]).T)
+    return builder.AddNamedSystem(name, TrajectorySource(trajectory)).get_output_port()
 
 
 def add_curves(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndarray) -> OutputPort:
-    """Return values that change smoothly between their instants, by cubic polynomials.
+    """Return a source of values interpolated by cubic polynomials.
 
     Args:
         builder: Builder of the diagram.
@@ -159,7 +159,7 @@ def add_curves(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.nda
 def add_signs(
     builder: DiagramBuilder, name: str, t: np.ndarray, v: np.ndarray, size: np.ndarray
 ) -> OutputPort:
-    """Return ``size sign(v)`` that changes where ``v`` is zero, between the instants.
+    """Return a source of ``size sign(v)`` that changes at the zeros of ``v``, between the instants.
 
     Args:
         builder: Builder of the diagram.
@@ -178,8 +178,8 @@ def add_signs(
     breaks = breaks[far]
     middles = 0.5 * (breaks[1:] + breaks[:-1])
     signs = np.sign([np.interp(middles, t, column) for column in v.T]) * size[:, None]
-    held = PiecewisePolynomial.ZeroOrderHold(breaks, np.hstack([signs, signs[:, -1:]]))
-    return builder.AddNamedSystem(name, TrajectorySource(held)).get_output_port()
+    trajectory = PiecewisePolynomial.ZeroOrderHold(breaks, np.hstack([signs, signs[:, -1:]]))
+    return builder.AddNamedSystem(name, TrajectorySource(trajectory)).get_output_port()
 
 
 def add_sines(
@@ -189,7 +189,7 @@ def add_sines(
     frequency: np.ndarray,
     phase: np.ndarray,
 ) -> OutputPort:
-    """Return sums of sines, ``sum_m A_im sin(w_im t + p_im)``, shape (N,).
+    """Return a source of sums of sines, ``sum_m A_im sin(w_im t + p_im)``, shape (N,).
 
     Args:
         builder: Builder of the diagram.

@@ -1,4 +1,4 @@
-"""The station of the simulated experiment: a robot, its drives and its encoders, in Drake."""
+"""Station of the simulated experiment: a robot, its drives and its encoders, in Drake."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -37,7 +37,7 @@ from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
 _SCHEME = "runge_kutta3"
 
-# what sets the state at the start, of the context of the diagram
+# sets the initial state in the context of the diagram
 SetState = Callable[[Context], None]
 
 
@@ -49,15 +49,15 @@ def simulate_diagram(
     ends: Sequence[float],
     progress: Callable[[float], None],
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Simulate a diagram by steps of the same length, and return times and logged signals.
+    """Simulate a diagram with a fixed step, and return times and logged signals.
 
     Args:
-        diagram: With the log.
-        log: Its log.
-        set_state: Sets the state at the start.
-        step: Of the integration [s].
-        ends: Times after which progress is told, the last one the end [s].
-        progress: Receives the fraction done.
+        diagram: Diagram with the log.
+        log: Log of the diagram.
+        set_state: Sets the initial state.
+        step: Step of the integration [s].
+        ends: Times of the progress reports, the last one the end [s].
+        progress: Receives the completed fraction.
 
     Raises:
         InputError: If the motion cannot be simulated.
@@ -91,14 +91,14 @@ def build_station(
     rigid: np.ndarray,
     random: np.random.Generator,
 ) -> tuple[Diagram, SignalLog, SetState]:
-    """Return the station of one run, its log, and what puts the robot at the start.
+    """Return the station of one run, its log, and a function that sets its initial state.
 
-    The log has at the ticks ``state`` ``[q, v]``, ``q`` as the encoders measure it, ``feedback``
-    that acts until the next tick, and ``feed_forward`` at the tick [Nm or N].
+    At the ticks the log has ``state`` ``[q, v]``, ``q`` as measured by the encoders, ``feedback``
+    until the next tick, and ``feed_forward`` at the tick [Nm or N].
 
     Args:
-        subject: The robot; the servo feeds forward its usual friction.
-        run: What it is to do.
+        subject: The robot; the servo uses its usual friction for the feed-forward.
+        run: The run.
         faults: Encoders, disturbance and drift of the friction.
         servo: The controller.
         friction: ``f_c`` and ``f_v`` of this run, each (N,).
@@ -119,14 +119,14 @@ def build_station(
     feedback = control.get_output_port_control()
     hold = builder.AddNamedSystem("hold", ZeroOrderHold(servo.period, n))
     builder.Connect(feedback, hold.get_input_port())
-    assert subject.coulomb is not None and subject.viscous is not None  # as the servo has them
+    assert subject.coulomb is not None and subject.viscous is not None  # for the servo
     usual = subject.coulomb, subject.viscous
     known = add_feed_forward(builder, servo, t, v, rigid, usual)
-    wanted = add_sum(builder, "drive_torque", hold.get_output_port(), known)
+    torque_sum = add_sum(builder, "drive_torque", hold.get_output_port(), known)
     limits = builder.AddNamedSystem(
         "drive_limits", Saturation(-subject.effort_limit, subject.effort_limit)
     )
-    builder.Connect(wanted, limits.get_input_port())
+    builder.Connect(torque_sum, limits.get_input_port())
     builder.Connect(limits.get_output_port(), plant.GetInputPort("actuation"))
     resistance = add_friction(builder, friction, inertia, servo.period, state, faults.drift)
     if faults.disturbance > 0.0:
@@ -160,7 +160,7 @@ def add_feed_forward(
     rigid: np.ndarray,
     friction: tuple[np.ndarray, np.ndarray],
 ) -> OutputPort:
-    """Return what a servo feeds forward, shape (N,).
+    """Return the feed-forward torque of a servo, shape (N,).
 
     Args:
         builder: Builder of the diagram.
@@ -168,7 +168,7 @@ def add_feed_forward(
         t: Ticks [s], shape (K,).
         v: Reference velocities, shape (K, N).
         rigid: Torques of the robot without friction [Nm or N], shape (K, N).
-        friction: ``f_c`` and ``f_v`` as the servo believes them, each (N,).
+        friction: Nominal ``f_c`` and ``f_v`` of the servo, each (N,).
     """
     coulomb, viscous = friction
     smooth = servo.feedforward * rigid + servo.friction * viscous * v
@@ -194,7 +194,7 @@ def _add_encoders(
     servo: Servo,
     state: OutputPort,
 ) -> OutputPort:
-    """Return positions and velocities as the servo measures them, shape (2N,)."""
+    """Return positions and velocities measured by the servo, shape (2N,)."""
     n = subject.dimension
     size = 2 * n
     names = tuple(subject.robot.names)
@@ -222,10 +222,10 @@ def add_friction(
     Args:
         builder: Builder of the diagram.
         friction: ``f_c`` and ``f_v``, each (N,).
-        inertia: What friction brakes [kg m^2 or kg], shape (N,).
-        step: Of the integration [s].
-        state: ``[q, v]`` of what friction brakes, shape (2N,).
-        drift: How friction changes, if it does.
+        inertia: Inertia that friction acts on [kg m^2 or kg], shape (N,).
+        step: Step of the integration [s].
+        state: ``[q, v]`` of that inertia, shape (2N,).
+        drift: Change of friction, if any.
     """
     n = inertia.size
     stiffest = friction[0] * (1.0 if drift is None else max(1.0, drift.factor))

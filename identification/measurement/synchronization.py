@@ -1,4 +1,4 @@
-"""Whether signals of a record were sampled at the same instants."""
+"""Synchronization of a record's signals."""
 
 from dataclasses import dataclass
 
@@ -9,24 +9,24 @@ from identification.measurement.periods import AveragedMotion
 from identification.measurement.record import Record
 from pfsc_drake.errors import InputError
 
-LONGEST_LAG = 0.1  # s, up to which lags are looked for
+LONGEST_LAG = 0.1  # s, range of the search for lags
 TOLERATED = 2.0  # sampling times
 _SURE = 3.0  # standard deviations
 _RANK = 1e-10
 # of a joint's largest velocity, below which its torques do not count, and not fully up to twice
 _SLOW = 0.1
-_NEAR = 6  # samples on either side of the best lag, that tell how sure it is
-_ENOUGH = 20_000  # samples that tell the lag of a measured velocity
-_SCALE = 0.1  # by which a measured velocity may differ from the derivative of the position
+_NEAR = 6  # samples on either side of the best lag, for its standard deviation
+_ENOUGH = 20_000  # samples for the lag of a measured velocity
+_SCALE = 0.1  # tolerated difference of a measured velocity from the derivative of the position
 
 
 @dataclass(frozen=True)
 class Lag:
-    """By how much one signal comes later than another.
+    """Lag of one signal behind another.
 
     Attributes:
-        time: Positive if it is late [s].
-        standard_deviation: Standard deviation of that [s].
+        time: Lag [s], positive if it is late.
+        standard_deviation: Standard deviation of the lag [s].
     """
 
     time: float
@@ -38,13 +38,12 @@ class Lag:
 
 
 def torque_lag(motion: AveragedMotion, regressor: np.ndarray) -> Lag:
-    """Return how late the torques are, as the lag with which a model explains them best.
+    """Return the lag of the torques with which a model explains them best.
 
-    For each lag the parameters of the model are estimated anew, so that none have to be known:
-    with an orthonormal basis of the weighted regressor's columns the residual is what the
-    circular correlation of the basis with the torques leaves over. Samples at which a joint
-    is slow do not count: a joint that sticks before it reverses has torques that are late
-    by themselves.
+    For each lag the parameters of the model are estimated again, so that none need to be known:
+    with an orthonormal basis of the weighted regressor's columns the residual follows from the
+    circular correlation of the basis with the torques. Samples with a slow joint do not count: a
+    joint that sticks before it reverses has late torques without any lag.
 
     Args:
         motion: One period.
@@ -52,7 +51,7 @@ def torque_lag(motion: AveragedMotion, regressor: np.ndarray) -> Lag:
             shape (K, N, n).
 
     Raises:
-        InputError: If the regressor is not of this motion.
+        InputError: If the regressor belongs to another motion.
     """
     count, joints = motion.tau.shape
     if regressor.shape[:2] != (count, joints):
@@ -83,7 +82,7 @@ def torque_lag(motion: AveragedMotion, regressor: np.ndarray) -> Lag:
 
 
 def _weight(motion: AveragedMotion) -> np.ndarray:
-    """Return what each torque counts, shape (K, N)."""
+    """Return the weight of each torque, shape (K, N)."""
     speed = np.abs(motion.v)
     share = speed / np.maximum(speed.max(axis=0), np.finfo(float).tiny)
     deviation = np.sqrt(motion.mean_torque_variance)
@@ -93,14 +92,14 @@ def _weight(motion: AveragedMotion) -> np.ndarray:
 
 
 def check_torque_lag(motion: AveragedMotion, regressor: np.ndarray) -> Lag:
-    """Refuse torques that lag the motion, or lead it.
+    """Refuse torques that are late or early compared to the motion.
 
     Args:
         motion: One period.
-        regressor: ``Y(q, v, a)`` along the motion, with friction, as :func:`torque_lag` takes it.
+        regressor: ``Y(q, v, a)`` along the motion, with friction, as for :func:`torque_lag`.
 
     Returns:
-        The lag that was found and is tolerated.
+        The tolerated lag.
 
     Raises:
         InputError: If they are off by more than two sampling times, with certainty.
@@ -117,13 +116,13 @@ def check_torque_lag(motion: AveragedMotion, regressor: np.ndarray) -> Lag:
 
 
 def check_velocities(record: Record) -> None:
-    """Refuse measured velocities that are not those of the positions: late, scaled or turned.
+    """Refuse velocities that differ from the positions' derivative: late, scaled or reversed.
 
     Args:
-        record: With velocities, or nothing is checked.
+        record: Record; without velocities nothing is checked.
 
     Raises:
-        InputError: With joint and lag, above two sampling times, or factor.
+        InputError: With joint and lag above two sampling times, or factor.
     """
     if record.v is None:
         return
@@ -143,7 +142,7 @@ def check_velocities(record: Record) -> None:
             raise InputError(
                 f"{record.source}: v of {name} {_late(lag)} the derivative of q by "
                 f"{abs(lag) * 1e3:.3g} ms; allowed: {allowed * 1e3:.3g} ms (leave v out, or shift "
-                "what is late)"
+                "the late signal)"
             )
 
 
@@ -159,7 +158,7 @@ def _basis(matrix: np.ndarray) -> np.ndarray:
 
 
 def _delay(first: np.ndarray, second: np.ndarray, step: float) -> tuple[float, float]:
-    """Return how late the second signal is [s], and its factor at that lag."""
+    """Return the lag of the second signal [s], and its factor at that lag."""
     reach = min(max(2, round(LONGEST_LAG / step)), first.size // 4)
     middle = slice(reach, first.size - reach)
     window = np.lib.stride_tricks.sliding_window_view(first, first.size - 2 * reach)

@@ -1,1 +1,1 @@
-"""What the torques depend on: parameters, regressor, base parameters."""
+"""Parameters, regressor and base parameters of a robot's torques."""

@@ -1,4 +1,4 @@
-"""Base parameters found with numbers: what of the parameters the torques depend on (2.74)."""
+"""Numerical base parameters: combinations of parameters that the torques depend on (2.74)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,17 +9,17 @@ from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
 # least part of a column outside the span of others for it to be independent of them: models are
-# written to six digits, and what is below makes no torque that could be measured
+# written with six digits, and smaller parts have no measurable torque
 _INDEPENDENT = 3e-5
-# of the largest column of the same kind of parameter; below, it is zero but for such rounding
+# of the largest column of the same kind of parameter; below, it is zero up to such rounding
 _ZERO = 3e-5
-# relative error of a coefficient that is a whole number or zero
+# relative error of a coefficient that is an integer or zero
 _ROUNDING = 1e-9
-# postures that the columns are compared in, per parameter
+# postures for the comparison of columns, per parameter
 _SAMPLES_PER_PARAMETER = 4
-# slides without limits move that far [m], turning joints half a turn to both sides
+# slides without limits move that far [m], revolute joints half a turn to both sides
 _STROKE = 1.0
-# of the parameters, those of a group are kept before those of the next: what Mayeda et al. keep
+# priority of the parameters as base parameters, by groups, as in Mayeda et al.
 _PREFERENCE = (
     ("Izz", "mx", "my", "Ixx", "Ixy", "Ixz", "Iyz", "m_q", "m_y"),
     ("I_M", "f_c", "f_v"),
@@ -34,7 +34,7 @@ class BaseParameters:
     ``Y rho = Y_b rho_b`` with ``rho_b = K_b rho`` and the columns ``Y_b = Y[:, indices]``.
 
     Attributes:
-        indices: Indices of the columns that are kept, shape (n_b,).
+        indices: Indices of the base parameters among all, shape (n_b,).
         projection: ``K_b``, shape (n_b, n); has ones at ``indices``.
         full_names: Names of the n parameters.
         full_units: Units of the n parameters.
@@ -52,17 +52,17 @@ class BaseParameters:
 
     @property
     def names(self) -> list[str]:
-        """What each is a combination of, ``link_2.Izz + 0.3481 link_3.m + ...``."""
+        """Combination of each base parameter, ``link_2.Izz + 0.3481 link_3.m + ...``."""
         return [combination(row, self.full_names, first=i) for row, i in self._rows()]
 
     @property
     def short_names(self) -> list[str]:
-        """The names of the parameters that lead the combinations."""
+        """Leading parameter of each combination."""
         return [self.full_names[i] for i in self.indices]
 
     @property
     def units(self) -> list[str]:
-        """Of the base parameters."""
+        """Units of the base parameters."""
         return [self.full_units[i] for i in self.indices]
 
     def values(self, parameters: np.ndarray) -> np.ndarray:
@@ -88,9 +88,9 @@ class BaseParameters:
 def base_parameters(regressor: Regressor, seed: int = 0) -> BaseParameters:
     """Return base parameters of a robot, from the regression matrices of random motions.
 
-    Columns that depend on others are told by orthogonalization, and their parameters are added to
+    Columns that depend on others are found by orthogonalization, and their parameters are added to
     those that they depend on. Moments of inertia about the joint axis, first moments across and
-    friction are kept rather than masses, so that the combinations look like (B.4).
+    friction are preferred to masses, so that the combinations resemble (B.4).
 
     Args:
         regressor: Regressor of the robot.
@@ -102,21 +102,21 @@ def base_parameters(regressor: Regressor, seed: int = 0) -> BaseParameters:
     X = regressor.matrix(*random_motion(regressor, seed)).reshape(-1, regressor.size)
     X[:, _without_effect(X, regressor.names)] = 0.0
     order = sorted(range(regressor.size), key=lambda i: _preference(regressor.names[i]))
-    kept = np.sort(_independent(X, order))
-    if kept.size == 0:
+    independent = np.sort(_independent(X, order))
+    if independent.size == 0:
         raise InputError(f"{regressor.subject.name}: no parameter has an effect on the torques")
-    projection = np.linalg.lstsq(X[:, kept], X, rcond=None)[0]
+    projection = np.linalg.lstsq(X[:, independent], X, rcond=None)[0]
     norms = np.linalg.norm(X, axis=0)
-    share = np.abs(projection) * norms[kept, None]
-    # what is below the error of the combination is none of it
-    error = np.linalg.norm(X - X[:, kept] @ projection, axis=0)
+    share = np.abs(projection) * norms[independent, None]
+    # coefficients below the error of the combination are zero
+    error = np.linalg.norm(X - X[:, independent] @ projection, axis=0)
     projection[share <= np.maximum(_ROUNDING * norms, error)] = 0.0
-    projection[:, kept] = np.eye(kept.size)
-    return BaseParameters(kept, projection, list(regressor.names), list(regressor.units))
+    projection[:, independent] = np.eye(independent.size)
+    return BaseParameters(independent, projection, list(regressor.names), list(regressor.units))
 
 
 def random_motion(regressor: Regressor, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return positions, velocities and accelerations that have nothing to do with each other.
+    """Return independent random positions, velocities and accelerations.
 
     Args:
         regressor: Regressor of the robot.
@@ -124,7 +124,7 @@ def random_motion(regressor: Regressor, seed: int = 0) -> tuple[np.ndarray, np.n
 
     Returns:
         Arrays (K, N) with enough rows for all parameters, of the order of 1 in rad (m) and s.
-        Positions are within the limits of a joint where it has some.
+        Positions are within the limits of a joint if it has some.
     """
     subject, random = regressor.subject, np.random.default_rng(seed)
     stroke = np.where(np.array(subject.joint_units) == "rad", np.pi, _STROKE)
@@ -140,7 +140,7 @@ def combination(row: np.ndarray, names: Sequence[str], first: int | None = None)
     Args:
         row: Coefficients, shape (n,).
         names: Names of the n parameters.
-        first: The one that is to lead; by default the first with a coefficient.
+        first: Leading parameter; by default the first with a coefficient.
     """
     used = np.flatnonzero(row).tolist()
     if first is not None:
@@ -155,7 +155,7 @@ def combination(row: np.ndarray, names: Sequence[str], first: int | None = None)
 
 
 def _without_effect(X: np.ndarray, names: Sequence[str]) -> np.ndarray:
-    """Return which columns are zero beside those of the same kind of parameter, shape (n,)."""
+    """Return a flag for columns that are zero compared to those of the same kind, shape (n,)."""
     norms, kinds = np.linalg.norm(X, axis=0), np.array([name.split(".")[1] for name in names])
     largest = {kind: norms[kinds == kind].max() for kind in np.unique(kinds)}
     return norms <= _ZERO * np.array([largest[kind] for kind in kinds])
@@ -170,14 +170,14 @@ def _independent(X: np.ndarray, order: Sequence[int]) -> np.ndarray:
     """Return the indices of columns that do not depend on those before them in an order."""
     norms = np.linalg.norm(X, axis=0)
     directions = np.empty((0, X.shape[0]))
-    kept = []
+    independent = []
     for i in order:
         if norms[i] == 0.0:
             continue
         rest = X[:, i] / norms[i]
-        for _ in range(2):  # once more, against the rounding of the first time
+        for _ in range(2):  # twice, against rounding
             rest = rest - directions.T @ (directions @ rest)
         if (length := np.linalg.norm(rest)) > _INDEPENDENT:
-            kept.append(i)
+            independent.append(i)
             directions = np.vstack([directions, rest / length])
-    return np.array(kept, dtype=int)
+    return np.array(independent, dtype=int)

@@ -1,4 +1,4 @@
-"""Dynamic parameters of a robot: their order, names, units and true values.
+"""Dynamic parameters of a robot: order, names, units and simulated values.
 
 A serial robot with N joints has, in this order,
 
@@ -6,12 +6,12 @@ A serial robot with N joints has, in this order,
   :class:`~pfsc_drake.robot.serial.links.ChainLink`, about its origin:
   ``m`` [kg], ``mx my mz`` [kg m] (mass times centre of mass), ``Ixx Ixy Ixz Iyy Iyz Izz`` [kg m^2],
   the entries of the inertia matrix;
-- the rotor inertia ``I_M`` of every joint at the motor side [kg m^2]; at the joint side where the
+- the rotor inertia ``I_M`` of every joint at the motor side [kg m^2]; at the joint side if the
   gear ratio is unknown (1);
 - Coulomb and viscous friction ``f_c``, ``f_v`` of every joint at the joint side (2.41).
 
-A link holds the masses and the inertias of the rotors that it carries, at rest (Sec. 2.4.6). A
-DELTA robot has ``m_q1 m_q2 m_q3 m_y`` [kg] of Sec. 2.4.5 instead of the first two groups.
+A link includes the masses and the inertias of its rotors at rest (Sec. 2.4.6). A DELTA robot has
+``m_q1 m_q2 m_q3 m_y`` [kg] of Sec. 2.4.5 instead of the first two groups.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from pfsc_drake.robot.delta.delta_parameters import NUM_ARMS
 
 LINK_PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _LINK_UNITS = ["kg"] + ["kg m"] * 3 + ["kg m^2"] * 6
-# where the rows and columns of the inertia matrix stand among them
+# rows and columns of the inertia matrix among them
 _ROWS, _COLUMNS = [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]
 PER_LINK = len(LINK_PARAMETERS)
 
@@ -56,7 +56,7 @@ def parameter_units(subject: Subject, friction: bool = True) -> list[str]:
         units = ["kg"] * (NUM_ARMS + 1)
     else:
         units = _LINK_UNITS * n
-        # a slide whose drive is not known as a rotor has a mass there
+        # a slide whose drive is not modelled as a rotor has a mass there
         units += [
             "kg" if unit == "m" and ratio == 1.0 else "kg m^2"
             for unit, ratio in zip(subject.joint_units, subject.gear_ratio, strict=True)
@@ -68,7 +68,7 @@ def parameter_units(subject: Subject, friction: bool = True) -> list[str]:
 
 
 def true_parameters(subject: Subject, friction: bool = True) -> np.ndarray:
-    """Return the parameters as the robot's model has them.
+    """Return the parameters of the robot's model.
 
     Args:
         subject: The robot.
@@ -103,7 +103,7 @@ def link_parameters(mass: float, p_LC: np.ndarray, I_L: np.ndarray) -> np.ndarra
     """Return the ten parameters of a link, shape (10,).
 
     Args:
-        mass: [kg].
+        mass: Mass [kg].
         p_LC: Centre of mass in the link frame [m], shape (3,).
         I_L: Inertia about the origin of the link frame [kg m^2], shape (3, 3).
     """
@@ -114,7 +114,7 @@ def from_moments(mass: float, moment: np.ndarray, inertia: np.ndarray) -> np.nda
     """Return the ten parameters of a link, shape (10,); the inverse of :func:`link_moments`.
 
     Args:
-        mass: [kg].
+        mass: Mass [kg].
         moment: Mass times centre of mass in the link frame [kg m], shape (3,).
         inertia: About the origin of the link frame [kg m^2], shape (3, 3).
     """
@@ -125,14 +125,14 @@ def link_moments(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]
     """Return mass [kg], first moment [kg m] (3,) and inertia about the origin [kg m^2] (3, 3).
 
     Args:
-        parameters: The ten of one link, shape (10,).
+        parameters: The ten parameters of a link, shape (10,).
     """
     inertia = np.zeros((3, 3))
     inertia[_ROWS, _COLUMNS] = inertia[_COLUMNS, _ROWS] = parameters[4:]
     return float(parameters[0]), np.array(parameters[1:4]), inertia
 
 
-def moved(parameters: np.ndarray, R: np.ndarray, p: np.ndarray) -> np.ndarray:
+def transform_parameters(parameters: np.ndarray, R: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Return the ten parameters of a body about another frame, shape (10,).
 
     Args:

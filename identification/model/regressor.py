@@ -1,4 +1,4 @@
-"""The regression matrix Y of (2.73): torques that are linear in the dynamic parameters."""
+"""Regression matrix Y of (2.73): torques that are linear in the dynamic parameters."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +18,7 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.newton_euler import LinkMotion, link_motions
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount, rotor_momentum
 
-# samples that are evaluated at once
+# samples that are evaluated together
 _BATCH = 500
 
 
@@ -34,10 +34,10 @@ class Regressor:
     Attributes:
         subject: The robot.
         friction: Whether friction is among the parameters.
-        coupling: Whether spinning rotors and turning links act on each other (2.62); takes effect
-            where ``subject.mounts`` says how the rotors sit.
-        sign_width: Velocity [rad/s or m/s] within which the sign of the velocity in Coulomb's
-            friction passes smoothly, as ``tanh(v / sign_width)``; 0 for the sign itself.
+        coupling: Whether spinning rotors and turning links are coupled (2.62); takes effect if
+            ``subject.mounts`` is known.
+        sign_width: Velocity [rad/s or m/s] within which the sign of the velocity in Coulomb
+            friction is smooth, as ``tanh(v / sign_width)``; 0 for the sign itself.
         names: Names of the parameters.
         units: Units of the parameters.
         function: ``Y(q, v, a)``, CasADi function of three vectors (N,), SX inside, to (N, n).
@@ -100,7 +100,7 @@ class Regressor:
                 argument[: stop - start] = values[start:stop]
                 argument[stop - start :] = values[start]
             self._batch.evaluate()
-            # the matrices stand by columns, one after the other
+            # the matrices are stored by columns, one after the other
             result = self._batch.results["Y"].reshape(_BATCH, self.size, n)
             Y[start:stop] = result[: stop - start]
         return Y.transpose(0, 2, 1)
@@ -177,12 +177,12 @@ def rotor_columns(
 ) -> ca.SX:
     """Return the columns of the rotors' inertias at the motor side, shape (N, N).
 
-    Lagrange's equations for what rotor j adds to the kinetic energy (2.62) when joints are stiff,
+    From Lagrange's equations for the kinetic energy of rotor j (2.62) with stiff joints,
     ``I_M,j (n_j^2 v_j^2 / 2 + n_j v_j e_j . omega)`` with ``n_j = 1 / k_r,j``.
 
     Args:
         chain: The robot.
-        mounts: Where the rotors sit; None without coupling.
+        mounts: Mounts of the rotors; None without coupling.
         gear_ratio: n, shape (N,).
         q: Joint coordinates, symbols of shape (N, 1).
         v: Their velocities, symbols of shape (N, 1).
@@ -208,8 +208,7 @@ def friction_columns(v: ca.SX, sign_width: float = 0.0) -> ca.SX:
 
     Args:
         v: Joint velocities, shape (N, 1).
-        sign_width: Velocity [rad/s or m/s] within which the sign passes smoothly; 0 for the
-            sign itself.
+        sign_width: Velocity [rad/s or m/s] within which the sign is smooth; 0 for the sign itself.
     """
     n = v.numel()
     sign = ca.tanh(v / sign_width) if sign_width > 0.0 else ca.sign(v)
@@ -233,9 +232,9 @@ def delta_columns(robot: DeltaRobot, q: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:
     """
     motion = rod_motion(robot.parameters.geometry, _jets(q, v, a))
     acceleration = motion.y_t.differentiate().differentiate()
-    carried = motion.slide_forces(acceleration - robot.gravity)
+    forces = motion.slide_forces(acceleration - robot.gravity)
     slides = a + ca.DM(robot.parameters.geometry.rails @ robot.gravity)
-    return ca.horzcat(ca.diag(slides), ca.vertcat(*[force.coefficients[0] for force in carried]))
+    return ca.horzcat(ca.diag(slides), ca.vertcat(*[force.coefficients[0] for force in forces]))
 
 
 def _jets(q: ca.SX, v: ca.SX, a: ca.SX) -> list[Jet]:

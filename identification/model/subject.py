@@ -1,9 +1,9 @@
 """The robot under test.
 
-Angles of a model that were rounded when it was written, as 1.5708 for a right angle, are found:
-axes that are parallel or at right angles but for 4e-6 rad have another set of base parameters than
-those of the robot. Gravity then acts about an upright axis, and some more are seen, by 4e-6 of what
-others do; their estimates are noise of any size.
+Rounded angles of a model file, such as 1.5708 for a right angle, are detected: axes that are
+parallel or perpendicular up to 4e-6 rad have another set of base parameters than those of the
+robot. Gravity then acts about a vertical axis, and additional parameters become visible at 4e-6 of
+the effect of others; their estimates are noise of any size.
 """
 
 from dataclasses import dataclass, replace
@@ -27,24 +27,24 @@ from pfsc_drake.robot.serial.rotor_coupling import RotorMount, mounts_from_param
 from pfsc_drake.yaml.reading import read_yaml
 from pfsc_drake.yaml.typed import load_typed
 
-# what angles of a robot's design are multiples of
+# angles of a robot's design are multiples of this
 STEP_DEG = 15.0
-# how far off such a multiple an angle is taken for rounded [rad]
+# largest deviation of a rounded angle from such a multiple [rad]
 TOLERANCE = 1e-4
-# of a rotation matrix, by which it is off without having been rounded
+# deviation of a rotation matrix that is no rounding of an angle
 _EXACT = 1e-12
 
 
 def with_round_angles(chain: SerialChain) -> tuple[SerialChain, str]:
     """Return a chain with joints turned by multiples of 15 degrees where they nearly are.
 
-    Roll, pitch and yaw of a joint's frame in the one before count, each by itself.
+    Roll, pitch and yaw of a joint's frame in the previous one are rounded separately.
 
     Args:
-        chain: As the model file has it.
+        chain: Chain of the model file.
 
     Returns:
-        The chain, and what was changed in one line; empty if nothing was.
+        The chain, and its changes in one line; empty if there are none.
     """
     links, changed, most = [], [], 0.0
     for link in chain.links:
@@ -59,13 +59,13 @@ def with_round_angles(chain: SerialChain) -> tuple[SerialChain, str]:
         return chain, ""
     note = (
         f"the model's angles at {', '.join(changed)} are up to {most:.2g} rad off multiples of "
-        f"{STEP_DEG:g} deg; taken for rounded, and put right"
+        f"{STEP_DEG:g} deg; treated as rounded, and corrected"
     )
     return replace(chain, links=tuple(links)), note
 
 
 def round_rotation(R: np.ndarray) -> np.ndarray:
-    """Return a rotation with roll, pitch and yaw on multiples of 15 degrees that they are near.
+    """Return a rotation whose roll, pitch and yaw are rounded to multiples of 15 degrees if close.
 
     Args:
         R: Shape (3, 3).
@@ -87,7 +87,7 @@ _YAML = (".yaml", ".yml")
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A robot with N joints whose parameters are to be found.
+    """A robot with N joints whose parameters are identified.
 
     Exactly one of ``chain`` and ``delta`` is not None.
 
@@ -95,23 +95,24 @@ class Subject:
         name: Name of the robot.
         chain: A serial robot.
         delta: A DELTA robot.
-        mounts: Where the rotors of a serial robot sit, N of them; None if unknown.
+        mounts: Mounts of the N rotors of a serial robot; None if unknown.
         gear_ratio: Turns of the rotors per turn of the joints (rad per m for slides), shape (N,);
-            1 where unknown.
-        position_limits: Lower and upper ones [rad or m], shape (N, 2); infinite if unknown.
-        velocity_limit: [rad/s or m/s], shape (N,); infinite if unknown.
-        acceleration_limit: [rad/s^2 or m/s^2], shape (N,); infinite if unknown.
+            1 if unknown.
+        position_limits: Lower and upper limits [rad or m], shape (N, 2); infinite if unknown.
+        velocity_limit: Largest velocities [rad/s or m/s], shape (N,); infinite if unknown.
+        acceleration_limit: Largest accelerations [rad/s^2 or m/s^2], shape (N,); infinite if
+            unknown.
         effort_limit: Largest torques of the drives at the joint side [Nm or N], shape (N,);
             infinite if unknown.
-        joint_names: As in the model.
+        joint_names: Names as in the model.
         joint_units: ``rad`` or ``m`` of each.
-        coulomb: True Coulomb friction [Nm or N], shape (N,); None if unknown.
-        viscous: True viscous friction [Nm s/rad or N s/m], shape (N,); None if unknown.
-        parameters: The file that the model of a serial robot was written from; None if unknown.
-        block: Which model a serial robot was read from, as scenarios say it; None for others.
-        folder: Where relative file names in ``block`` start.
+        coulomb: Simulated Coulomb friction [Nm or N], shape (N,); None if unknown.
+        viscous: Simulated viscous friction [Nm s/rad or N s/m], shape (N,); None if unknown.
+        parameters: Parameter file of a serial robot's model; None if unknown.
+        block: Model of a serial robot, as in scenarios; None for others.
+        folder: Base folder of relative file names in ``block``.
         tool: Whether the tool of the parameter file belongs to the last link.
-        note: What of the model was taken otherwise than its file says, one line; empty if nothing.
+        note: Corrections of the model file, one line; empty if there are none.
     """
 
     name: str
@@ -135,7 +136,7 @@ class Subject:
 
     @property
     def robot(self) -> RobotModel:
-        """The robot, whichever kind it is."""
+        """The robot model, of either kind."""
         robot = self.delta if self.chain is None else self.chain
         assert robot is not None
         return robot
@@ -147,7 +148,7 @@ class Subject:
 
     @property
     def family(self) -> str:
-        """Name under which data of the robot are shipped, whichever of its models this is."""
+        """Name under which data of the robot are shipped, for all of its models."""
         return self.name if self.parameters is None else self.parameters.name
 
 
@@ -156,12 +157,11 @@ def load_subject(robot: str | Path, tool: bool = False) -> Subject:
 
     Args:
         robot: Name of a shipped model (``comau_racer_1_4``, ``festo_expt_45``,
-            ``franka_emika_panda``), an SDF, URDF or MJCF file, the parameter file of a DELTA
-            robot, or a scenario, whose ``robot:`` block counts. Of a bare model file all links up
-            to the frame ``tool_point`` are taken, or up to the last body where there is no such
-            frame.
-        tool: Whether the tool that the robot's parameter file names stays on the last link. It is
-            no part of the robot of Tab. C.3. Robots without such a file keep what they carry.
+            ``franka_emika_panda``), an SDF, URDF or MJCF file, the parameter file of a DELTA robot,
+                or a scenario, whose ``robot:`` block is used. From a bare model file all links up
+                to the frame ``tool_point`` are used, or up to the last body without such a frame.
+        tool: Whether the tool in the robot's parameter file stays on the last link. It is not part
+            of the robot of Tab. C.3. Robots without such a file keep their tools.
 
     Raises:
         InputError: If there is no such robot, its model cannot be read, or is no chain of joints.
@@ -243,11 +243,11 @@ def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> S
 
 
 def tool_frame_of(plant: MultibodyPlant, block: RobotBlock) -> Frame:
-    """Return the frame that a block names, of a model without it that of the last body.
+    """Return the frame that a block names, or the frame of the last body.
 
     Args:
         plant: Plant with the robot.
-        block: Which robot.
+        block: Block of the robot.
     """
     if block.tool_frame == RobotBlock().tool_frame and not plant.HasFrameNamed(block.tool_frame):
         return plant.get_body(BodyIndex(plant.num_bodies() - 1)).body_frame()
@@ -255,7 +255,7 @@ def tool_frame_of(plant: MultibodyPlant, block: RobotBlock) -> Frame:
 
 
 def _parameter_file(model: Path) -> ArmParameters | None:
-    """Return the parameters that a model was written from, which lie next to it."""
+    """Return the parameters of a model from the file beside it."""
     file = model.with_name("parameters.yaml")
     if model.suffix.lower() != ".sdf" or not file.is_file():
         return None
@@ -267,30 +267,32 @@ def _parameter_file(model: Path) -> ArmParameters | None:
 def _mounts(chain: SerialChain, parameters: ArmParameters | None) -> list[RotorMount] | None:
     if parameters is None or not parameters.rotors.fixed_to_link:
         return None
-    # where the base stands is the scenario's business and has no effect on rotors
+    # the pose of the base belongs to the scenario and has no effect on rotors
     upright = (replace(chain.links[0], R_PF=np.eye(3)), *chain.links[1:])
     return mounts_from_parameters(replace(chain, links=upright), parameters)
 
 
 def without_tool(chain: SerialChain, parameters: ArmParameters) -> SerialChain:
-    """Return a chain whose last link has lost the tool.
+    """Return a chain without the tool on its last link.
 
     Args:
-        chain: The robot with the tool; its tool point is that of the parameters.
+        chain: The robot with the tool; its tool point is the one in the parameters.
         parameters: Parameters of the robot and its tool.
     """
     tool = parameters.tool
     p_LB = chain.p_LT - chain.R_LT @ tool.tool_point
-    bare = _taken_off(chain.links[-1], tool, chain.R_LT, p_LB)
-    return replace(chain, links=(*chain.links[:-1], bare))
+    last_link = _remove_body(chain.links[-1], tool, chain.R_LT, p_LB)
+    return replace(chain, links=(*chain.links[:-1], last_link))
 
 
-def _taken_off(link: ChainLink, body: BodyParameters, R_LB: np.ndarray, p: np.ndarray) -> ChainLink:
-    """Return a link without one of the bodies that it is made of, whose frame is at R_LB, p."""
+def _remove_body(
+    link: ChainLink, body: BodyParameters, R_LB: np.ndarray, p: np.ndarray
+) -> ChainLink:
+    """Return a link without one of its bodies, whose frame is at R_LB, p."""
     p_LC = p + R_LB @ body.center_of_mass
     I_C = R_LB @ body.inertia_matrix() @ R_LB.T
     other = replace(link, mass=body.mass, p_LC=p_LC, I_C=I_C)
-    # moments of mass of order 0, 1, 2 about the link's origin add up
+    # moments of mass of order 0, 1, 2 about the link's origin are additive
     mass = link.mass - body.mass
     center = (link.mass * link.p_LC - body.mass * p_LC) / mass
     about_origin = link.inertia_about_origin - other.inertia_about_origin

@@ -1,4 +1,4 @@
-"""Pictures of an identification."""
+"""Figures of an identification."""
 
 from collections.abc import Sequence
 
@@ -30,12 +30,12 @@ _LINE = 0.19  # height of a parameter's line [inches]
 def excitation_figure(
     t: np.ndarray, q: np.ndarray, limits: np.ndarray, units: Sequence[str]
 ) -> Figure:
-    """Return the motion that was measured.
+    """Return the figure of the measured motion.
 
     Args:
         t: Times [s], shape (K,).
         q: Positions [rad or m], shape (K, N).
-        limits: Lower and upper ones, shape (N, 2); infinite if unknown.
+        limits: Lower and upper limits, shape (N, 2); infinite if unknown.
         units: ``rad`` or ``m`` of each joint.
     """
     with plt.rc_context(STYLE):
@@ -56,14 +56,14 @@ def fit_figure(
     title: str,
     caption: str,
 ) -> Figure:
-    """Return measured and predicted torques and what is left, as in Fig. C.2.
+    """Return the figure of measured, predicted and residual torques, as in Fig. C.2.
 
     Args:
         t: Times [s], shape (K,).
-        torques: Measured and predicted ones of that motion [Nm or N], each (K, N).
+        torques: Measured and predicted torques of that motion [Nm or N], each (K, N).
         units: ``Nm`` or ``N`` of each joint.
-        title: A few words.
-        caption: What to see in it.
+        title: Title.
+        caption: Explanation.
     """
     measured, predicted = torques
     with plt.rc_context(STYLE):
@@ -83,36 +83,36 @@ def fit_figure(
 def parameter_figure(
     runs: Repetitions, truth: np.ndarray | None, consistent: ConsistentParameters | None
 ) -> Figure:
-    """Return how well each parameter is known, and by how much it misses.
+    """Return the figure of the parameters' uncertainties and errors.
 
     Args:
         runs: Runs of the same excitation.
-        truth: True base parameters, shape (n_b,), or None.
+        truth: Ground truth of the base parameters, shape (n_b,), or None.
         consistent: The nearest consistent set, or None.
     """
     first = runs.estimates[0]
-    names, place = first.short_names, np.arange(first.base.rank)[::-1]
+    names, rows = first.short_names, np.arange(first.base.rank)[::-1]
     sigma = runs.predicted_standard_deviation
     relative = 100.0 * sigma / np.abs(runs.mean)
     with plt.rc_context(STYLE):
         canvas = Canvas(figsize=(1.15 * WIDTH, _LINE * len(names) + 1.4))
         left, right = canvas.subplots(1, 2, sharey=True)
         badly = relative > 100.0 * BADLY
-        left.barh(place[~badly], relative[~badly], color=COLOURS[0], label="predicted")
+        left.barh(rows[~badly], relative[~badly], color=COLOURS[0], label="predicted")
         if badly.any():
-            left.barh(place[badly], relative[badly], color=COLOURS[4], label="badly identifiable")
+            left.barh(rows[badly], relative[badly], color=COLOURS[4], label="badly identifiable")
         if len(runs.estimates) > 1:
             spread = 100.0 * runs.standard_deviation / np.abs(runs.mean)
-            left.plot(spread, place, "o", color=COLOURS[1], markersize=3.5, label="of the runs")
+            left.plot(spread, rows, "o", color=COLOURS[1], markersize=3.5, label="of the runs")
         left.set(xscale="log", xlabel="standard deviation in % of the value")
-        left.set_yticks(place, names, fontsize=7)
+        left.set_yticks(rows, names, fontsize=7)
         left.set_ylim(-1, len(names))
         right.axvspan(-2.0, 2.0, color="#E5E7EB")
         right.axvline(0.0, color=REFERENCE, linewidth=0.8)
         for run in runs.estimates:
             about = runs.mean if truth is None else truth
             right.plot(
-                (run.base_parameters - about) / sigma, place, ".", color=COLOURS[0], markersize=4
+                (run.base_parameters - about) / sigma, rows, ".", color=COLOURS[0], markersize=4
             )
         right.plot([], [], ".", color=COLOURS[0], label="runs")
         if consistent is not None:
@@ -123,7 +123,7 @@ def parameter_figure(
             deviation = own / sigma[: len(own)]
             right.plot(
                 deviation,
-                place[: len(own)],
+                rows[: len(own)],
                 "D",
                 color=COLOURS[2],
                 markersize=3.5,
@@ -139,14 +139,14 @@ def parameter_figure(
             frameon=False,
         )
         caption = (
-            "Left: how well the torques tell each base parameter. Right: by how much the runs "
-            "and the consistent model miss; two standard deviations are shaded."
+            "Left: standard deviations of the base parameters. Right: errors of the runs and of "
+            "the consistent model; two standard deviations are shaded."
         )
         return render(Drawing("parameters", "Parameters", caption, canvas))
 
 
 def whiteness_figure(test: Whiteness) -> Figure:
-    """Return the autocorrelation of the residuals.
+    """Return the figure of the autocorrelation of the residuals.
 
     Args:
         test: Test of the residuals.
@@ -165,10 +165,10 @@ def whiteness_figure(test: Whiteness) -> Figure:
 
 
 def weakness_figure(estimate: Estimate) -> Figure:
-    """Return the singular values of the weighted regressor with columns of length 1.
+    """Return the figure of the singular values of the weighted, normalized regressor.
 
     Args:
-        estimate: Whose regressor.
+        estimate: Estimate with the regressor.
     """
     values = estimate.factors.values
     with plt.rc_context(STYLE):
@@ -176,5 +176,5 @@ def weakness_figure(estimate: Estimate) -> Figure:
         panel = canvas.subplots()
         panel.bar(np.arange(1, len(values) + 1), values, color=COLOURS[0])
         panel.set(yscale="log", xlabel="direction", ylabel="singular value")
-        caption = "Directions of the parameters by how much the torques depend on them."
+        caption = "Directions of the parameters by their effect on the torques."
         return render(Drawing("directions", "Singular values of the excitation", caption, canvas))

@@ -1,4 +1,4 @@
-"""One page about the identification of a robot."""
+"""Page of an identification of a robot."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,19 +33,19 @@ from reporting.style import Figure
 
 @dataclass(frozen=True, eq=False)
 class PageContent:
-    """What a page about an identification tells.
+    """Content of the page of an identification.
 
     Attributes:
         subject: The robot.
-        findings: What was estimated.
-        other_t: Times of the motion that was predicted [s], shape (K,).
+        findings: Results of the estimation.
+        other_t: Times of the predicted motion [s], shape (K,).
         consistent: The consistent set, if there is one.
-        recording: Page with the robot's motion, beside the page, if there is one.
-        warnings: One sentence each.
-        metrics: Further ones.
-        figures: Further ones, at the end.
-        tables: Further ones, at the beginning.
-        attributes: What identifies the run.
+        recording: Page with the robot's motion, beside this page, if there is one.
+        warnings: Warnings, one sentence each.
+        metrics: Further metrics.
+        figures: Further figures, at the end.
+        tables: Further tables, at the beginning.
+        attributes: Provenance of the identification.
     """
 
     subject: Subject
@@ -65,7 +65,7 @@ def write_page(results: ResultsFolder, content: PageContent) -> Report:
 
     Args:
         results: Folder for them.
-        content: What they tell.
+        content: Content of the page.
     """
     metrics = summary(content)
     results.write("metrics.json", metrics.to_json())
@@ -85,10 +85,10 @@ def write_page(results: ResultsFolder, content: PageContent) -> Report:
 
 
 def summary(content: PageContent) -> Metrics:
-    """Return the figures of an identification.
+    """Return the metrics of an identification.
 
     Args:
-        content: What there is to tell.
+        content: Content of the page.
     """
     findings, metrics = content.findings, Metrics()
     estimate, runs = findings.estimate, findings.runs
@@ -107,9 +107,7 @@ def summary(content: PageContent) -> Metrics:
     )
     if len(runs.estimates) > 1:
         test = runs.spread_test(friction=False)
-        metrics.add(
-            "spread_ratio", test.median_ratio, "1", source="of the runs, to what is predicted"
-        )
+        metrics.add("spread_ratio", test.median_ratio, "1", source="of the runs, to the prediction")
         metrics.add("spread_p_value", test.p_value, "1")
     truth = findings.truth_test
     if truth is not None:
@@ -120,7 +118,7 @@ def summary(content: PageContent) -> Metrics:
             source=f"{truth.degrees_of_freedom} expected",
         )
         metrics.add(
-            "truth_p_value", truth.p_value, "1", "> 0.01", "errors are those that are predicted"
+            "truth_p_value", truth.p_value, "1", "> 0.01", "errors agree with their covariance"
         )
     if findings.prediction is not None:
         explained = float(findings.prediction.explained.min())
@@ -159,12 +157,12 @@ def _figures(content: PageContent) -> list[Figure]:
     fit = (estimate.system.torques, estimate.prediction)
     figures = [
         excitation_figure(t, motion.q, subject.position_limits, subject.joint_units),
-        fit_figure(t, fit, units, "Torques that the model is from", "Means of the periods."),
+        fit_figure(t, fit, units, "Torques of the estimate", "Means of the periods."),
     ]
     if findings.prediction is not None and content.other_t is not None:
         torques = (findings.prediction.measured, findings.prediction.predicted)
-        caption = "Means of the periods of a motion that the model does not know."
-        title = "Torques of a motion that was not used"
+        caption = "Means of the periods of a motion that was not used to estimate."
+        title = "Torques of another motion"
         figures.append(fit_figure(content.other_t, torques, units, title, caption))
     figures.append(parameter_figure(findings.runs, findings.truth, content.consistent))
     test = whiteness(estimate.residuals, estimate.system.used, estimate.joint_names)

@@ -16,8 +16,8 @@ def parameter_table(findings: Findings, words: bool = True) -> Table:
     """Return Tab. C.3: each base parameter with its standard deviations.
 
     Args:
-        findings: What was estimated.
-        words: Whether to say what each is a combination of, or only what leads it.
+        findings: Results of the estimation.
+        words: Whether to print the combination of each parameter, or only its leading parameter.
     """
     runs, base = findings.runs, findings.estimate.base
     scale = 100.0 / np.abs(runs.mean)
@@ -35,11 +35,11 @@ def parameter_table(findings: Findings, words: bool = True) -> Table:
         "Mean of the runs; standard deviation of one run in % of it, of the runs and predicted."
     )
     head = ["", "parameter", "mean", "unit", "of the runs in %", "predicted in %", "true"]
-    return _known("Base parameters", caption, head, rows)
+    return _drop_empty_columns("Base parameters", caption, head, rows)
 
 
 def torque_table(findings: Findings) -> Table:
-    """Return Tab. C.4: what the model leaves of the torques, beside their noise."""
+    """Return Tab. C.4: residual torques of the model, beside their noise."""
     runs, used = findings.runs, findings.prediction
     unknown = np.full(len(findings.estimate.joint_names), np.nan)
     columns = zip(
@@ -62,27 +62,29 @@ def torque_table(findings: Findings) -> Table:
         "explained in %",
     ]
     caption = (
-        "Root mean squares of single measured torques: noise, and error of the model on the motion "
-        "that it is from and on one that was not used; share of the torques' variance that it "
+        "Root mean squares of single measured torques: noise, and error of the model on its own "
+        "motion and on one that was not used; share of the torques' variance that it "
         "explains."
     )
-    return _known("Torques", caption, head, [list(row) for row in columns])
+    return _drop_empty_columns("Torques", caption, head, [list(row) for row in columns])
 
 
-def _known(
+def _drop_empty_columns(
     title: str, caption: str, head: Sequence[str], rows: Sequence[Sequence[str | float]]
 ) -> Table:
-    """Return a table without the columns of which nothing is known."""
-    kept = [
+    """Return a table without its empty columns."""
+    columns = [
         k
         for k in range(len(head))
         if any(isinstance(row[k], str) or not math.isnan(float(row[k])) for row in rows)
     ]
-    return Table(title, caption, [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
+    return Table(
+        title, caption, [head[k] for k in columns], [[row[k] for k in columns] for row in rows]
+    )
 
 
 def weakness_table(estimate: Estimate) -> Table:
-    """Return what is badly identifiable, and why."""
+    """Return the table of badly identifiable parameters with reasons."""
     rows: list[list[str | float]] = [
         [weak.name, 100.0 * weak.relative_deviation, weak.reason]
         for weak in estimate.weak_parameters()
@@ -92,7 +94,7 @@ def weakness_table(estimate: Estimate) -> Table:
 
 
 def friction_table(choice: FrictionChoice, joints: Sequence[str]) -> Table:
-    """Return the friction terms that were tried."""
+    """Return the table of the tested friction terms."""
     rows: list[list[str | float]] = [
         [
             joints[judged.term.joint],
@@ -105,15 +107,15 @@ def friction_table(choice: FrictionChoice, joints: Sequence[str]) -> Table:
         for judged in choice.judgements
     ]
     caption = (
-        "By how much terms beside Coulomb and viscous friction lower the error of a motion that "
-        f"was not used; chosen above a significance of {choice.threshold:.2f}."
+        "Reduction of the error of a motion that was not used by terms beside Coulomb and viscous "
+        f"friction; chosen above a significance of {choice.threshold:.2f}."
     )
     head = ["joint", "term", "width", "share in %", "significance", ""]
     return Table("Friction", caption, head, rows)
 
 
 def consistent_table(found: ConsistentParameters, units: Sequence[str]) -> Table:
-    """Return all parameters of the consistent set."""
+    """Return the table of all parameters of the consistent set."""
     rows: list[list[str | float]] = [
         [name, value, unit]
         for name, value, unit in zip(found.names, found.parameters.tolist(), units, strict=True)

@@ -1,4 +1,4 @@
-"""What a component is: ports, states, and expressions of what it puts out and remembers."""
+"""Blocks: ports, states, and expressions of outputs and state updates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 
 @dataclass(frozen=True)
 class Port:
-    """A vector that goes into a block or comes out of it.
+    """A vector input or output of a block.
 
     Attributes:
         size: Number of elements.
-        unit: Their unit, or units, for people and for ``interface.json``.
-        optional: Whether optional: of an input: whether it need not be connected.
+        unit: Unit, or units, for readers and for ``interface.json``.
+        optional: Whether an input need not be connected.
     """
 
     size: int
@@ -26,15 +26,15 @@ class Values(SimpleNamespace):
 
 
 class Block:
-    """A sampled component: what it puts out, and what it remembers until the next tick.
+    """A sampled component with inputs, outputs and discrete states.
 
-    Three methods say all of it. They are written in CasADi operations and called with symbols once,
-    when the block is compiled; called with numbers (``casadi.DM``) they calculate. So there is no
-    ``if`` on a value, no loop that ends on one, and nothing is kept on ``self`` from tick to tick.
+    Three methods define it. They are written in CasADi operations and called with symbols once,
+    when the block is compiled; with numbers (``casadi.DM``) they evaluate. Therefore they contain
+    no ``if`` on a value and no loop that ends on one, and store nothing on ``self`` between ticks.
     Cases are written with :mod:`pfsc_drake.blocks.cases`.
 
-    A derived class sets its ports and states when it is made, and says in its docstring what it
-    does: the law, the ports with shapes and units, the states, where the formulas come from::
+    A derived class sets its ports and states in its constructor. Its docstring specifies the law,
+    the ports with shapes and units, the states, and the source of the formulas::
 
         class LowPass(Block):
             def __init__(self, size: int, rate: float, period: float) -> None:
@@ -52,17 +52,17 @@ class Block:
             def update(self, x, u, y, t):
                 return {"filtered": x.filtered + self._share * (u.value - x.filtered)}
 
-    What an output depends on is found in its expression: ``filtered`` above is no direct
-    feedthrough, and a loop of such outputs is none.
+    Direct feedthrough is found from the expressions: ``filtered`` above has none, and a loop of
+    such outputs is not algebraic.
 
     Attributes:
         inputs: Ports by name.
         outputs: Ports by name.
-        states: Sizes of what is remembered, by name.
-        inner: Sizes of what :meth:`output` finds beside the outputs and returns for :meth:`update`,
-            so that nothing is evaluated twice, by name.
-        expands: Whether the methods' functions may be written out as scalars, which makes them
-            faster. Not for a block whose rare cases are skipped (``short_circuit``).
+        states: Sizes of the states, by name.
+        inner: Sizes of intermediate values, by name, that :meth:`output` returns beside the outputs
+            for :meth:`update`, so that nothing is evaluated twice.
+        expands: Whether the methods' functions may be expanded into scalars, which makes them
+            faster. False for a block whose rare cases are skipped (``short_circuit``).
     """
 
     expands: ClassVar[bool] = True
@@ -72,7 +72,7 @@ class Block:
     inner: Mapping[str, int] = MappingProxyType({})
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero.
+        """Return the states at the start; states left out are zero.
 
         Args:
             u: Inputs at the start.
@@ -92,12 +92,12 @@ class Block:
         raise NotImplementedError
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays.
+        """Return the states at the next tick; states left out stay the same.
 
         Args:
             x: States.
             u: Inputs; None if an optional one is not connected.
-            y: Outputs at this tick, and what is :attr:`inner`.
+            y: Outputs and inner values (:attr:`inner`) at this tick.
             t: Number of the present tick.
         """
         del x, u, y, t

@@ -15,7 +15,7 @@ def stages_of(program: Program, update_stage: int | None) -> list[Stage]:
 
     Args:
         program: The program.
-        update_stage: Which one; none if omitted.
+        update_stage: Number of that stage; no update if omitted.
     """
     stages = list(program.stages)
     if update_stage is not None:
@@ -28,12 +28,12 @@ class BoundProgram:
 
     Args:
         program: The program.
-        update_stage: The stage that is evaluated with the update, if one is.
+        update_stage: Number of the stage that is evaluated with the update, if any.
 
     Attributes:
         program: The same.
-        x, t, preset, u, made: Arguments of the functions: states, tick, which states are set,
-            inputs by name, results of stages.
+        x, t, preset, u, stage_results: Arguments of the functions: states, tick, flags of states
+            that were set, inputs by name, results of stages.
     """
 
     def __init__(self, program: Program, update_stage: int | None) -> None:
@@ -41,33 +41,33 @@ class BoundProgram:
         self.x, self.t = np.zeros(program.size), np.zeros(1)
         self.preset = np.zeros(len(program.states))
         self.u = {name: np.zeros(port.size) for name, port in program.network.inputs.items()}
-        self.made = [np.zeros(stage.function.numel_out(0)) for stage in program.stages]
+        self.stage_results = [np.zeros(stage.function.numel_out(0)) for stage in program.stages]
         arrays = {"x": self.x, "t": self.t, "preset": self.preset} | self.u
-        arrays |= {f"stage_{k}": values for k, values in enumerate(self.made)}
+        arrays |= {f"stage_{k}": values for k, values in enumerate(self.stage_results)}
         self._arrays = arrays
         self._stages = stages_of(program, update_stage)
         self._bound_stages: dict[int, BoundFunction] = {}
 
     def stage(self, k: int) -> tuple[Stage, BoundFunction]:
-        """Return a stage with its function; what nobody evaluates is never compiled.
+        """Return a stage with its function, compiled at the first call.
 
         Args:
             k: Its number.
         """
         if k not in self._bound_stages:
-            self._bound_stages[k] = self._bound(self._stages[k].function)
+            self._bound_stages[k] = self._bind(self._stages[k].function)
         return self._stages[k], self._bound_stages[k]
 
     @functools.cached_property
     def initial(self) -> BoundFunction:
-        """What is remembered at the start; evaluated too rarely to be compiled."""
-        return self._bound(self.program.initial, False)
+        """States at the start; evaluated too rarely to be compiled."""
+        return self._bind(self.program.initial, False)
 
     @functools.cached_property
     def update(self) -> BoundFunction:
-        """What is remembered at the next tick, where no stage evaluates it."""
-        return self._bound(self.program.update)
+        """States at the next tick, if no stage evaluates them."""
+        return self._bind(self.program.update)
 
-    def _bound(self, function: ca.Function, often: bool = True) -> BoundFunction:
+    def _bind(self, function: ca.Function, often: bool = True) -> BoundFunction:
         arrays = {name: self._arrays[name] for name in function.name_in()}
         return BoundFunction(function, often, **arrays)

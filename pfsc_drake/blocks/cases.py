@@ -1,7 +1,7 @@
 """Cases of a law as expressions, which read like the dissertation's braces.
 
-All branches are evaluated, and one is selected: what the others are, NaN or infinite, does not
-matter. Conditions are 1 or 0. A comparison with NaN is 0, so write it such that 0 is the safe side.
+All branches are evaluated, and one is selected; NaN or infinite values of the others do not matter.
+Conditions are 1 or 0. A comparison with NaN is 0, so write it such that 0 is the safe side.
 """
 
 from collections.abc import Mapping
@@ -34,12 +34,12 @@ def first_of(*cases: tuple[Any, Any], otherwise: Any) -> Any:
     return reduce(lambda rest, case: where(case[0], case[1], rest), reversed(cases), otherwise)
 
 
-def latched(before: Any, now: Any) -> Any:
-    """Return the value before if it is not zero, else the one of now: the first one stays.
+def latch(before: Any, now: Any) -> Any:
+    """Return the value before if it is not zero, else the present one: the first nonzero one stays.
 
     Args:
         before: Last result, shape (k,).
-        now: What is found now, shape (k,).
+        now: Present value, shape (k,).
     """
     return where(before, before, now)
 
@@ -74,7 +74,7 @@ def is_finite(x: Any) -> Any:
 def all_finite(*parts: Any) -> Any:
     """Return whether all entries are finite numbers, shape (1,).
 
-    A sum is finite only if all its terms are; that of finite numbers is, if it does not overflow.
+    The sum of the entries is tested: it is finite only if all its terms are, unless it overflows.
 
     Args:
         parts: Each of any shape.
@@ -83,7 +83,7 @@ def all_finite(*parts: Any) -> Any:
 
 
 def least(values: Any, counts: Any) -> Any:
-    """Return the number of the least of those values that count, -1 if none does.
+    """Return the index of the least of the values that count, -1 if none does.
 
     Args:
         values: Shape (k,); NaN does not count.
@@ -97,21 +97,21 @@ def least(values: Any, counts: Any) -> Any:
 
 
 def unit(which: Any, size: int) -> Any:
-    """Return 1 at a place, and 0 elsewhere, shape (size,).
+    """Return 1 at an index, and 0 elsewhere, shape (size,).
 
     Args:
-        which: Number of the place; if there is none such, all is 0.
+        which: The index; if it is out of range, all entries are 0.
         size: k.
     """
     return ca.vertcat(*[which == i for i in range(size)])
 
 
-def kept_if_finite(after: Mapping[str, Any], before: Any) -> tuple[dict[str, Any], Any]:
-    """Return what is remembered of a sample, and whether that is the sample, shape (1,).
+def hold_if_not_finite(after: Mapping[str, Any], before: Any) -> tuple[dict[str, Any], Any]:
+    """Return updated states, or the present ones if not all are finite, and which, shape (1,).
 
     Args:
-        after: What would be remembered, by name.
-        before: What is remembered now, as attributes; it stays if a number is not finite.
+        after: Updated states, by name.
+        before: Present states, as attributes.
     """
     good = all_finite(*after.values())
     return {name: where(good, value, getattr(before, name)) for name, value in after.items()}, good

@@ -1,7 +1,7 @@
 """Linear algebra of small dense matrices as expressions, without loops that depend on values.
 
-All functions take and return expressions of scalars (``casadi.SX``). Nothing is raised: what
-cannot be computed comes out as NaN, or with a reciprocal condition number of 0.
+All functions take and return expressions of scalars (``casadi.SX``). Nothing is raised: a result
+that does not exist is NaN, or has a reciprocal condition number of 0.
 """
 
 import itertools
@@ -64,7 +64,7 @@ def householder(M: ca.SX) -> tuple[ca.SX, ca.SX]:
         pivot = -ca.copysign(norm, x[0])
         v = ca.SX(x)
         v[0] -= pivot
-        # |v|^2 / 2, of which nothing is left where nothing is to be reflected
+        # |v|^2 / 2, zero if nothing is to be reflected
         square = norm * (norm + ca.fabs(x[0]))
         w = where(square > 0.0, v / square, 0.0)
         R[k:, k:] -= v @ (w.T @ R[k:, k:])
@@ -110,7 +110,7 @@ def symmetric_eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
     for p, q in _SWEEPS * list(itertools.combinations(range(n), 2)):
         x, gap = A[p, q], A[q, q] - A[p, p]
         longer = gap + ca.copysign(ca.sqrt(gap**2 + 4.0 * x**2), gap)
-        # also what is so small that its square is zero
+        # also values so small that their square is zero
         t = where(longer == 0.0, 0.0, 2.0 * x / longer)
         c = 1.0 / ca.sqrt(1.0 + t**2)
         for i in set(range(n)) - {p, q}:
@@ -125,9 +125,9 @@ def solve_upper(U: ca.SX, B: ca.SX, *, transposed: bool = False) -> ca.SX:
     """Return ``U^-1 B`` or ``U'^-1 B`` of an upper triangular U by substitution.
 
     Args:
-        U: Shape (n, n); only what is on and above its diagonal counts.
+        U: Shape (n, n); entries below its diagonal are ignored.
         B: Right-hand sides as columns, shape (n, k).
-        transposed: Whether U' is meant.
+        transposed: Whether to use U'.
     """
     n, T = U.shape[0], U.T if transposed else U
     rows: list[ca.SX] = ca.vertsplit(B)
@@ -140,11 +140,11 @@ def solve_upper(U: ca.SX, B: ca.SX, *, transposed: bool = False) -> ca.SX:
 
 
 def upper_part(M: ca.SX, *, unit: bool = False) -> ca.SX:
-    """Return what is on and above the diagonal of a square matrix; what is below is left out.
+    """Return the upper triangle of a square matrix with its diagonal.
 
     Args:
         M: Shape (n, n).
-        unit: Whether ones stand on the diagonal instead.
+        unit: Whether the diagonal is replaced by ones.
     """
     if not unit:
         return ca.triu(M)
@@ -155,6 +155,6 @@ def norm_1(M: ca.SX) -> ca.SX:
     """Return the largest column sum of magnitudes, shape (1, 1).
 
     Args:
-        M: Finite entries, shape (n, m); a NaN does not show.
+        M: Finite entries, shape (n, m); NaN entries are not detected.
     """
     return ca.mmax(ca.densify(ca.sum1(ca.fabs(M))))

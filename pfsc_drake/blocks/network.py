@@ -1,4 +1,4 @@
-"""Blocks, one or many, as functions between ports, states and wires."""
+"""Blocks, single or connected, as functions between ports, states and wires."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,11 +13,11 @@ from pfsc_drake.compiled.dependencies import dependencies
 
 
 class Source(NamedTuple):
-    """Where an argument comes from.
+    """The source of an argument.
 
     Attributes:
         kind: ``input``, ``state``, ``wire``, ``tick`` or ``parameter``.
-        name: Which; of several parameters as one vector all names, with blanks between them.
+        name: Its name; of several parameters as one vector all names, separated by blanks.
     """
 
     kind: str
@@ -25,7 +25,7 @@ class Source(NamedTuple):
 
 
 TICK = Source("tick", "tick")
-# symbols that no argument brings are parameters
+# free symbols become parameters
 _FREE = {"allow_free": True}
 
 
@@ -46,17 +46,17 @@ class Node:
 
 @dataclass(frozen=True)
 class Network:
-    """What one block does, or many that are wired.
+    """A block, or several connected blocks, as functions.
 
     Attributes:
-        inputs: Ports at the border; none that is optional is left open.
-        outputs: Wires that are led out, by port.
+        inputs: Ports at the border, all of them connected.
+        outputs: Wires of the output ports at the border, by port.
         units: Units of these ports.
         states: Sizes by name.
         wires: Sizes by name.
-        nodes: What evaluates wires, each by one node.
-        updates: What evaluates states at the next tick; others stay.
-        initials: What evaluates states at the start; others are zero.
+        nodes: Functions of the wires, each wire in exactly one of them.
+        updates: Functions of the states at the next tick; other states stay the same.
+        initials: Functions of the states at the start; other states are zero.
     """
 
     inputs: Mapping[str, Port]
@@ -70,25 +70,25 @@ class Network:
 
     @classmethod
     def of(cls, block: Block, unconnected: Collection[str] = ()) -> "Network":
-        """Return the network that a block is.
+        """Return a block as a network.
 
         Args:
             block: The block.
-            unconnected: Optional inputs that nothing is connected to.
+            unconnected: Optional inputs that are not connected.
 
         Raises:
-            ValueError: If the block's methods return what it has not declared.
+            ValueError: If the block's methods return undeclared values.
         """
         # the same nodes whatever is connected
         groups = [node.results for node in cls.of(block).nodes] if unconnected else []
-        return cls._grouped(block, frozenset(unconnected), groups)
+        return cls._of_groups(block, frozenset(unconnected), groups)
 
     @classmethod
     @once_per_content(300)
-    def _grouped(
+    def _of_groups(
         cls, block: Block, unconnected: frozenset[str], groups: list[tuple[str, ...]]
     ) -> "Network":
-        """Return the network of a block whose nodes are known, or are to be found if none is."""
+        """Return the network of a block with known groups of results; none to find them."""
         inputs = {name: p for name, p in block.inputs.items() if name not in unconnected}
         x, u = _symbols(block.states), _symbols({name: p.size for name, p in inputs.items()})
         sizes = {name: p.size for name, p in block.outputs.items()} | dict(block.inner)
@@ -120,26 +120,26 @@ class Network:
             initials,
         )
 
-    def restricted(self, outputs: Collection[str]) -> "Network":
-        """Return what is needed for some of the outputs, in their order.
+    def subnetwork(self, outputs: Collection[str]) -> "Network":
+        """Return the part of the network that some of the outputs need, in their order.
 
         Args:
             outputs: Names of the outputs.
         """
-        made: dict[Source, set[Source]] = {}
+        sources_of: dict[Source, set[Source]] = {}
         for kind, nodes in (("wire", self.nodes), ("state", (*self.updates, *self.initials))):
             for node in nodes:
                 for name in node.results:
-                    made.setdefault(Source(kind, name), set()).update(node.sources)
+                    sources_of.setdefault(Source(kind, name), set()).update(node.sources)
         found = needed = {Source("wire", self.outputs[name]) for name in outputs}
         while needed:
-            needed = set().union(*(made.get(source, ()) for source in needed)) - found
+            needed = set().union(*(sources_of.get(source, ()) for source in needed)) - found
             found = found | needed
 
-        def kept(nodes: tuple[Node, ...], kind: str) -> tuple[Node, ...]:
+        def select(nodes: tuple[Node, ...], kind: str) -> tuple[Node, ...]:
             return tuple(n for n in nodes if any(Source(kind, name) in found for name in n.results))
 
-        nodes = kept(self.nodes, "wire")
+        nodes = select(self.nodes, "wire")
         wires = {name for node in nodes for name in node.results}
         return Network(
             {name: p for name, p in self.inputs.items() if Source("input", name) in found},
@@ -148,33 +148,33 @@ class Network:
             {name: n for name, n in self.states.items() if Source("state", name) in found},
             {name: n for name, n in self.wires.items() if name in wires},
             nodes,
-            kept(self.updates, "state"),
-            kept(self.initials, "state"),
+            select(self.updates, "state"),
+            select(self.initials, "state"),
         )
 
     @cached_property
-    def shown(self) -> dict[str, str]:
-        """Outputs at the border that are a state as it is, zero at the start, by port."""
-        begun = {name for node in self.initials for name in node.results}
+    def state_outputs(self) -> dict[str, str]:
+        """States that are outputs at the border without change and begin at zero, by port."""
+        initialized = {name for node in self.initials for name in node.results}
         wires: dict[str, str] = {}
         for node in self.nodes:
-            wires |= _shown(node)
+            wires |= _state_results(node)
         return {
             port: wires[wire]
             for port, wire in self.outputs.items()
-            if wire in wires and wires[wire] not in begun
+            if wire in wires and wires[wire] not in initialized
         }
 
 
 @dataclass
 class Wiring:
-    """How blocks are wired.
+    """Connections of blocks.
 
     Attributes:
-        networks: By name.
-        connections: What feeds an input: ``(name, input)`` of an output ``(name, output)``, or the
-            name of an input at the border.
-        outputs: Ports at the border, and which output ``(name, output)`` they are.
+        networks: Networks by name.
+        connections: Source of an input ``(name, input)``: an output ``(name, output)``, or the name
+            of an input at the border.
+        outputs: Output ``(name, output)`` of each port at the border.
     """
 
     networks: dict[str, Network] = field(default_factory=dict)
@@ -182,10 +182,10 @@ class Wiring:
     outputs: dict[str, tuple[str, str]] = field(default_factory=dict)
 
     def network(self) -> Network:
-        """Return all of them as one; states and wires are called ``block.name``.
+        """Return all blocks as one network; states and wires are named ``block.name``.
 
         Raises:
-            ValueError: If an input is not fed.
+            ValueError: If an input is not connected.
         """
         inputs: dict[str, Port] = {}
         states: dict[str, int] = {}
@@ -209,7 +209,7 @@ class Wiring:
                 (part.updates, updates),
                 (part.initials, initials),
             ):
-                into += [_renamed(node, name, fed) for node in kind]
+                into += [_prefix_names(node, name, fed) for node in kind]
         outputs = {
             port: f"{name}.{self.networks[name].outputs[output]}"
             for port, (name, output) in self.outputs.items()
@@ -229,8 +229,8 @@ class Wiring:
         return Source("wire", f"{name}.{self.networks[name].outputs[output]}")
 
 
-def _shown(node: Node) -> dict[str, str]:
-    """Return those of a node's results that are states as they are, by name."""
+def _state_results(node: Node) -> dict[str, str]:
+    """Return the results of a node that are unchanged states, by name."""
     function = node.function
     of_states = all(source.kind == "state" for source in node.sources)
     if not of_states or function.class_name() != "SXFunction":
@@ -244,8 +244,8 @@ def _shown(node: Node) -> dict[str, str]:
     }
 
 
-def _renamed(node: Node, prefix: str, fed: Mapping[str, Source]) -> Node:
-    """Return a node of a part as one of the whole."""
+def _prefix_names(node: Node, prefix: str, fed: Mapping[str, Source]) -> Node:
+    """Return a node of a part as a node of the whole network."""
     sources = tuple(
         fed[source.name]
         if source.kind == "input"
@@ -264,7 +264,7 @@ def _symbols(sizes: Mapping[str, int]) -> dict[str, ca.MX]:
 def _check(
     block: Block, method: str, found: dict[str, Any], sizes: Mapping[str, int], every: bool = False
 ) -> None:
-    """Refuse what a method returns that has not been declared."""
+    """Refuse undeclared results of a method."""
     name = type(block).__name__
     for key, value in found.items():
         if key not in sizes:
@@ -287,11 +287,12 @@ def _nodes(
     """Return the functions of a method's results.
 
     Args:
-        block: Whose method it is.
+        block: Block of the method.
         method: Its name.
         known: Symbols of all arguments.
         found: The results.
-        groups: Which results are one function; if there are none, those that need the same inputs.
+        groups: Results of each function; if there are none, one function for all with the same
+            inputs.
     """
     if not found:
         return ()
@@ -299,7 +300,7 @@ def _nodes(
     results = [ca.densify(ca.MX(value)) for value in found.values()]
     whole = ca.Function(f"{type(block).__name__}_{method}", list(known.values()), results)
     arguments: list[Any] = list(known.values())
-    expanded = _expanded(whole) if block.expands else None
+    expanded = _expand(whole) if block.expands else None
     if expanded is None:
         _refuse_parameters(whole)
     if expanded is not None:
@@ -329,20 +330,20 @@ def _node(
     names: list[str],
     results: list[Any],
 ) -> Node:
-    """Return one function of some results, of the arguments that they need."""
+    """Return one function of some results and of the arguments that they need."""
     used = [i for i in range(len(sources)) if any(needs[row, i] for row in rows)]
     chosen = ca.cse([results[row] for row in rows])
-    given, sources = [arguments[i] for i in used], [sources[i] for i in used]
-    function = ca.Function(title, given, chosen, _FREE)
+    symbols, sources = [arguments[i] for i in used], [sources[i] for i in used]
+    function = ca.Function(title, symbols, chosen, _FREE)
     if function.has_free():
         parameters = function.free_sx()
-        function = ca.Function(title, [*given, ca.vertcat(*parameters)], chosen)
+        function = ca.Function(title, [*symbols, ca.vertcat(*parameters)], chosen)
         sources.append(Source("parameter", " ".join(p.name() for p in parameters)))
     return Node(function, tuple(sources), tuple(names[row] for row in rows))
 
 
-def _expanded(function: ca.Function) -> ca.Function | None:
-    """Return a function of scalars, or None if there is none."""
+def _expand(function: ca.Function) -> ca.Function | None:
+    """Return a function of scalars, or None if it cannot be expanded."""
     try:
         return function.expand(function.name(), _FREE)
     except RuntimeError:
@@ -350,7 +351,7 @@ def _expanded(function: ca.Function) -> ca.Function | None:
 
 
 def _refuse_parameters(function: ca.Function) -> None:
-    """Refuse symbols that are no arguments where they cannot become some."""
+    """Refuse free symbols where they cannot become parameters."""
     for inner in function.find_functions():
         if inner.has_free():
             raise ValueError(f"{function.name()}: {inner.name()} has parameters without values")

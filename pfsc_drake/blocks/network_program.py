@@ -1,4 +1,4 @@
-"""A network as few functions: stages of outputs, what is remembered, how it begins."""
+"""A network as few functions: stages of outputs, update and initial states."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -6,7 +6,14 @@ from dataclasses import replace
 import casadi as ca
 
 from pfsc_drake.blocks.network import TICK, Network, Node, Source
-from pfsc_drake.blocks.stage import Stage, call_named, ends_of, names_of, ordered, slices_of
+from pfsc_drake.blocks.stage import (
+    Stage,
+    call_named,
+    ends_of,
+    evaluation_order,
+    names_of,
+    slices_of,
+)
 from pfsc_drake.blocks.wire_dependencies import Dependencies
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
@@ -20,19 +27,19 @@ class Program:
 
     Args:
         network: The network.
-        like: Program of the same block with more inputs, whose stages this one is to have.
+        like: Program of the same block with more inputs, whose stages are reused.
 
     Attributes:
         network: The same.
-        states: Where in ``x`` each state is, those last that the network shows as they are.
+        states: Slices of the states in ``x``; states that are outputs without change come last.
         size: Size of ``x``.
-        stages: In an order in which they can be evaluated.
+        stages: Stages in an order of evaluation.
         update: ``x`` of the next tick, called ``x_next``.
-        update_inputs, update_states, update_stages: What it takes.
-        update_stage: The stage that needs all that the update needs, so that both can be one
-            function, see :meth:`with_update`; None if there is none.
-        initial: ``x`` at the start, called ``x_start``, of ``x``, ``preset`` (a number for each
-            state by name; where it is not 0 that of ``x`` stays), ``t`` and ``initial_inputs``.
+        update_inputs, update_states, update_stages: Its arguments.
+        update_stage: Number of the stage that needs everything that the update needs, so that both
+            can be one function, see :meth:`with_update`; None if there is none.
+        initial: ``x`` at the start, called ``x_start``, of ``x``, ``preset`` (a flag for each state
+            by name; nonzero to keep its value in ``x``), ``t`` and ``initial_inputs``.
 
     Raises:
         InputError: If outputs depend on themselves within a tick.
@@ -41,7 +48,7 @@ class Program:
     def __init__(self, network: Network, like: "Program | None" = None) -> None:
         self.network, self._like = network, like
         self._with_update: dict[int, Stage] = {}
-        shown = set(network.shown.values())
+        shown = set(network.state_outputs.values())
         sizes = dict(sorted(network.states.items(), key=lambda item: item[0] in shown))
         self.states = slices_of(sizes)
         self.size = sum(sizes.values())
@@ -51,12 +58,12 @@ class Program:
         self._states = dict(zip(self.states, values, strict=True))
         self._dependencies = Dependencies(network)
         self.stages, self._stage_of = self._stages(self._groups())
-        self._made = [
+        self._stage_results = [
             ca.MX.sym(f"stage_{k}", stage.function.numel_out(0))
             for k, stage in enumerate(self.stages)
         ]
         self._make_update()
-        self.update_stage = self._place_of_update()
+        self.update_stage = self._find_update_stage()
         self.initial, self.initial_inputs = _initial_function(self)
 
     @classmethod
@@ -66,7 +73,7 @@ class Program:
 
         Args:
             network: The network.
-            like: Program of the same block with more inputs, whose stages this one is to have.
+            like: Program of the same block with more inputs, whose stages are reused.
 
         Raises:
             InputError: If outputs depend on themselves within a tick.
@@ -74,19 +81,19 @@ class Program:
         return cls(network, like)
 
     def __content__(self) -> object:
-        """Return what decides over all functions."""
+        """Return everything that determines the functions."""
         return self.network, self._like
 
     def output(self, output: str) -> tuple[int, slice]:
-        """Return the stage that evaluates an output at the border, and where it is in it.
+        """Return the stage that evaluates an output at the border, and its slice in the result.
 
         Args:
             output: Name of the port.
         """
-        return self.place(self.network.outputs[output])
+        return self.position(self.network.outputs[output])
 
-    def place(self, wire: str) -> tuple[int, slice]:
-        """Return the stage that evaluates a wire, and where it is in it.
+    def position(self, wire: str) -> tuple[int, slice]:
+        """Return the stage that evaluates a wire, and its slice in the result.
 
         Args:
             wire: Its name.
@@ -100,22 +107,22 @@ class Program:
         ``(x, t, inputs ..) -> (x_next, outputs ..)``, by name.
         """
         results: list[ca.MX] = []
-        given = {"x": self._x, "t": self._t} | self._u
+        arguments = {"x": self._x, "t": self._t} | self._u
         for k, stage in enumerate(self.stages):
-            named = given | {f"stage_{j}": results[j] for j in stage.stages}
+            named = arguments | {f"stage_{j}": results[j] for j in stage.stages}
             results.append(call_named(self.stages[k].function, named))
-        named = given | {f"stage_{j}": results[j] for j in self.update_stages}
+        named = arguments | {f"stage_{j}": results[j] for j in self.update_stages}
         outputs = {}
         for port in self.network.outputs:
             k, part = self.output(port)
             outputs[port] = results[k][part]
         return ca.Function(
             "step",
-            list(given.values()),
+            list(arguments.values()),
             [call_named(self.update, named), *outputs.values()],
-            list(given),
+            list(arguments),
             ["x_next", *outputs],
-            # an input and an output may be called the same
+            # an input and an output may have the same name
             {"allow_duplicate_io_names": True},
         )
 
@@ -126,16 +133,16 @@ class Program:
             k: The stage, :attr:`update_stage` of this program or of one with more inputs.
         """
         if k not in self._with_update:
-            self._with_update[k] = self._made_with_update(k)
+            self._with_update[k] = self._combine_with_update(k)
         return self._with_update[k]
 
-    def _made_with_update(self, k: int) -> Stage:
+    def _combine_with_update(self, k: int) -> Stage:
         stage = self.stages[k]
         arguments = {*stage.function.name_in(), *self.update.name_in()}
         inputs = {name: symbol for name, symbol in self._u.items() if name in arguments}
         stages = tuple(sorted({*stage.stages, *self.update_stages} - {k}))
         named = {"x": self._x, "t": self._t} | inputs
-        named |= {f"stage_{j}": self._made[j] for j in stages}
+        named |= {f"stage_{j}": self._stage_results[j] for j in stages}
         result = call_named(stage.function, named)
         later = call_named(self.update, named | {f"stage_{k}": result})
         function = ca.Function(
@@ -148,7 +155,7 @@ class Program:
         states = stage.states | self.update_states
         return replace(stage, function=function, inputs=tuple(inputs), states=states, stages=stages)
 
-    def _place_of_update(self) -> int | None:
+    def _find_update_stage(self) -> int | None:
         nodes = self.network.updates
         for k in reversed(range(len(self.stages) if self.size else 0)):
             stage = self.stages[k]
@@ -165,7 +172,7 @@ class Program:
 
     def _groups(self) -> list[list[Node]]:
         """Return the nodes of each stage."""
-        order = ordered(self.network.nodes)
+        order = evaluation_order(self.network.nodes)
         if self._like is None:
             return self._dependencies.groups(order)
         stage_of, numbers = self._like._stage_of, range(len(self._like.stages))
@@ -175,13 +182,13 @@ class Program:
         """Return the stages of groups of nodes, and the stage of each wire."""
         stages: list[Stage] = []
         stage_of: dict[str, int] = {}
-        made: dict[str, ca.MX] = {}
+        wire_values: dict[str, ca.MX] = {}
         vectors: list[ca.MX] = []
         for nodes in groups:
             inside: dict[str, ca.MX] = {}
             for node in nodes:
                 results = node.function.call(
-                    [self._value(source, inside | made) for source in node.sources]
+                    [self._value(source, inside | wire_values) for source in node.sources]
                 )
                 inside |= dict(zip(node.results, results, strict=True))
             sources = [s for node in nodes for s in node.sources]
@@ -206,7 +213,7 @@ class Program:
             states = frozenset(s.name for s in sources if s.kind == "state")
             stages.append(Stage(function, inputs, states, tuple(earlier), needs, at_start, parts))
             vectors.append(ca.MX.sym(f"stage_{k}", function.numel_out(0)))
-            made |= {name: vectors[k][part] for name, part in parts.items()}
+            wire_values |= {name: vectors[k][part] for name, part in parts.items()}
             stage_of |= dict.fromkeys(inside, k)
         return stages, stage_of
 
@@ -215,7 +222,7 @@ class Program:
             return self._states[source.name]
         if source.kind == "input":
             return self._u[source.name]
-        if source.kind == "parameter":  # which has no value in a simulation
+        if source.kind == "parameter":  # without a value in a simulation
             return ca.MX.nan(len(source.name.split()))
         return self._t if source == TICK else wires[source.name]
 
@@ -227,19 +234,21 @@ class Program:
         self.update_inputs = names_of(sources, "input")
         self.update_states = frozenset(names_of(sources, "state")) | (set(self.states) - changed)
         self.update_stages = tuple(sorted({self._stage_of[name] for name in wires}))
-        made = {
-            name: self._made[k][self.stages[k].parts[name]]
+        wire_values = {
+            name: self._stage_results[k][self.stages[k].parts[name]]
             for name, k in self._stage_of.items()
             if name in wires
         }
         later = dict(self._states)
         for node in nodes:
-            results = node.function.call([self._value(source, made) for source in node.sources])
+            results = node.function.call(
+                [self._value(source, wire_values) for source in node.sources]
+            )
             later |= dict(zip(node.results, results, strict=True))
         self.update = ca.Function(
             "update",
             [self._x, self._t, *(self._u[name] for name in self.update_inputs)]
-            + [self._made[k] for k in self.update_stages],
+            + [self._stage_results[k] for k in self.update_stages],
             [ca.vertcat(*later.values())],
             ["x", "t", *self.update_inputs, *(f"stage_{k}" for k in self.update_stages)],
             ["x_next"],
@@ -247,15 +256,15 @@ class Program:
 
 
 def _initial_function(program: Program) -> tuple[ca.Function, tuple[str, ...]]:
-    """Return what is remembered at the start, and the inputs that it takes."""
+    """Return the function of the initial states, and the names of its inputs."""
     preset = ca.MX.sym("preset", len(program.states))
     flags = dict(zip(program.states, ca.vertsplit(preset), strict=True)) if program.states else {}
-    begun: dict[str, ca.MX] = {}
+    initial_values: dict[str, ca.MX] = {}
     wires: dict[str, ca.MX] = {}
-    on_the_way: set[str] = set()
+    pending: set[str] = set()
     used: set[str] = set()
 
-    def evaluated(node: Node) -> list[ca.MX]:
+    def evaluate(node: Node) -> list[ca.MX]:
         arguments = []
         for source in node.sources:
             if source.kind == "state":
@@ -269,27 +278,27 @@ def _initial_function(program: Program) -> tuple[ca.Function, tuple[str, ...]]:
 
     def wire_of(name: str) -> ca.MX:
         if name not in wires:
-            if name in on_the_way:
+            if name in pending:
                 raise InputError(
-                    f"{name}: depends on itself at the start, through {', '.join(on_the_way)}"
+                    f"{name}: depends on itself at the start, through {', '.join(pending)}"
                 )
-            on_the_way.add(name)
+            pending.add(name)
             node = program._dependencies.maker[name]
-            wires.update(zip(node.results, evaluated(node), strict=True))
-            on_the_way.discard(name)
+            wires.update(zip(node.results, evaluate(node), strict=True))
+            pending.discard(name)
         return wires[name]
 
     def start_of(name: str) -> ca.MX:
-        if name not in begun:
+        if name not in initial_values:
             node = program._dependencies.starter.get(name)
             size = program.network.states[name]
             if node is None:
                 found = {name: ca.MX(ca.DM.zeros(size))}
             else:
-                found = dict(zip(node.results, evaluated(node), strict=True))
+                found = dict(zip(node.results, evaluate(node), strict=True))
             for key, value in found.items():
-                begun[key] = ca.if_else(flags[key], program._states[key], value)
-        return begun[name]
+                initial_values[key] = ca.if_else(flags[key], program._states[key], value)
+        return initial_values[name]
 
     start = [start_of(name) for name in program.states]
     inputs = tuple(name for name in program._u if name in used)

@@ -1,4 +1,4 @@
-"""Rotations as expressions: their vectors, what these turn, and how vectors change."""
+"""Rotations as expressions: rotation vectors, matrices, and generalized moments."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ _SMALL = 1e-3
 def rotation_vector(R: Any) -> Any:
     """Return axis times angle, at most pi, of a rotation, shape (3,) [rad].
 
-    By way of the quaternion that loses no digits: that of four with the largest divisor.
+    Computed from the quaternion with the largest divisor of four, which loses no digits.
 
     Args:
         R: Rotation matrix, shape (3, 3).
@@ -71,9 +71,10 @@ def moment_of(vector: Any, force: Any) -> Any:
 
 
 def nearest_turn(vector: Any, before: Any) -> Any:
-    """Return the vector of the same rotation that is next to another one, shape (3,) [rad].
+    """Return the vector of the same rotation that is nearest to another one, shape (3,) [rad].
 
-    Of two: a vector, and that of the turn the other way round, so that turns go on beyond pi.
+    The candidates are the vector itself and its complement, the turn the other way round, so that
+    turns continue beyond pi.
 
     Args:
         vector: Shape (3,), of a length up to pi [rad].
@@ -85,7 +86,7 @@ def nearest_turn(vector: Any, before: Any) -> Any:
 
 
 def matrix_of(rows: Any) -> Any:
-    """Return a matrix that is given by rows, shape (3, 3).
+    """Return a matrix from its elements by rows, shape (3, 3).
 
     Args:
         rows: Shape (9,).

@@ -1,4 +1,4 @@
-"""The derivative of a network over one tick, exactly, from the derivatives of its functions."""
+"""Exact derivative of a network over one tick, from the derivatives of its functions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,31 +7,31 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.network import TICK, Network, Node, Source
-from pfsc_drake.blocks.stage import ordered
+from pfsc_drake.blocks.stage import evaluation_order
 
 # relative to an argument, or absolute if that is larger
 _DIFFERENCE = 1e-6
-# rows of an adjoint by what they are the derivative by, shape (k, size) each
+# rows of an adjoint by their variables, shape (k, size) each
 Adjoint = dict[Source, np.ndarray]
 
 
 class NetworkSlope:
-    """What differentiates a network: the chain rule over the functions that it consists of.
+    """Derivative of a network by the chain rule over its functions.
 
-    Each function is differentiated by CasADi, when its derivative is asked for first; of what
-    changes nothing that is asked for, none is made.
+    CasADi differentiates a function when its derivative is first needed, and none that does not
+    affect the requested results.
 
     Args:
         network: The network.
 
     Attributes:
         network: The same.
-        order: Its nodes, in an order in which they can be evaluated.
+        order: Its nodes, in an order of evaluation.
     """
 
     def __init__(self, network: Network) -> None:
         self.network = network
-        self.order = ordered(network.nodes)
+        self.order = evaluation_order(network.nodes)
         self._jacobians: dict[int, ca.Function] = {}
 
     def at(
@@ -89,7 +89,7 @@ class SlopeAt:
     """The derivative of a network at one tick.
 
     Attributes:
-        slope: Slope, and of which network.
+        slope: Derivative of the network.
         known: All values at that tick: states, inputs, wires.
     """
 
@@ -104,8 +104,8 @@ class SlopeAt:
         """Return derivatives of states at the next tick, then of wires, one below the other.
 
         Args:
-            states: Which states.
-            wires: Which wires.
+            states: Names of the states.
+            wires: Names of the wires.
 
         Returns:
             By each state and each input that any of them depends on, shape (k, size).
@@ -118,7 +118,7 @@ class SlopeAt:
             _add(found, Source("wire", name), weights)
         for node in network.updates:
             self._through(node, {n: of_next.pop(n) for n in node.results if n in of_next}, found)
-        for name, weights in of_next.items():  # what stays
+        for name, weights in of_next.items():  # unchanged states
             _add(found, Source("state", name), weights)
         for node in reversed(self.slope.order):
             sources = [(name, Source("wire", name)) for name in node.results]
@@ -130,20 +130,20 @@ class SlopeAt:
         """Return the states that wires depend on, now or some ticks later.
 
         Args:
-            wires: Which wires.
+            wires: Names of the wires.
         """
         reaching: dict[str, None] = {}
         new: list[str] = []
-        told = list(wires)
-        while new or told:
-            found = self.derivatives(new, told)
+        outputs = list(wires)
+        while new or outputs:
+            found = self.derivatives(new, outputs)
             depended = [s.name for s, rows in found.items() if s.kind == "state" and rows.any()]
-            new, told = [name for name in depended if name not in reaching], []
+            new, outputs = [name for name in depended if name not in reaching], []
             reaching |= dict.fromkeys(new)
         return list(reaching)
 
     def _through(self, node: Node, weights: Mapping[str, np.ndarray], found: Adjoint) -> None:
-        """Add what a node's results contribute by way of its arguments."""
+        """Add the contributions of a node's results through its arguments."""
         weights = {name: rows for name, rows in weights.items() if rows.any()}
         if not weights:
             return
@@ -160,7 +160,7 @@ def _variables(node: Node) -> list[Source]:
 
 
 def _jacobian(node: Node) -> ca.Function:
-    """Return a function of arguments and results like CasADi's own, by no parameter."""
+    """Return CasADi's function of the derivatives, without those by parameters."""
     function, n = node.function, len(_variables(node))
     if n == function.n_in():
         return function.jacobian()
@@ -173,25 +173,25 @@ def _jacobian(node: Node) -> ca.Function:
 
 
 def _unknown(blocks: list[np.ndarray]) -> np.ndarray:
-    """Return which columns have an entry that is no number, in any of several matrices."""
+    """Return a flag for each column that has a NaN or infinite entry in any of several matrices."""
     return np.any([~np.isfinite(block).all(axis=0) for block in blocks], axis=0)
 
 
 def _difference(
     function: ca.Function, arguments: list[ca.DM], column: int, k: int
 ) -> list[np.ndarray]:
-    """Return the derivatives of all results by one element where calculus has no answer.
+    """Return finite differences of all results by one element without analytic derivative.
 
-    That is a length that is zero, or a case that does not hold and divides by zero. What is not
-    finite itself moves nothing.
+    Such an element is a length that is zero, or belongs to an inactive case that divides by zero.
+    The derivative of a result that is not finite is zero.
     """
     value = float(arguments[column][k])
     step, sides = _DIFFERENCE * max(1.0, abs(value)), []
     for sign in (1.0, -1.0):
         shifted = ca.DM(arguments[column])
         shifted[k] = value + sign * step
-        given = [*arguments[:column], shifted, *arguments[column + 1 :]]
-        sides.append([result.full().ravel() for result in function.call(given)])
+        shifted_arguments = [*arguments[:column], shifted, *arguments[column + 1 :]]
+        sides.append([result.full().ravel() for result in function.call(shifted_arguments)])
     with np.errstate(invalid="ignore"):
         differences = [(a - b) / (2.0 * step) for a, b in zip(*sides, strict=True)]
     return [np.where(np.isfinite(entries), entries, 0.0) for entries in differences]

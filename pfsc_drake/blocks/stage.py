@@ -1,4 +1,4 @@
-"""Stages of a network: all wires that depend on the same inputs, in an order of evaluation."""
+"""Stages of a network: wires that depend on the same inputs, in an order of evaluation."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -13,16 +13,16 @@ Needs = frozenset[Source]
 
 @dataclass(frozen=True)
 class Stage:
-    """All wires that depend on the same inputs.
+    """Wires that depend on the same inputs.
 
     Attributes:
         function: Function of ``sources``, then the results of earlier ``stages``; one vector out.
         inputs: Names of the inputs among its arguments.
-        states: Names of the states that it depends on.
+        states: Names of the states it depends on.
         stages: Numbers of the earlier stages among its arguments.
-        needs: What its results depend on at last: inputs and tick.
-        needs_at_start: The same before the start, when states are what the inputs say.
-        parts: Where in the result wires are.
+        needs: Sources of its results: inputs and tick.
+        needs_at_start: The same before the start, when the states follow from the inputs.
+        parts: Slices of the wires in the result.
     """
 
     function: ca.Function
@@ -34,30 +34,30 @@ class Stage:
     parts: Mapping[str, slice]
 
 
-def ordered(nodes: Collection[Node]) -> list[Node]:
-    """Return nodes such that each comes after those that it takes wires of.
+def evaluation_order(nodes: Collection[Node]) -> list[Node]:
+    """Return nodes sorted such that each comes after those whose wires it takes.
 
     Args:
-        nodes: All that evaluate wires.
+        nodes: All nodes that evaluate wires.
 
     Raises:
         InputError: If there is a loop.
     """
     maker = {name: node for node in nodes for name in node.results}
     order: dict[int, Node] = {}
-    way: list[Node] = []
+    path: list[Node] = []
 
     def visit(node: Node) -> None:
         if id(node) in order:
             return
-        if any(node is other for other in way):
-            names = [other.results[0] for other in way]
+        if any(node is other for other in path):
+            names = [other.results[0] for other in path]
             raise InputError(f"algebraic loop of outputs: {' -> '.join([*names, names[0]])}")
-        way.append(node)
+        path.append(node)
         for source in node.sources:
             if source.kind == "wire":
                 visit(maker[source.name])
-        way.pop()
+        path.pop()
         order[id(node)] = node
 
     for node in nodes:
@@ -86,7 +86,7 @@ def names_of(sources: Iterable[Source], kind: str) -> tuple[str, ...]:
 
 
 def ends_of(sizes: Mapping[str, int]) -> list[int]:
-    """Return where each of consecutive vectors begins, and the last ends.
+    """Return the first index of each of consecutive vectors, and the end of the last.
 
     Args:
         sizes: Sizes of the vectors.
@@ -98,7 +98,7 @@ def ends_of(sizes: Mapping[str, int]) -> list[int]:
 
 
 def slices_of(sizes: Mapping[str, int]) -> dict[str, slice]:
-    """Return where each of consecutive vectors is, by name.
+    """Return the slices of consecutive vectors, by name.
 
     Args:
         sizes: Sizes of the vectors.

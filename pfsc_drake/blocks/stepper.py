@@ -1,4 +1,4 @@
-"""A block that is stepped by hand, without Drake."""
+"""Stepping of a block without Drake."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
 
-# arguments of a program that are not the block's
+# arguments of a program that do not belong to the block
 _NO_INPUTS = {"x", "t", "preset"}
 
 
@@ -19,8 +19,7 @@ class Stepper:
 
     Args:
         block: The block or network.
-        connected: Names of the optional inputs that are given at every step; the others are not
-            connected.
+        connected: Names of the connected optional inputs; each step needs their values.
 
     Attributes:
         tick: Number of the next tick.
@@ -41,31 +40,33 @@ class Stepper:
 
     @property
     def states(self) -> dict[str, np.ndarray] | None:
-        """States by name, as they are before the next tick; None before the start."""
+        """States by name, before the next tick; None before the start."""
         if not self._started:
             return None
         return {name: self._x[part].copy() for name, part in self._program.states.items()}
 
     def restart(self) -> None:
-        """Forget all states: the next step is the first one."""
+        """Delete all states: the next step is the first one."""
         self._started, self.tick = False, 0
 
     def start(self, **inputs: Any) -> None:
-        """Begin, as the inputs say.
+        """Set the initial states from the inputs.
 
         Args:
             inputs: Values by name.
         """
-        wanted = self._program.initial_inputs
-        given = {name: value for name, value in inputs.items() if name in wanted}
-        self._give(self._initial, given, set(self._initial.arguments) - _NO_INPUTS)
+        expected = self._program.initial_inputs
+        initial_inputs = {name: value for name, value in inputs.items() if name in expected}
+        self._set_arguments(
+            self._initial, initial_inputs, set(self._initial.arguments) - _NO_INPUTS
+        )
         self._initial.arguments["t"][0] = self.tick
         self._initial.evaluate()
         self._x[:] = self._initial.results["x_start"]
         self._started = True
 
     def set_state(self, name: str, value: Any) -> None:
-        """Set what is remembered, after the start.
+        """Set a state after the start.
 
         Args:
             name: Name of the state.
@@ -75,17 +76,17 @@ class Stepper:
         self._started = True
 
     def step(self, **inputs: Any) -> dict[str, np.ndarray]:
-        """Return the outputs of a tick by name, and go on to the next.
+        """Return the outputs of a tick by name, and advance to the next.
 
         Args:
-            inputs: Values by name, all that are connected.
+            inputs: Values of all connected inputs, by name.
 
         Raises:
             InputError: If one is missing, unknown or of another size.
         """
         if not self._started:
             self.start(**inputs)
-        self._give(self._step, inputs, self._connected)
+        self._set_arguments(self._step, inputs, self._connected)
         self._step.arguments["t"][0] = self.tick
         self._step.evaluate()
         results = {name: value.copy() for name, value in self._step.results.items()}
@@ -93,9 +94,11 @@ class Stepper:
         self.tick += 1
         return results
 
-    def _give(self, function: BoundFunction, inputs: dict[str, Any], wanted: set[str]) -> None:
-        if inputs.keys() != wanted:
-            raise InputError(f"inputs: {', '.join(inputs)}; must be {', '.join(sorted(wanted))}")
+    def _set_arguments(
+        self, function: BoundFunction, inputs: dict[str, Any], expected: set[str]
+    ) -> None:
+        if inputs.keys() != expected:
+            raise InputError(f"inputs: {', '.join(inputs)}; must be {', '.join(sorted(expected))}")
         for name, value in inputs.items():
             values = np.ravel(value)
             if values.shape != function.arguments[name].shape:

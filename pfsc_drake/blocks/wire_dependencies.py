@@ -1,4 +1,4 @@
-"""What the wires of a network depend on, and which of them are evaluated together."""
+"""Inputs that the wires of a network depend on, and groups of wires evaluated together."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ class Dependencies:
 
     Attributes:
         maker: The node that evaluates each wire.
-        starter: The node that says how each state begins; states that begin at zero have none.
+        starter: The node that evaluates each initial state; states that begin at zero have none.
     """
 
     def __init__(self, network: Network) -> None:
@@ -24,11 +24,11 @@ class Dependencies:
         self._needs: dict[tuple[str, bool], Needs] = {}
 
     def of(self, node: Node, *, at_start: bool) -> Needs:
-        """Return the inputs that a node depends on, by way of wires and, at start, of states.
+        """Return the inputs that a node depends on, through wires and, at the start, states.
 
         Args:
             node: The node.
-            at_start: Whether before the start, when states are what the inputs say.
+            at_start: Whether before the start, when the states follow from the inputs.
         """
         key = node.results[0], at_start
         if key not in self._needs:
@@ -37,7 +37,7 @@ class Dependencies:
         return self._needs[key]
 
     def of_source(self, source: Source, *, at_start: bool) -> Needs:
-        """Return the inputs that what a node takes depends on, see :meth:`of`."""
+        """Return the inputs that a source depends on, see :meth:`of`."""
         if source.kind == "wire":
             return self.of(self.maker[source.name], at_start=at_start)
         if source.kind == "parameter":
@@ -58,45 +58,45 @@ class Dependencies:
         return frozenset(needs)
 
     def groups(self, order: Sequence[Node]) -> list[list[Node]]:
-        """Return nodes by what they need, those that need less before.
+        """Return groups of nodes with the same needs, those with fewer needs first.
 
         Args:
-            order: All that evaluate wires, each after those that it takes wires of.
+            order: All nodes that evaluate wires, each after those whose wires it takes.
         """
-        places = self._places(order)
+        needs_of_result = self._stage_needs(order)
         groups: dict[tuple[Needs, Needs], list[Node]] = {}
         for node in order:
-            groups.setdefault(places[node.results[0]], []).append(node)
-        # what a node takes from another needs no more than itself
+            groups.setdefault(needs_of_result[node.results[0]], []).append(node)
+        # a node needs at least the inputs of the wires that it takes
         return [groups[key] for key in sorted(groups, key=lambda key: (len(key[0]), len(key[1])))]
 
-    def _places(self, order: Sequence[Node]) -> dict[str, tuple[Needs, Needs]]:
-        """Return what each node's stage needs, now and at the start, by the node's first result.
+    def _stage_needs(self, order: Sequence[Node]) -> dict[str, tuple[Needs, Needs]]:
+        """Return the needs of each node's stage, now and at the start, by the node's first result.
 
-        What is put out at the border waits for nothing that it does not need. Everything else is
-        evaluated as late as those that take it, so that there are few stages.
+        Outputs at the border wait only for inputs that they need. Everything else is evaluated as
+        late as its consumers, so that there are few stages.
         """
-        shown = self._network.shown
+        shown = self._network.state_outputs
         border = {wire for port, wire in self._network.outputs.items() if port not in shown}
         takers: dict[str, list[tuple[Needs, Needs]]] = {}
-        places: dict[str, tuple[Needs, Needs]] = {}
+        needs_of_result: dict[str, tuple[Needs, Needs]] = {}
         last: list[tuple[Needs, Needs]] = []
         for node in reversed(order):
             own = self.of(node, at_start=False), self.of(node, at_start=True)
-            later = [place for name in node.results for place in takers.get(name, ())]
+            later = [stage_needs for name in node.results for stage_needs in takers.get(name, ())]
             if border.intersection(node.results):
-                place = own
+                stage_needs = own
                 last.append(own)
             elif later:
-                place = (
+                stage_needs = (
                     frozenset.intersection(*(needs for needs, _ in later)),
                     frozenset.intersection(*(at_start for _, at_start in later)),
                 )
-            else:  # only what is remembered depends on it
+            else:  # only states depend on it
                 above = [p for p in last if own[0] <= p[0] and own[1] <= p[1]]
-                place = max(above, key=lambda p: (len(p[0]), len(p[1])), default=own)
-            places[node.results[0]] = place
+                stage_needs = max(above, key=lambda p: (len(p[0]), len(p[1])), default=own)
+            needs_of_result[node.results[0]] = stage_needs
             for source in node.sources:
                 if source.kind == "wire":
-                    takers.setdefault(source.name, []).append(place)
-        return places
+                    takers.setdefault(source.name, []).append(stage_needs)
+        return needs_of_result

@@ -1,4 +1,4 @@
-"""Blocks that only lead vectors from one place to another."""
+"""Blocks that only route vectors."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,7 +20,7 @@ class Collect(Block):
         sizes: Sizes of the parts, by the names of their ports.
 
     Attributes:
-        rows: Where each part is in the whole.
+        rows: Slices of the parts in the whole vector.
     """
 
     def __init__(self, sizes: Mapping[str, int]) -> None:
@@ -45,7 +45,7 @@ class Rows(Block):
 
     Args:
         size: Size of the whole vector.
-        rows: Which elements.
+        rows: Indices of the elements.
     """
 
     def __init__(self, size: int, rows: Sequence[int]) -> None:
@@ -103,7 +103,7 @@ class Sum(Block):
 
 
 class Constant(Block):
-    """A vector that stays.
+    """A constant vector.
 
     Ports:
         value (output): The vector.
@@ -123,19 +123,19 @@ class Constant(Block):
 
 
 class Hold(Block):
-    """A zero-order hold: what came in at the last tick, or some ticks before.
+    """A delay of one tick or several ticks.
 
     Ports:
         value (input): The vector.
-        held (output): That of the last tick, or of ``ticks`` ago, zero before; without direct
+        held (output): The vector one tick, or ``ticks`` ticks, ago, zero before; without direct
             feedthrough.
 
     State:
-        What is ``held``, the oldest first, shape (ticks size,).
+        The last ``ticks`` vectors as ``held``, the oldest first, shape (ticks size,).
 
     Args:
         size: Size of the vector.
-        ticks: How old what is put out is at a tick.
+        ticks: Number of ticks of the delay.
     """
 
     def __init__(self, size: int, ticks: int = 1) -> None:
@@ -147,5 +147,5 @@ class Hold(Block):
         return {"held": x.held[: self._size]}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; states left out stay the same."""
         return {"held": ca.vertcat(*ca.vertsplit(x.held, self._size)[1:], u.value)}

@@ -22,9 +22,9 @@ from pfsc_drake.errors import InputError
 
 _FUNCTIONS = "controller_functions"
 _DOUBLE = 8  # bytes
-# what may be NaN before it is first measured, and stops the motion until then
+# inputs that may be NaN before their first measurement, and stop the motion until then
 _UNKNOWN_AT_START = "obstacles"
-# of joints that turn, and that slide; the longer ones first
+# units of revolute and prismatic joints; the longer ones first
 _UNITS_OF_JOINTS = (
     *(("rad, rad/s", "m, m/s"), ("rad/s", "m/s"), ("rad", "m")),
     *(("Nm s/rad", "N s/m"), ("Nm", "N")),
@@ -33,7 +33,7 @@ _HEADER = """\
 /* {title}
 
    One call of controller_initialize, then one of controller_step every {period:g} s. Nothing is
-   allocated, nothing is kept but what is in controller_state: any number of controllers may run.
+   allocated, and all memory is in controller_state: any number of controllers may run.
 */
 #ifndef CONTROLLER_H
 #define CONTROLLER_H
@@ -43,12 +43,12 @@ extern "C" {{
 #endif
 
 #define CONTROLLER_SAMPLING_TIME {period!r} /* s */
-#define CONTROLLER_DRIVES {drives} /* numbers of the first output, which the drives are told */
+#define CONTROLLER_DRIVES {drives} /* size of the first output, the command of the drives */
 
 typedef struct {{
     double tick; /* number of the next tick */
     double x[{size}];
-    double phase; /* initialized, or a fault that stays until it is again */
+    double phase; /* initialized, or a fault that holds until the next initialization */
 }} controller_state;
 
 typedef struct {{
@@ -59,7 +59,7 @@ typedef struct {{
 {outputs}
 }} controller_outputs;
 
-/* Begin where the inputs say; if they are no start, every step is a fault. */
+/* Set the initial states from the inputs; if these are invalid, every step is a fault. */
 void controller_initialize(controller_state *state, const controller_inputs *inputs);
 
 /* Evaluate one tick; returns the fault, 0 for none. From {first} on there is no state to
@@ -80,7 +80,7 @@ _SOURCE = """\
 
 #include "{functions}.h"
 
-#define INITIALIZED 4503601774854145.0 /* which memory does not hold by chance */
+#define INITIALIZED 4503601774854145.0 /* unlikely in uninitialized memory */
 #define LARGEST_START 1e9
 
 static int is_valid(const double *values, size_t size)
@@ -144,7 +144,7 @@ class CFault(enum.IntEnum):
 
     @property
     def explanation(self) -> str:
-        """One phrase for people."""
+        """Cause of the fault in one phrase."""
         return _EXPLANATIONS[self]
 
 
@@ -152,12 +152,12 @@ _EXPLANATIONS = {
     CFault.NOT_INITIALIZED: "controller_step was called before controller_initialize",
     CFault.START_INVALID: "controller_initialize was given a value that is NaN, infinite or beyond "
     "1e9",
-    CFault.FAULT_INVALID: "the controller found a fault that is not a number of one",
+    CFault.FAULT_INVALID: "the fault output of the controller is not a fault number",
 }
 
 
 def fault_sentences() -> dict[int, str]:
-    """Return the sentences of all values that a controller in C returns, by value."""
+    """Return the sentences of all return values of a controller in C, by value."""
     return {int(fault): fault.explanation for kind in (Fault, CFault) for fault in kind}
 
 
@@ -166,14 +166,14 @@ class CController:
     """A controller in C99.
 
     Attributes:
-        program: What it does.
+        program: Program of the network.
         period: Sampling time [s].
-        title: What it is.
-        presets: States that it begins with, by name; the others are what the inputs say.
-        scenario: Name of what it was made from.
-        hash: SHA-256 of that.
-        turning: Whether each joint turns, else it slides; ports name both units if it is empty, or
-            where some do.
+        title: Title in the files.
+        presets: Initial states by name; the others follow from the inputs.
+        scenario: Name of the scenario that it was generated from.
+        hash: SHA-256 of the scenario.
+        turning: Whether each joint is revolute, otherwise prismatic; ports name both units if it is
+            empty or mixed.
     """
 
     program: Program
@@ -186,7 +186,7 @@ class CController:
 
     @classmethod
     def of(cls, network: Network, period: float, **about: Any) -> "CController":
-        """Return the controller that a network is.
+        """Return a network as a controller.
 
         Args:
             network: Network of blocks.
@@ -208,11 +208,11 @@ class CController:
         """Return the contents of all source files and of ``interface.json``, by name.
 
         Raises:
-            InputError: If something has no translation to C.
+            InputError: If an operation has no translation to C.
         """
         step, initial = self._step, self._initial
         size = max(self.program.size, 1)
-        given = {"x": "state->x", "t": "&state->tick", "x_next": "x_next"}
+        members = {"x": "state->x", "t": "&state->tick", "x_next": "x_next"}
         network = self.program.network
         checked = [
             f"is_valid(inputs->{_identifier(name)}, {network.inputs[name].size})"
@@ -235,8 +235,8 @@ class CController:
                 size=size,
                 unused="" if checked else "(void)inputs;\n    ",
                 is_valid=" && ".join(checked) or "is_valid(&state->tick, 1)",
-                initial=", ".join(self._arguments(initial, given | {"x_start": "state->x"})),
-                step=", ".join(self._arguments(step, given)),
+                initial=", ".join(self._arguments(initial, members | {"x_start": "state->x"})),
+                step=", ".join(self._arguments(step, members)),
                 fault=_identifier("fault"),
                 status=f"\n    outputs->{_identifier('status')}[0] = fault;" if status else "",
                 not_initialized=int(CFault.NOT_INITIALIZED),
@@ -250,17 +250,17 @@ class CController:
         """Write all files, and return them.
 
         Args:
-            folder: Made if it does not exist.
+            folder: Folder; created if it does not exist.
 
         Raises:
-            InputError: If the folder holds other files of these names, or cannot be written.
+            InputError: If the folder contains other files of these names, or cannot be written.
         """
         files = {name: text.encode("utf-8") for name, text in self.files().items()}
         refuse_foreign(folder, (*files, MANIFEST))
         return write_own(folder, files)
 
     def interface(self) -> dict[str, Any]:
-        """Return what ``interface.json`` says."""
+        """Return the content of ``interface.json``."""
         network = self.program.network
         inputs = [
             {"name": name, "size": port.size, "unit": self._unit(port.unit)}
@@ -282,7 +282,7 @@ class CController:
         }
 
     def _unit(self, unit: str) -> str:
-        """Return a port's unit as it is for joints that all turn, or all slide."""
+        """Return a port's unit, reduced if all joints are revolute, or all are prismatic."""
         if not self.turning or any(self.turning) != all(self.turning):
             return unit
         for turns, slides in _UNITS_OF_JOINTS:
@@ -290,7 +290,7 @@ class CController:
         return unit
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states that are set before the start, and which: ``x`` and ``preset``."""
+        """Return the states set before the start, and their flags: ``x`` and ``preset``."""
         x, preset = np.zeros(self.program.size), np.zeros(len(self.program.states))
         for name, value in self.presets.items():
             x[self.program.states[name]] = value
@@ -299,7 +299,7 @@ class CController:
 
     @property
     def table_bytes(self) -> int:
-        """Size of the tables."""
+        """Size of the tables [bytes]."""
         declared = self._functions[f"{_FUNCTIONS}_tables.h"]
         return sum(_DOUBLE * int(size) for size in re.findall(r"\[(\d+)\];", declared))
 
@@ -321,21 +321,21 @@ class CController:
         t = ca.MX.sym("t")
         u = {name: ca.MX.sym(name, self.program.network.inputs[name].size) for name in names}
         x, preset = self.start()
-        begun = self.program.initial(ca.DM(x), ca.DM(preset), t, *u.values())
-        return ca.Function("initial", [t, *u.values()], [begun], ["t", *u], ["x_start"])
+        x_start = self.program.initial(ca.DM(x), ca.DM(preset), t, *u.values())
+        return ca.Function("initial", [t, *u.values()], [x_start], ["t", *u], ["x_start"])
 
-    def _arguments(self, function: ca.Function, given: Mapping[str, str]) -> list[str]:
-        """Return what a function in C is called with."""
+    def _arguments(self, function: ca.Function, members: Mapping[str, str]) -> list[str]:
+        """Return the arguments of a call of a function in C."""
         n = function.n_in()
         names = [*function.name_in(), *function.name_out()]
         return [
-            given.get(name, f"{'inputs' if i < n else 'outputs'}->{member}")
+            members.get(name, f"{'inputs' if i < n else 'outputs'}->{member}")
             for i, (name, member) in enumerate(zip(names, map(_identifier, names), strict=True))
         ]
 
 
 def _identifier(name: str) -> str:
-    """Return a name as one of C."""
+    """Return a name as a C identifier."""
     return parameters(ca.Function("f", [ca.SX.sym("x")], [], [name], []))[0]
 
 

@@ -1,4 +1,4 @@
-"""Any diagram of blocks that controls as a project in C99, in one call."""
+"""Any controller of blocks as a C99 project, in one call."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +16,7 @@ from pfsc_drake.systems.fuse import fuse
 def export(
     controller: Diagram, folder: str | Path, inputs: Mapping[str, np.ndarray] | None = None
 ) -> CController:
-    """Write a controller as C99, with all that is needed to try it.
+    """Write a controller as C99, with all files needed to test it.
 
     ::
 
@@ -24,38 +24,39 @@ def export(
         export(follower, "controller", {"plant_state": np.tile(follower.start_state, (100, 1))})
 
     Args:
-        controller: Diagram of blocks with an output ``fault``, its first output what drives are
-            told, as a :class:`~pfsc_drake.Follower` is.
-        folder: Where the files go; made if it does not exist. What they are is in ``README.md``.
+        controller: Diagram of blocks with an output ``fault`` and the command of the drives as its
+            first output, such as a :class:`~pfsc_drake.Follower`.
+        folder: Folder of the files, described in its ``README.md``; created if it does not exist.
             Files of earlier exports are replaced, others never: the folder is refused then.
-        inputs: Values of all inputs at some ticks, each (ticks, size), which are recorded with
-            what the controller makes of them, to be repeated in C; no record if omitted.
+        inputs: Values of all inputs at some ticks, each (ticks, size). They are recorded with the
+            controller's outputs, for comparison in C; no record if omitted.
 
     Returns:
         The controller in C.
 
     Raises:
-        InputError: If a part is no block, there is no ``fault``, inputs do not suit, or the folder
-            holds files of these names that no export has written, or that were changed since.
+        InputError: If a part is not a block, there is no ``fault``, inputs do not fit, or the
+            folder contains files of these names that no export has written, or that were changed
+            since.
     """
     require(str(folder) != "", "folder", "''", "a folder")
     check_project(Path(folder))
     whole = fuse(controller)
     title = controller.get_name() or "Controller"
     exported = CController.of(whole.network, whole.period, title=title)
-    recorded = None if inputs is None else _recorded(exported, inputs)
+    recorded = None if inputs is None else _record(exported, inputs)
     write_project(exported, Path(folder), recorded)
     return exported
 
 
-def _recorded(controller: CController, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+def _record(controller: CController, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
     stepper = Stepper(controller.program.network)
     rows = []
     for values in zip(*inputs.values(), strict=True):
-        given = dict(zip(inputs, values, strict=True))
-        told = stepper.step(**given)
+        tick = dict(zip(inputs, values, strict=True))
+        outputs = stepper.step(**tick)
         network = controller.program.network
-        parts = [*(given[name] for name in network.inputs), *(told[n] for n in network.outputs)]
+        parts = [*(tick[name] for name in network.inputs), *(outputs[n] for n in network.outputs)]
         rows.append(np.concatenate([np.ravel(part) for part in parts]))
     return np.array(rows)
 
@@ -66,7 +67,7 @@ _HARNESS = Path(__file__).parent / "harness"
 _README = """\
 # {title}
 
-Generated C99: no allocation, nothing but the mathematical library, no memory but what is in
+Generated C99: no allocation, only the mathematical library, and all memory is in
 `controller_state`.
 
     controller_state state;
@@ -74,7 +75,7 @@ Generated C99: no allocation, nothing but the mathematical library, no memory bu
     fault = controller_step(&state, &inputs, &outputs);   /* every {period:g} s */
 
 A fault other than 0 holds until the next `controller_initialize`; the outputs then stop the robot.
-With faults above 100 there is no state to stop it from: drives get 0, and brakes have to hold it.
+With faults above 100 there is no state to stop it from: the drives get 0, and brakes must hold it.
 
 | fault | cause |
 |---|---|
@@ -88,51 +89,53 @@ With faults above 100 there is no state to stop it from: drives get 0, and brake
 |---|---|---|
 {outputs}
 
-The state takes {state} bytes, tables {tables} bytes, the source {source} kB. Made from
+The state takes {state} bytes, the tables {tables} bytes, the source {source} kB. Generated from
 {origin}.
 
 - `make` builds `replay`, `replay_random` and `main_rt`; so does CMake: `cmake -B build && cmake
   --build build`. Other compilers: `make CC=clang OPTIMIZATION=-O2`, with `-std=c99` or
   `-ffp-contract=off`.
-- `./replay [LOG]` feeds recorded inputs, those of `replay.bin`, and compares the outputs bit by
-  bit; it prints the time of a step. On another machine the sine may differ in the last place.
-- `./replay_random` feeds wrong inputs: they end in a fault, and what drives are told is finite.
+- `./replay [LOG]` feeds the recorded inputs of `replay.bin`, and compares the outputs bit by bit;
+  it prints the time of a step. On another machine the sine may differ in the last digit.
+- `./replay_random` feeds invalid inputs: they end in a fault, and the command of the drives is
+finite.
 - `make sanitize` does both with the sanitizers of addresses and undefined behaviour.
 - `./main_rt [SECONDS [LOG]]` steps once per sampling time with deadlines and prints a histogram.
   Put your drivers into its two functions `read_inputs` and `write_outputs`.
-- `interface.json` says the same as these tables, for programs.
+- `interface.json` contains the same tables, for programs.
 """
 
 
 def write_project(
     controller: CController, folder: Path, recorded: np.ndarray | None = None
 ) -> list[Path]:
-    """Write a controller and what goes with it, and return all files.
+    """Write a controller and its project, and return all files.
 
     Args:
         controller: The controller.
-        folder: Made if it does not exist.
+        folder: Folder; created if it does not exist.
         recorded: Inputs, then outputs of each tick of a run, in the order of ``interface.json``,
             shape (ticks, inputs and outputs), for ``replay.bin``.
 
     Raises:
-        InputError: If something has no translation to C, or the folder is refused.
+        InputError: If an operation has no translation to C, or the folder is refused.
     """
     files = {name: text.encode("utf-8") for name, text in controller.files().items()}
     files |= {file.name: file.read_bytes() for file in _harness()}
     if recorded is not None:
         files[LOG] = np.ascontiguousarray(recorded, dtype=float).tobytes()
     source = sum(len(text) for name, text in files.items() if name.startswith("controller"))
-    said = controller.interface()
+    interface = controller.interface()
+    source_name = f"`{interface['scenario']}`, SHA-256 `{interface['hash']}`"
     files[_README_NAME] = _README.format(
         title=controller.title,
         period=controller.period,
-        inputs=_rows(said["inputs"]),
-        outputs=_rows(said["outputs"]),
-        faults="\n".join(f"| {n} | {cause} |" for n, cause in said["faults"].items()),
-        state=said["state_bytes"],
-        tables=said["table_bytes"],
-        origin=f"`{said['scenario']}`, SHA-256 `{said['hash']}`" if said["hash"] else "blocks",
+        inputs=_rows(interface["inputs"]),
+        outputs=_rows(interface["outputs"]),
+        faults="\n".join(f"| {n} | {cause} |" for n, cause in interface["faults"].items()),
+        state=interface["state_bytes"],
+        tables=interface["table_bytes"],
+        origin=source_name if interface["hash"] else "blocks",
         source=round(source / 1000),
     ).encode("utf-8")
     refuse_foreign(folder, (*files, MANIFEST))

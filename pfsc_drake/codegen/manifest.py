@@ -1,4 +1,4 @@
-"""Manifest of a folder: which of its files this program has written."""
+"""Manifest of a folder: the files that this program has written."""
 
 import hashlib
 import json
@@ -22,8 +22,8 @@ def manifest_text(
 
     Args:
         kind: Kind of results, e.g. ``run``.
-        files: Their names in the folder, perhaps with the SHA-256 that each may have.
-        outcome: How it ended, if that is told.
+        files: Their names in the folder, optionally with the SHA-256 that each may have.
+        outcome: Outcome, if any.
     """
     listed = dict(files) if isinstance(files, Mapping) else list(files)
     content: dict[str, Any] = {"program": _PROGRAM, "results": kind, "files": listed}
@@ -33,7 +33,7 @@ def manifest_text(
 
 
 def read_manifest(folder: Path) -> tuple[str, dict[str, list[str]]] | None:
-    """Return kind of results, and names with SHA-256 of their files, as a folder's manifest says.
+    """Return the kind of results, and the names of their files with SHA-256, from a manifest.
 
     None without a manifest of this program.
     """
@@ -50,14 +50,14 @@ def read_manifest(folder: Path) -> tuple[str, dict[str, list[str]]] | None:
 
 
 def refuse_foreign(folder: Path, names: Iterable[str]) -> None:
-    """Refuse a folder where files of an export would replace others; changes nothing.
+    """Refuse a folder where files of an export would replace others; change nothing.
 
     Args:
         folder: The folder, which may be missing.
         names: Names of the files of the export.
 
     Raises:
-        InputError: If one stands there that no export has written, or that has been changed since.
+        InputError: If it contains a file that no export has written, or that was changed since.
     """
     if (folder.is_symlink() or folder.exists()) and not folder.is_dir():
         raise InputError(f"{folder}: is no folder; allowed: a folder")
@@ -85,7 +85,7 @@ def write_own(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
     """Write the files of an export, and the manifest that lists them; return all.
 
     Args:
-        folder: That :func:`refuse_foreign` has nothing to say against; made if it is missing.
+        folder: Folder accepted by :func:`refuse_foreign`; created if it is missing.
         files: Contents by name.
 
     Raises:
@@ -108,7 +108,7 @@ def write_own(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Write a file under another name, which it changes for its own when it is complete."""
+    """Write a file under another name, and rename it when it is complete."""
     unfinished = file.with_name(f".unfinished_{file.name}")
     unfinished.write_bytes(content)
     unfinished.replace(file)

@@ -1,4 +1,4 @@
-"""Functions that are evaluated a thousand times a second, on arrays that stay."""
+"""Functions for evaluation a thousand times a second, on fixed arrays."""
 
 import functools
 import struct
@@ -11,25 +11,26 @@ from pfsc_drake.compiled.native_code import native_code
 
 
 class BoundFunction:
-    """A CasADi function with arrays of its own for arguments and results.
+    """A CasADi function with its own arrays for arguments and results.
 
-    Nothing is allocated and nothing checked in an evaluation: write into the arguments, call
+    An evaluation allocates nothing and checks nothing: write into the arguments, call
     :attr:`evaluate`, read the results.
 
-    The function becomes machine code here and now, so that no evaluation takes longer than another
-    (:mod:`~pfsc_drake.compiled.native_code`: once per content, and kept for the next process). What
-    cannot be compiled is left to CasADi's interpreter; the results are the same to the last bit.
+    The function is compiled when it is bound, so that all evaluations take the same time
+    (:mod:`~pfsc_drake.compiled.native_code`: once per content, with a cache on disk). A function
+    that cannot be compiled is left to CasADi's interpreter; the results are the same to the last
+    bit.
 
     Args:
         function: The function; arguments and results must be dense.
-        often: Whether it is evaluated so often that machine code pays.
-        shared: Arrays to use for arguments or results of these names, so that functions
-            need not copy from each other. Contiguous, of doubles.
+        often: Whether it is evaluated so often that machine code pays off.
+        shared: Arrays to use for arguments or results of these names, so that functions need not
+            copy from each other. Contiguous, of doubles.
 
     Attributes:
         arguments: Flat arrays by name, each (number of elements,); matrices by columns.
-        results: The same of the results.
-        evaluate: Calculates the results from the arguments.
+        results: The same for the results.
+        evaluate: Compute the results from the arguments.
 
     Raises:
         ValueError: If the function has sparse arguments or results, or a shared array does
@@ -49,15 +50,15 @@ class BoundFunction:
         self._function = function
         code = native_code(function) if often else None
         if code is None:
-            self.evaluate = self._interpreted(function)
+            self.evaluate = self._bind_interpreter(function)
         else:
             self.evaluate = code.bind([*self.arguments.values()], [*self.results.values()])
 
     def __content__(self) -> ca.Function:
-        """Return what decides over it: the arrays are written before every use."""
+        """Return the content that determines it: the arrays are written before every use."""
         return self._function
 
-    def _interpreted(self, function: ca.Function) -> Callable[[], None]:
+    def _bind_interpreter(self, function: ca.Function) -> Callable[[], None]:
         buffer, evaluate = function.buffer()
         for i, values in enumerate(self.arguments.values()):
             buffer.set_arg(i, values.data)
@@ -87,8 +88,8 @@ def _array(name: str, sparsity: ca.Sparsity, shared: dict[str, np.ndarray]) -> n
 class PlainFunction:
     """A CasADi function that takes and returns plain floats, see :class:`BoundFunction`.
 
-    For callers that compute with single floats: in a tick of 1 ms an array costs more than many a
-    formula.
+    For callers that compute with single floats: in a tick of 1 ms an array costs more than many
+    formulas.
 
     Args:
         function: The function; arguments and results must be dense.
@@ -96,22 +97,22 @@ class PlainFunction:
 
     def __init__(self, function: ca.Function) -> None:
         arguments, results = function.name_in(), function.name_out()
-        given = np.zeros(sum(function.numel_in(name) for name in arguments))
-        made = np.zeros(sum(function.numel_out(name) for name in results))
+        inputs = np.zeros(sum(function.numel_in(name) for name in arguments))
+        outputs = np.zeros(sum(function.numel_out(name) for name in results))
         parts: dict[str, np.ndarray] = {}
         for names, sizes, flat in (
-            (arguments, function.numel_in, given),
-            (results, function.numel_out, made),
+            (arguments, function.numel_in, inputs),
+            (results, function.numel_out, outputs),
         ):
             ends = np.cumsum([sizes(name) for name in names])
             parts |= dict(zip(names, np.split(flat, ends[:-1]), strict=True))
         self._evaluate = BoundFunction(function, **parts).evaluate
-        self._given, self._made = given.data, made.data
-        self._write = struct.Struct(f"{given.size}d").pack_into
-        self._read = struct.Struct(f"{made.size}d").unpack_from
+        self._inputs, self._outputs = inputs.data, outputs.data
+        self._write = struct.Struct(f"{inputs.size}d").pack_into
+        self._read = struct.Struct(f"{outputs.size}d").unpack_from
 
     def __call__(self, *values: float) -> tuple[float, ...]:
-        """Return all elements of the results from those of the arguments, one after the other."""
-        self._write(self._given, 0, *values)
+        """Return all elements of the results from all elements of the arguments, in order."""
+        self._write(self._inputs, 0, *values)
         self._evaluate()
-        return self._read(self._made)
+        return self._read(self._outputs)

@@ -1,4 +1,4 @@
-"""Functions in C99: nothing but numbers, arrays on the stack, and the mathematical library."""
+"""Functions in C99: numbers, arrays on the stack, and the mathematical library."""
 
 import functools
 import math
@@ -25,14 +25,14 @@ _EXPRESSIONS = {
     ca.OP_SQRT: "sqrt({x})",
     ca.OP_FABS: "fabs({x})",
     ca.OP_COPYSIGN: "copysign({x}, {y})",
-    # a number rather than NaN; of 0 and -0, which the standard leaves open, CasADi's is the first
+    # a number rather than NaN; of 0 and -0, which the standard leaves open, CasADi takes the first
     ca.OP_FMIN: "smaller({x}, {y})",
     ca.OP_FMAX: "larger({x}, {y})",
     ca.OP_SIGN: "sign({x})",
 }
 _RELATIONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 
-# each needs those before it, if any
+# each helper may call those before it
 _HELPERS = """\
 static double smaller(double x, double y)
 {
@@ -49,8 +49,8 @@ static double sign(double x)
     return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x;
 }
 
-/* rounded towards zero; far below zero what is no number or too large for an integer; so that sums
-   of two do not overflow */
+/* rounded towards zero; far below zero if NaN or out of the range of integers; sums of two do not
+   overflow */
 static long long rounded(double x)
 {
     const long long most = 4611686018427387904LL;
@@ -119,7 +119,7 @@ class CCode(Code):
     """Instructions of one function in C.
 
     Args:
-        tables: Where constant tables go.
+        tables: Store of the constant tables.
     """
 
     nowhere = "NULL"
@@ -130,32 +130,32 @@ class CCode(Code):
         self._buffers: dict[str, int] = {}
 
     def text(self, name: str, parameters: Sequence[str]) -> str:
-        """Return the function."""
+        """Return the text of the function."""
         lines, live = _needed(self._lines)
         buffers = [f"double {b}[{size}];" for b, size in self._buffers.items() if b in live]
         return _function(name, parameters, [*buffers, *lines])
 
     @staticmethod
-    def repeated(
+    def loop(
         name: str, parameters: Sequence[str], sizes: Sequence[int], called: str, repetitions: int
     ) -> str:
-        """Return a function that calls another with one part of its arrays after the other."""
-        given = ", ".join(f"{p} + {size} * i" for p, size in zip(parameters, sizes, strict=True))
+        """Return a function that calls another for one part of its arrays after the other."""
+        passed = ", ".join(f"{p} + {size} * i" for p, size in zip(parameters, sizes, strict=True))
         return _function(
             name,
             parameters,
-            [f"for (int i = 0; i < {repetitions}; ++i) {{", f"    {called}({given});", "}"],
+            [f"for (int i = 0; i < {repetitions}; ++i) {{", f"    {called}({passed});", "}"],
         )
 
     @staticmethod
-    def switched(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
-        """Return a function whose first argument says which of several others is called."""
+    def switch(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
+        """Return a function that calls one of several others, by its first argument."""
         index, *others = parameters
-        given = ", ".join(others)
+        passed = ", ".join(others)
         lines = [f"switch (rounded(*{index})) {{"]
         for i, case in enumerate(cases):
             label = "default" if i == len(cases) - 1 else f"case {i}"
-            lines += [f"{label}:", f"    {case}({given});", "    break;"]
+            lines += [f"{label}:", f"    {case}({passed});", "    break;"]
         return _function(name, parameters, [*lines, "}"])
 
     def buffer(self, size: int) -> str:
@@ -168,27 +168,27 @@ class CCode(Code):
         """Return the pointer to an element."""
         return f"{pointer} + {index}" if index else pointer
 
-    def _operated(self, name: str, code: int, x: str, y: str) -> str:
+    def _operation(self, name: str, code: int, x: str, y: str) -> str:
         operands = {"x": _operand(x), "y": _operand(y)}
         if code in _EXPRESSIONS:
             return f"const double {name} = {_EXPRESSIONS[code].format(**operands)};"
         function, count = function_name(code)
-        given = ", ".join([*operands.values()][:count])
-        return f"const double {name} = {function}({given});"
+        passed = ", ".join([*operands.values()][:count])
+        return f"const double {name} = {function}({passed});"
 
-    def _compared(self, name: str, code: int, x: str, y: str) -> str:
+    def _comparison(self, name: str, code: int, x: str, y: str) -> str:
         return f"const int {name} = {_operand(x)} {_RELATIONS[code]} {_operand(y)};"
 
-    def _negated(self, name: str, condition: str) -> str:
+    def _negation(self, name: str, condition: str) -> str:
         return f"const int {name} = !{condition};"
 
-    def _both(self, name: str, first: str, second: str) -> str:
+    def _conjunction(self, name: str, first: str, second: str) -> str:
         return f"const int {name} = {first} && {second};"
 
-    def _either(self, name: str, first: str, second: str) -> str:
+    def _disjunction(self, name: str, first: str, second: str) -> str:
         return f"const int {name} = {first} || {second};"
 
-    def _chosen(self, name: str, condition: str, x: str) -> str:
+    def _select(self, name: str, condition: str, x: str) -> str:
         return f"const double {name} = {condition} ? {_operand(x)} : 0.0;"
 
     def _number(self, name: str, condition: str) -> str:
@@ -197,33 +197,33 @@ class CCode(Code):
     def _read(self, name: str, pointer: str, index: int) -> str:
         return f"const double {name} = {pointer}[{index}];"
 
-    def _written(self, x: str, pointer: str, index: int) -> str:
+    def _store(self, x: str, pointer: str, index: int) -> str:
         return f"{pointer}[{index}] = {_operand(x)};"
 
-    def _rounded(self, name: str, x: str) -> str:
+    def _index(self, name: str, x: str) -> str:
         return f"const long long {name} = rounded({_operand(x)});"
 
-    def _summed(self, name: str, i: str, j: int | str) -> str:
+    def _sum(self, name: str, i: str, j: int | str) -> str:
         return f"const long long {name} = {i} + {j};"
 
     def _element_or_nan(self, name: str, pointer: str, size: int, index: str) -> str:
         return f"const double {name} = element({pointer}, {size}, {index});"
 
-    def _written_if_there(self, pointer: str, size: int, index: str, x: str) -> str:
+    def _checked_store(self, pointer: str, size: int, index: str, x: str) -> str:
         return f"put({pointer}, {size}, {index}, {_operand(x)});"
 
-    def _looked_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str:
+    def _look_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str:
         return f"const double {name} = low_{mode}({_operand(x)}, {grid}, {size});"
 
-    def _called(self, name: str, pointers: Sequence[str]) -> str:
+    def _function_call(self, name: str, pointers: Sequence[str]) -> str:
         return f"{name}({', '.join(pointers)});"
 
 
 def helpers(text: str) -> str:
-    """Return the functions that others call, as far as they need them.
+    """Return the helper functions that a text needs.
 
     Args:
-        text: The others.
+        text: The functions that may call them.
     """
     needed: list[str] = []
     for body in reversed(re.findall(r"(?:/\*[^/]*\*/\n)?static .*?\n}\n", _HELPERS, re.DOTALL)):
@@ -248,7 +248,7 @@ def table_text(name: str, values: Sequence[str]) -> str:
 
 
 def table_head(name: str, size: int) -> str:
-    """Return what declares a table.
+    """Return the declaration of a table.
 
     Args:
         name: Its name.
@@ -267,20 +267,20 @@ def _function(name: str, parameters: Sequence[str], lines: Sequence[str]) -> str
 
 
 def _needed(lines: Sequence[str]) -> tuple[list[str], set[str]]:
-    """Return the lines without those whose result no one uses, and all names in them."""
+    """Return the lines whose results are used, and all names in them."""
     live: set[str] = set()
-    kept = []
+    live_lines = []
     for line in reversed(lines):
-        # of a number, or into a buffer
-        made = re.match(r"const (?:double|int|long long) (\w+) = |put\((b\d+),|(b\d+)\[", line)
-        if made is None or (made[1] or made[2] or made[3]) in live:
+        # the target: a number, or a buffer
+        target = re.match(r"const (?:double|int|long long) (\w+) = |put\((b\d+),|(b\d+)\[", line)
+        if target is None or (target[1] or target[2] or target[3]) in live:
             live.update(re.findall(r"\b[vcib]\d+\b", line))
-            kept.append(line)
-    return kept[::-1], live
+            live_lines.append(line)
+    return live_lines[::-1], live
 
 
 def _operand(value: str) -> str:
-    """Return a name or literal as C has it."""
+    """Return a name or literal in C."""
     if not value.startswith("0x"):
         return value
     number = _number(value)
@@ -289,7 +289,7 @@ def _operand(value: str) -> str:
 
 @functools.lru_cache(maxsize=100_000)
 def _number(literal: str) -> str:
-    """Return a literal in C; decimals that Python writes are read back to the same bits."""
+    """Return a literal in C; Python's decimals are read back to the same bits."""
     (value,) = struct.unpack(">d", bytes.fromhex(literal[2:]))
     if math.isnan(value):
         return "NAN"

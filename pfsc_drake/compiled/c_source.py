@@ -32,35 +32,34 @@ _CLOSE = """\
 
 
 def c_source(functions: Mapping[str, ca.Function], prefix: str) -> dict[str, str]:
-    """Return functions as C99, which give the results of CasADi's interpreter to the last bit.
+    """Return functions as C99, with the same results as CasADi's interpreter to the last bit.
 
-    They are re-entrant, allocate nothing and need nothing but the mathematical library; what they
-    need of memory is on the stack. Arguments and results may overlap only where a function is of
-    matrix expressions (MX). Of compilers' options, none may fuse multiplication and addition
-    (``-std=c99`` or ``-ffp-contract=off``), or calculate inexactly.
+    They are re-entrant, allocate nothing, keep their memory on the stack and need only the
+    mathematical library. Arguments and results may overlap only for functions of matrix expressions
+    (MX). The compiler must neither fuse multiplication and addition (use ``-std=c99`` or
+    ``-ffp-contract=off``) nor use inexact arithmetic.
 
     Args:
-        functions: By the names that they are to have behind ``prefix_``: identifiers, none of them
-            ``tables``.
+        functions: By their names behind ``prefix_``: identifiers, none of them ``tables``.
         prefix: An identifier.
 
     Returns:
         Contents of files by their names: ``prefix.h``, ``prefix_name.c`` of each function, and
-        their tables, ``prefix_tables.h`` and ``.c``. A function takes a pointer to the nonzeros of
-        each argument, then of each result, all of them by their names (:func:`parameters`).
+        the tables, ``prefix_tables.h`` and ``.c``. A function takes a pointer to the nonzeros of
+        each argument, then of each result, named as in :func:`parameters`.
 
     Raises:
-        Untranslatable: If a function contains something that has no translation.
+        Untranslatable: If a function contains an operation without translation.
     """
     tables = Tables(f"{prefix}_table")
     declarations, files = [], {}
     for name, function in functions.items():
         translation = Translation(CCode, tables)
         inner = translation.function(function)
-        given = parameters(function)
-        declared = f"void {prefix}_{name}({_declared(function, given)})"
+        names = parameters(function)
+        declared = f"void {prefix}_{name}({_declared(function, names)})"
         declarations.append(f"{declared};\n")
-        defined = f"{declared}\n{{\n    {inner}({', '.join(given)});\n}}\n"
+        defined = f"{declared}\n{{\n    {inner}({', '.join(names)});\n}}\n"
         text = "\n".join([*translation.texts, defined])
         files[f"{prefix}_{name}.c"] = "\n".join(
             [
@@ -89,7 +88,7 @@ def parameters(function: ca.Function) -> list[str]:
     """Return the names of a function's parameters in C: its arguments, then its results.
 
     Args:
-        function: Any function. What is no identifier becomes one, and each is there once.
+        function: Any function. Characters that C does not allow are replaced; each name is unique.
     """
     names: list[str] = []
     for name in [*function.name_in(), *function.name_out()]:
@@ -109,7 +108,7 @@ def _declared(function: ca.Function, names: list[str]) -> str:
     sizes = [function.nnz_in(i) for i in range(function.n_in())]
     types = ["const double"] * len(sizes) + ["double"] * function.n_out()
     sizes += [function.nnz_out(i) for i in range(function.n_out())]
-    # there are no arrays of no elements
+    # C has no arrays without elements
     return (
         ", ".join(
             f"{kind} {name}[{size}]" if size else f"{kind} *{name}"

@@ -1,4 +1,4 @@
-"""Straight code of one function, in whatever language: numbers by name, memory where it must be."""
+"""Straight-line code of one function in any language: named numbers, memory where needed."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -12,10 +12,10 @@ from pfsc_drake.compiled.operations import COMPARISONS, LOGIC, Untranslatable, l
 __all__ = ["Code", "LiteralTable", "Tables", "Value", "Values", "elements"]
 
 Value = str | tuple[str, int]
-"""A number: its name, its literal, or pointer and element where it still is in memory.
+"""A number: its name, its literal, or pointer and element if it is still in memory.
 
-Memory that is named so does not change any more. Names of numbers begin with v, of conditions,
-which stand for 1.0 and 0.0, with c, of whole numbers with i.
+Memory with a name does not change any more. Names of numbers begin with v, of conditions (1.0 or
+0.0) with c, of integers with i.
 """
 
 Values = Sequence[Value]
@@ -23,13 +23,13 @@ _ZERO = literal(0.0)
 
 
 class LiteralTable(Sequence[Value]):
-    """Literals, perhaps very many: they are written when they are asked for.
+    """Literals, perhaps very many: their text is created on access.
 
     Args:
-        numbers: What they stand for, shape (n,).
+        numbers: Their values, shape (n,).
 
     Attributes:
-        content: The numbers as they are in memory; of NaN there is one kind.
+        content: The values as bytes; there is one kind of NaN.
     """
 
     def __init__(self, numbers: np.ndarray) -> None:
@@ -41,15 +41,15 @@ class LiteralTable(Sequence[Value]):
         return len(self._numbers)
 
     @overload
-    def __getitem__(self, place: int) -> Value: ...
+    def __getitem__(self, index: int) -> Value: ...
 
     @overload
-    def __getitem__(self, place: slice) -> Values: ...
+    def __getitem__(self, index: slice) -> Values: ...
 
-    def __getitem__(self, place: int | slice) -> Value | Values:
-        if isinstance(place, slice):
-            return LiteralTable(self._numbers[place])
-        return literal(self._numbers[place])
+    def __getitem__(self, index: int | slice) -> Value | Values:
+        if isinstance(index, slice):
+            return LiteralTable(self._numbers[index])
+        return literal(self._numbers[index])
 
     def __iter__(self) -> Iterator[Value]:
         return map(literal, self._numbers.tolist())
@@ -62,7 +62,7 @@ class Tables:
         prefix: Prefix of their names.
 
     Attributes:
-        names: Their pointers by content, which is doubles as they are in memory.
+        names: Their pointers by content, the values as bytes.
     """
 
     def __init__(self, prefix: str = "table") -> None:
@@ -85,10 +85,10 @@ class Code(ABC):
     """Instructions of one function, one after another.
 
     Args:
-        tables: Where constant tables go.
+        tables: Store of the constant tables.
 
     Attributes:
-        nowhere: The pointer to nothing, for what has no elements.
+        nowhere: The null pointer, for arrays without elements.
         most_instructions: Largest number of instructions of one function; machine code without
             optimizations keeps every value on the stack.
     """
@@ -108,7 +108,7 @@ class Code(ABC):
         Args:
             code: The operation as CasADi counts them.
             x: The first operand.
-            y: The second; nothing for operations of one.
+            y: The second; None for operations of one operand.
 
         Raises:
             Untranslatable: If the operation is not known, or there are too many instructions.
@@ -119,26 +119,26 @@ class Code(ABC):
             return self._logic(code, x, y)
         x, y = self.load(x), self.load(y)
         if code in COMPARISONS:
-            return self._add("c", self._compared, code, x, y)
-        return self._add("v", self._operated, code, x, y)
+            return self._add("c", self._comparison, code, x, y)
+        return self._add("v", self._operation, code, x, y)
 
     def _logic(self, code: int, x: Value, y: Value) -> str:
         is_true = self._truth(x)
         if code == ca.OP_IF_ELSE_ZERO:
-            return self._add("v", self._chosen, is_true, self.load(y))
+            return self._add("v", self._select, is_true, self.load(y))
         if code == ca.OP_NOT:
-            return self._add("c", self._negated, is_true)
-        both = self._both if code == ca.OP_AND else self._either
+            return self._add("c", self._negation, is_true)
+        both = self._conjunction if code == ca.OP_AND else self._disjunction
         return self._add("c", both, is_true, self._truth(y))
 
     def _truth(self, value: Value) -> str:
         if isinstance(value, str) and value[0] == "c":
             return value
         # NaN is true
-        return self._add("c", self._compared, ca.OP_NE, self.load(value), _ZERO)
+        return self._add("c", self._comparison, ca.OP_NE, self.load(value), _ZERO)
 
     def load(self, value: Value) -> str:
-        """Return a number's name or literal, after loading it where it is in memory."""
+        """Return a number's name or literal, after loading it if it is in memory."""
         if isinstance(value, str) and value[0] != "c":
             return value
         if value not in self._loaded:
@@ -150,10 +150,10 @@ class Code(ABC):
 
     def store(self, value: Value, pointer: str, index: int) -> None:
         """Write a number into memory."""
-        self._emit(self._written(self.load(value), pointer, index))
+        self._emit(self._store(self.load(value), pointer, index))
 
     def pointer(self, values: Sequence[Value]) -> str:
-        """Return a pointer to numbers one behind the other; they are not to be overwritten."""
+        """Return a pointer to numbers one behind the other; they must not be overwritten."""
         if not values:
             return self.nowhere
         if isinstance(values, LiteralTable) or all(_is_literal(value) for value in values):
@@ -173,28 +173,28 @@ class Code(ABC):
         return buffer
 
     def index(self, value: Value) -> str:
-        """Return a whole number, rounded towards zero, or one far below zero of what is none."""
-        return self._add("i", self._rounded, self.load(value))
+        """Return an integer, rounded towards zero; far below zero for NaN and out of range."""
+        return self._add("i", self._index, self.load(value))
 
     def plus(self, i: str, j: int | str) -> str:
-        """Return the sum of two whole numbers."""
-        return self._add("i", self._summed, i, j)
+        """Return the sum of two integers."""
+        return self._add("i", self._sum, i, j)
 
     def get(self, pointer: str, size: int, index: str) -> str:
         """Return an element at a computed index, NaN where there is none."""
         return self._add("v", self._element_or_nan, pointer, size, index)
 
     def put(self, pointer: str, size: int, index: str, value: Value) -> None:
-        """Write an element at a computed index, if there is such an element."""
-        self._emit(self._written_if_there(pointer, size, index, self.load(value)))
+        """Write an element at a computed index, if the element exists."""
+        self._emit(self._checked_store(pointer, size, index, self.load(value)))
 
     def low(self, mode: str, grid: str, size: int, value: Value) -> str:
-        """Return where a number is in a grid: ``linear``, ``binary`` or ``exact`` search."""
-        return self._add("v", self._looked_up, mode, grid, size, self.load(value))
+        """Return the index of a number in a grid: ``linear``, ``binary`` or ``exact`` search."""
+        return self._add("v", self._look_up, mode, grid, size, self.load(value))
 
     def call(self, name: str, pointers: Sequence[str]) -> None:
         """Add the call of a function."""
-        self._emit(self._called(name, pointers))
+        self._emit(self._function_call(name, pointers))
 
     def _add(self, kind: str, instruction: Callable[..., str], *operands: object) -> str:
         self._names += 1
@@ -218,28 +218,28 @@ class Code(ABC):
 
     @staticmethod
     @abstractmethod
-    def repeated(
+    def loop(
         name: str, parameters: Sequence[str], sizes: Sequence[int], called: str, repetitions: int
     ) -> str:
-        """Return a function that calls another with one part of its arrays after the other.
+        """Return a function that calls another for one part of its arrays after the other.
 
         Args:
             name: Its name.
             parameters: Parameters of both.
             sizes: Number of elements in a part, of each parameter.
-            called: The other.
+            called: The other function.
             repetitions: Number of parts.
         """
 
     @staticmethod
     @abstractmethod
-    def switched(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
-        """Return a function whose first argument says which of several others is called.
+    def switch(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
+        """Return a function that calls one of several others, by its first argument.
 
         Args:
             name: Its name.
-            parameters: The index, and those of the others.
-            cases: The others; the last of them where the index fits none.
+            parameters: The index, then the parameters of the others.
+            cases: The others; the last one also if the index is out of range.
         """
 
     @abstractmethod
@@ -253,22 +253,22 @@ class Code(ABC):
     # the instructions in the language; the first argument is the name of the result
 
     @abstractmethod
-    def _operated(self, name: str, code: int, x: str, y: str) -> str: ...
+    def _operation(self, name: str, code: int, x: str, y: str) -> str: ...
 
     @abstractmethod
-    def _compared(self, name: str, code: int, x: str, y: str) -> str: ...
+    def _comparison(self, name: str, code: int, x: str, y: str) -> str: ...
 
     @abstractmethod
-    def _negated(self, name: str, condition: str) -> str: ...
+    def _negation(self, name: str, condition: str) -> str: ...
 
     @abstractmethod
-    def _both(self, name: str, first: str, second: str) -> str: ...
+    def _conjunction(self, name: str, first: str, second: str) -> str: ...
 
     @abstractmethod
-    def _either(self, name: str, first: str, second: str) -> str: ...
+    def _disjunction(self, name: str, first: str, second: str) -> str: ...
 
     @abstractmethod
-    def _chosen(self, name: str, condition: str, x: str) -> str: ...
+    def _select(self, name: str, condition: str, x: str) -> str: ...
 
     @abstractmethod
     def _number(self, name: str, condition: str) -> str: ...
@@ -277,25 +277,25 @@ class Code(ABC):
     def _read(self, name: str, pointer: str, index: int) -> str: ...
 
     @abstractmethod
-    def _written(self, x: str, pointer: str, index: int) -> str: ...
+    def _store(self, x: str, pointer: str, index: int) -> str: ...
 
     @abstractmethod
-    def _rounded(self, name: str, x: str) -> str: ...
+    def _index(self, name: str, x: str) -> str: ...
 
     @abstractmethod
-    def _summed(self, name: str, i: str, j: int | str) -> str: ...
+    def _sum(self, name: str, i: str, j: int | str) -> str: ...
 
     @abstractmethod
     def _element_or_nan(self, name: str, pointer: str, size: int, index: str) -> str: ...
 
     @abstractmethod
-    def _written_if_there(self, pointer: str, size: int, index: str, x: str) -> str: ...
+    def _checked_store(self, pointer: str, size: int, index: str, x: str) -> str: ...
 
     @abstractmethod
-    def _looked_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str: ...
+    def _look_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str: ...
 
     @abstractmethod
-    def _called(self, name: str, pointers: Sequence[str]) -> str: ...
+    def _function_call(self, name: str, pointers: Sequence[str]) -> str: ...
 
 
 def elements(pointer: str, size: int, first: int = 0) -> Values:

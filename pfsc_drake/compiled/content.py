@@ -1,10 +1,10 @@
-"""What is made of the same content is made once per process.
+"""Results that are computed once per process for the same content.
 
-Setting up functions takes most of the time that building a station takes, and most stations of a
-process, those of a sweep or of a study of margins, have most of their parts in common. What is
-decorated with :func:`once_per_content` must be a function of its arguments alone, and what it
-returns must never be changed by anybody: CasADi functions, frozen dataclasses of them, tuples,
-arrays, which are made read-only.
+The setup of functions takes most of the time that building a station takes, and most stations of a
+process, such as those of a sweep or of a study of margins, share most of their parts. A function
+decorated with :func:`once_per_content` must depend on its arguments alone, and its results must
+never be changed: CasADi functions, frozen dataclasses of them, tuples, arrays, which become
+read-only.
 """
 
 import enum
@@ -26,30 +26,30 @@ __all__ = ["NoContentError", "content", "function_digest", "once_per_content"]
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# of many functions in a process, those whose digests are kept
+# functions in a process whose digests are stored
 _MOST_FUNCTIONS = 1000
-# and frozen objects
+# frozen objects whose digests are stored
 _MOST_REMEMBERED = 2000
 # bytes, up to which nothing is hashed
 _SHORT = 200
 
 
 class NoContentError(TypeError):
-    """What an object is cannot be told from what it holds."""
+    """Error for an object whose content cannot be found from its attributes."""
 
 
-def once_per_content(most_kept: int = 100) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator by which a function returns what it returned for the same content.
+def once_per_content(capacity: int = 100) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return a decorator that reuses the result of a function for the same content.
 
-    The same content is the same types and the same values to the last bit, however deep. Where an
-    argument holds what has no content, a Drake system for example, the function is called anew.
+    The same content is the same types and the same values to the last bit, however deep. If an
+    argument has no content, such as a Drake system, the function is called anew.
 
     Args:
-        most_kept: Largest number kept of how many contents results are kept, those asked for last.
+        capacity: Largest number of stored results; the least recently used ones are dropped.
     """
 
     def decorator(function: Callable[P, R]) -> Callable[P, R]:
-        kept: OrderedDict[Any, R] = OrderedDict()
+        results: OrderedDict[Any, R] = OrderedDict()
         lock = threading.Lock()
 
         @functools.wraps(function)
@@ -59,20 +59,20 @@ def once_per_content(most_kept: int = 100) -> Callable[[Callable[P, R]], Callabl
             except NoContentError:
                 return function(*args, **kwargs)
             with lock:
-                if key in kept:
-                    kept.move_to_end(key)
-                    return kept[key]
-            made = function(*args, **kwargs)
-            for part in made if isinstance(made, tuple) else (made,):
+                if key in results:
+                    results.move_to_end(key)
+                    return results[key]
+            result = function(*args, **kwargs)
+            for part in result if isinstance(result, tuple) else (result,):
                 if isinstance(part, np.ndarray):
                     part.flags.writeable = False
             with lock:
-                # what another thread was first to make has been handed out
-                made = kept.setdefault(key, made)
-                kept.move_to_end(key)
-                while len(kept) > most_kept:
-                    kept.popitem(last=False)
-            return made
+                # if another thread was first, its result has been handed out
+                result = results.setdefault(key, result)
+                results.move_to_end(key)
+                while len(results) > capacity:
+                    results.popitem(last=False)
+            return result
 
         return once
 
@@ -82,22 +82,22 @@ def once_per_content(most_kept: int = 100) -> Callable[[Callable[P, R]], Callabl
 def content(value: Any) -> bytes:
     """Return a key that is equal for equal content, and for nothing else, in this process.
 
-    Numbers, text, arrays, containers and CasADi functions are told by their values; objects by
-    their type and attributes, those left out that a ``cached_property`` has found. An object that
-    less decides over says what by a method ``__content__``. Types and functions of Python are
-    themselves; of closures and bound methods what they hold counts as well.
+    Numbers, text, arrays, containers and CasADi functions are compared by value; objects by type
+    and attributes, without those computed by a ``cached_property``. An object that depends on less
+    returns it from a method ``__content__``. Types and functions of Python are themselves; for
+    closures and bound methods the values they hold count as well.
 
     Args:
         value: Anything.
 
     Raises:
-        NoContentError: If something in it has no such content.
+        NoContentError: If a part of it has no content.
     """
     return _Walk().digest(value).key
 
 
 def function_digest(function: ca.Function) -> bytes:
-    """Return a digest of what a CasADi function does.
+    """Return a digest of a CasADi function's instructions.
 
     Args:
         function: Any function.
@@ -107,7 +107,7 @@ def function_digest(function: ca.Function) -> bytes:
     if found is None:
         found = function, hashlib.sha256(function.serialize().encode()).digest()
         with _digests_lock:
-            # the function is kept, for the key is its address
+            # the function is stored too, for the key is its address
             _digests[key] = found
             while len(_digests) > _MOST_FUNCTIONS:
                 _digests.popitem(last=False)
@@ -123,7 +123,7 @@ class _Digest(NamedTuple):
 
     Attributes:
         key: The digest.
-        arrays: Arrays in what else can never change; None if more than these could.
+        arrays: Its arrays, if everything else is immutable; otherwise None.
     """
 
     key: bytes
@@ -135,12 +135,12 @@ class _Remembered(NamedTuple):
 
     value: Any
     digest: _Digest
-    told: list[bytes]
+    contents: list[bytes]
 
     def holds(self, value: Any) -> bool:
-        """Return whether the digest is still that of the object."""
+        """Return whether the digest is still valid for the object."""
         arrays = self.digest.arrays or ()
-        return self.value is value and [a.tobytes() for a in arrays] == self.told
+        return self.value is value and [a.tobytes() for a in arrays] == self.contents
 
 
 _remembered: OrderedDict[int, _Remembered] = OrderedDict()
@@ -164,10 +164,10 @@ _UNCHANGING = (
 
 
 class _Walk:
-    """A walk through a value and all that it holds, each object once."""
+    """A traversal of a value and all its parts, each object once."""
 
     def __init__(self) -> None:
-        # the objects are kept, for the keys are their addresses; None of those not left yet
+        # with the objects, for the keys are their addresses; None for those in progress
         self._known: dict[int, tuple[Any, _Digest | None]] = {}
 
     def digest(self, value: Any) -> _Digest:
@@ -178,53 +178,53 @@ class _Walk:
         known = self._known.get(id(value))
         if known is None:
             self._known[id(value)] = value, None
-            found = self._found(value)
+            found = self._digest_of_object(value)
             self._known[id(value)] = value, found
             return found
         if known[1] is None:
             raise NoContentError(f"{type(value).__name__}: holds itself")
         return known[1]
 
-    def _found(self, value: Any) -> _Digest:
-        """Return the digest of what this walk has not met; of frozen objects it is remembered."""
+    def _digest_of_object(self, value: Any) -> _Digest:
+        """Return the digest of an object that is new to this traversal, stored if frozen."""
         if not _is_frozen(type(value)):
-            return self._made(value)
+            return self._new_digest(value)
         before = _remembered.get(id(value))
         if before is not None and before.holds(value):
             return before.digest
-        made = self._made(value)
-        if made.arrays is not None:
+        result = self._new_digest(value)
+        if result.arrays is not None:
             with _remembered_lock:
-                told = [array.tobytes() for array in made.arrays]
-                _remembered[id(value)] = _Remembered(value, made, told)
+                contents = [array.tobytes() for array in result.arrays]
+                _remembered[id(value)] = _Remembered(value, result, contents)
                 while len(_remembered) > _MOST_REMEMBERED:
                     _remembered.popitem(last=False)
-        return made
+        return result
 
-    def _made(self, value: Any) -> _Digest:
+    def _new_digest(self, value: Any) -> _Digest:
         tag, parts = self._parts(value)
         keys: list[bytes] = []
-        held: tuple[np.ndarray, ...] | None = ()
+        arrays: tuple[np.ndarray, ...] | None = ()
         for part in parts:
             # most parts are atoms
             atom = _ATOMS.get(type(part))
             if atom is not None:
                 keys.append(atom(part))
                 continue
-            key, arrays = self.digest(part)
+            key, part_arrays = self.digest(part)
             keys.append(key)
-            held = None if held is None or arrays is None else held + arrays
+            arrays = None if arrays is None or part_arrays is None else arrays + part_arrays
         key = _hash(tag, keys)
         kind = type(value)
         if issubclass(kind, np.ndarray):
             return _Digest(key, (value,))
         if _never_changes(kind):
             return _Digest(key, ())
-        # of cells what they hold can be another tomorrow
+        # the cells of a closure may change
         open_ended = issubclass(kind, types.FunctionType) and value.__closure__
-        return _Digest(key, held if _never_holds_else(kind) and not open_ended else None)
+        return _Digest(key, arrays if _never_holds_else(kind) and not open_ended else None)
 
-    def _met(self, thing: Any) -> bytes:
+    def _type_key(self, thing: Any) -> bytes:
         number = _things.get(thing)
         if number is None:
             with _remembered_lock:
@@ -232,22 +232,22 @@ class _Walk:
         return b"m%d" % number
 
     def _parts(self, value: Any) -> tuple[bytes, Iterable[Any]]:
-        """Return what kind of object it is, and what it holds."""
+        """Return the kind of an object, and its parts."""
         if _is_sequence(type(value)):
-            return self._met(type(value)), value
+            return self._type_key(type(value)), value
         if isinstance(value, ca.Function):
             return b"function", [function_digest(value)]
         if isinstance(value, type | types.BuiltinFunctionType | types.CodeType | np.ufunc):
-            return self._met(value), []
+            return self._type_key(value), []
         if isinstance(value, types.FunctionType):
-            held = tuple(cell.cell_contents for cell in value.__closure__ or ())
+            cells = tuple(cell.cell_contents for cell in value.__closure__ or ())
             defaults = value.__defaults__, value.__kwdefaults__
-            return self._met(value.__code__), [value.__module__, held, *defaults]
+            return self._type_key(value.__code__), [value.__module__, cells, *defaults]
         if isinstance(value, types.MethodType):
             return b"method", [value.__self__, value.__func__]
         if isinstance(value, functools.partial):
             return b"partial", [value.func, value.args, value.keywords]
-        kind = self._met(type(value))
+        kind = self._type_key(type(value))
         if isinstance(value, enum.Enum):
             return kind, [value.name]
         if isinstance(value, np.ndarray | np.generic):
@@ -270,7 +270,7 @@ class _Walk:
             return kind, [part for item in value.items() for part in item]
         if hasattr(type(value), "__content__"):
             return kind, [value.__content__()]
-        return kind, _reduced(value)
+        return kind, _pickle_parts(value)
 
 
 def _short(kind: bytes, value: bytes) -> bytes:
@@ -279,7 +279,7 @@ def _short(kind: bytes, value: bytes) -> bytes:
     return kind.upper() + hashlib.sha256(value).digest()
 
 
-# of values that hold nothing their own digests
+# for values without parts, their digests
 _ATOMS: dict[type, Callable[[Any], bytes]] = {
     float: lambda value: b"f" + struct.pack("<d", value),
     str: lambda value: _short(b"s", value.encode("utf-8", "surrogatepass")),
@@ -298,15 +298,15 @@ def _constant(value: ca.SX | ca.MX) -> ca.Function:
         raise NoContentError(f"{value}: has symbols") from None
 
 
-def _reduced(value: Any) -> list[Any]:
-    """Return what pickle would write of an object."""
+def _pickle_parts(value: Any) -> list[Any]:
+    """Return the parts that pickle would write for an object."""
     try:
-        made = value.__reduce_ex__(2)
+        result = value.__reduce_ex__(2)
     except Exception as error:
         raise NoContentError(f"{type(value).__name__}: {error}") from None
-    if isinstance(made, str):
-        return [made]
-    maker, arguments, *rest = made
+    if isinstance(result, str):
+        return [result]
+    maker, arguments, *rest = result
     state, *items = [*rest, None][: len(rest) or 1]
     parts = state if isinstance(state, tuple) else (state,)
     return [
@@ -317,17 +317,17 @@ def _reduced(value: Any) -> list[Any]:
     ]
 
 
-def _once_per_type(tell: Callable[[type], bool]) -> Callable[[type], bool]:
-    """Return a function of types that calculates once for each."""
-    kept: dict[type, bool] = {}
+def _once_per_type(test: Callable[[type], bool]) -> Callable[[type], bool]:
+    """Return a function of types that is evaluated once for each."""
+    results: dict[type, bool] = {}
 
-    def told(kind: type) -> bool:
-        found = kept.get(kind)
+    def cached(kind: type) -> bool:
+        found = results.get(kind)
         if found is None:
-            found = kept[kind] = tell(kind)
+            found = results[kind] = test(kind)
         return found
 
-    return told
+    return cached
 
 
 @_once_per_type
@@ -352,19 +352,19 @@ def _is_frozen(kind: type) -> bool:
 
 
 @functools.cache
-def _is_found_later(kind: type, name: str) -> bool:
+def _is_cached_property(kind: type, name: str) -> bool:
     return isinstance(getattr(kind, name, None), functools.cached_property)
 
 
 def _attributes(kind: type, state: Any) -> Any:
-    """Return an object's attributes by name, without those that follow from others."""
+    """Return an object's attributes by name, without cached properties."""
     if not isinstance(state, dict):
         return state
-    names = [name for name in sorted(state) if not _is_found_later(kind, name)]
+    names = [name for name in sorted(state) if not _is_cached_property(kind, name)]
     return tuple((name, state[name]) for name in names)
 
 
 def _hash(tag: bytes, parts: list[bytes]) -> bytes:
-    """Return what tells several parts from all others: themselves if they are short."""
-    told = b"".join([b"%d:%s" % (len(part), part) for part in (tag, *parts)])
-    return b"p" + told if len(told) < _SHORT else b"h" + hashlib.sha256(told).digest()
+    """Return a key of several parts: the parts themselves if they are short."""
+    joined = b"".join([b"%d:%s" % (len(part), part) for part in (tag, *parts)])
+    return b"p" + joined if len(joined) < _SHORT else b"h" + hashlib.sha256(joined).digest()

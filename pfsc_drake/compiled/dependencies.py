@@ -1,7 +1,7 @@
-"""Which results of a CasADi function depend on which arguments.
+"""Dependencies of a CasADi function's results on its arguments.
 
-The sparsity of a Jacobian does not say it: a place in a table has no derivative, and CasADi leaves
-out what goes through it. Here a value depends on all that its calculation reads.
+The sparsity of a Jacobian does not show them all: an index into a table has no derivative, and
+CasADi omits dependencies through it. Here a value depends on everything that its computation reads.
 """
 
 from typing import TypeAlias
@@ -14,28 +14,28 @@ __all__ = ["dependencies", "nonzero_dependencies"]
 
 Pattern: TypeAlias = sp.csr_array | np.ndarray
 
-# any result may come from any operand, and the Jacobian does not have all of them
+# any result may depend on any operand, and the Jacobian does not show it all
 _READS_EVERYTHING = {
     ca.OP_FIND,
     ca.OP_GETNONZEROS_PARAM,
     ca.OP_SETNONZEROS_PARAM,
     ca.OP_ADDNONZEROS_PARAM,
 }
-# operations on sparse patterns take as long as on dense ones of so many entries
+# from this number of entries, operations on sparse patterns are faster than on dense ones
 _MANY = 1_000_000
 
 
 def dependencies(function: ca.Function) -> np.ndarray:
-    """Return which results of a function depend on which of its arguments.
+    """Return the dependencies of a function's results on its arguments.
 
     Args:
         function: Any function.
 
     Returns:
-        Array of bool (number of results, number of arguments). It follows from the structure, not
-        from values: true wherever a dependency cannot be excluded.
+        Array of bool (number of results, number of arguments), from the structure, not from values:
+        true wherever a dependency cannot be excluded.
     """
-    # of each element the argument that it belongs to, which is less than the elements
+    # for each element the argument that it belongs to: smaller than all elements
     arguments = np.repeat(np.eye(function.n_in(), dtype=bool), _sizes_in(function), axis=0)
     elements = _Walk().through(function, arguments)
     results = np.split(elements, _ends(_sizes_out(function))[:-1])
@@ -43,7 +43,7 @@ def dependencies(function: ca.Function) -> np.ndarray:
 
 
 def nonzero_dependencies(function: ca.Function) -> sp.csr_array:
-    """Return which elements of a function's results depend on which elements of its arguments.
+    """Return the dependencies of result elements on argument elements of a function.
 
     Args:
         function: Any function.
@@ -56,21 +56,21 @@ def nonzero_dependencies(function: ca.Function) -> sp.csr_array:
 
 
 class _Walk:
-    """A walk through a function and those that it calls, each of them once."""
+    """A traversal of a function and those that it calls, each of them once."""
 
     def __init__(self) -> None:
-        # the functions are kept, for the key is their address
+        # with the functions, for the keys are their addresses
         self._known: dict[int, tuple[ca.Function, sp.csr_array]] = {}
 
     def function(self, function: ca.Function) -> sp.csr_array:
-        """Return what depends on what in a function, (nonzeros out, nonzeros in)."""
+        """Return the dependencies of a function, (nonzeros out, nonzeros in)."""
         key = function.__hash__()
         if key not in self._known:
             self._known[key] = function, sp.csr_array(self._of_its_kind(function))
         return self._known[key][1]
 
     def through(self, function: ca.Function, arguments: np.ndarray) -> np.ndarray:
-        """Return what results depend on, from the same of the arguments' elements."""
+        """Return the dependencies of the results, from those of the arguments' elements."""
         if function.class_name() == "MXFunction":
             return self._matrices(function, arguments)
         return np.asarray(self.function(function) @ arguments)
@@ -90,11 +90,11 @@ class _Walk:
         return _everything(sum(_sizes_out(function)), sum(_sizes_in(function)))
 
     def _matrices(self, function: ca.Function, arguments: Pattern) -> Pattern:
-        """Return the same of a function of matrix expressions, instruction by instruction."""
+        """Return the same for a function of matrix expressions, instruction by instruction."""
         first = [0, *_ends(_sizes_in(function))]
         nothing = arguments[:0]
-        # what the elements at each place of the interpreter's memory depend on at present
-        places: dict[int, Pattern] = {}
+        # dependencies of the elements in each slot of the interpreter's memory at present
+        slots: dict[int, Pattern] = {}
         results = []
         for k in range(function.n_instructions()):
             node, operation = function.instruction_MX(k), function.instruction_id(k)
@@ -103,8 +103,8 @@ class _Walk:
                 values = arguments[start : start + node.nnz()]
             else:
                 read = [
-                    places[place] if place >= 0 else _nothing(node.dep(i).nnz(), nothing)
-                    for i, place in enumerate(function.instruction_input(k))
+                    slots[slot] if slot >= 0 else _nothing(node.dep(i).nnz(), nothing)
+                    for i, slot in enumerate(function.instruction_input(k))
                 ]
                 if operation == ca.OP_OUTPUT:
                     results.append((node.info()["ind"], node.info()["offset"], read[0]))
@@ -113,16 +113,16 @@ class _Walk:
             # a node of several results has no size of its own
             several = node.is_call() or node.n_out() > 1
             row = 0
-            for i, place in enumerate(function.instruction_output(k)):
+            for i, slot in enumerate(function.instruction_output(k)):
                 n_rows = (node.get_output(i) if several else node).nnz()
-                if place >= 0:
-                    places[place] = values[row : row + n_rows]
+                if slot >= 0:
+                    slots[slot] = values[row : row + n_rows]
                 row += n_rows
         results.sort(key=lambda result: result[:2])
         return _stack([values for _, _, values in results], nothing)
 
     def _instruction(self, operation: int, node: ca.MX, operands: Pattern) -> Pattern:
-        """Return what an instruction's results depend on, from the same of its operands."""
+        """Return the dependencies of an instruction's results, from those of its operands."""
         if not node.n_dep():
             return _nothing(node.nnz(), operands)
         if operation == ca.OP_CALL:
@@ -136,12 +136,12 @@ class _Walk:
             pattern = _entry_by_entry(node, operands)
             if pattern is not None:
                 return pattern
-        # by itself, so that its pattern says nothing but what this instruction does
+        # in isolation, so that the pattern shows this instruction only
         symbols = [ca.MX.sym(f"x{i}", node.dep(i).sparsity()) for i in range(node.n_dep())]
         return _jacobian(ca.Function("f", symbols, node.eval_mx(symbols))) @ operands
 
     def _map(self, function: ca.Function, repetitions: int) -> sp.sparray:
-        """Return the same of a function that is evaluated with one set of columns after another."""
+        """Return the same for a function that is evaluated for one set of columns after another."""
         each = sp.eye_array(repetitions, dtype=bool)
         once = self.function(function)
         rows = np.split(np.arange(once.shape[0]), _ends(_sizes_out(function))[:-1])
@@ -149,13 +149,13 @@ class _Walk:
         return sp.block_array([[sp.kron(each, once[r][:, c]) for c in columns] for r in rows])
 
     def _switch(self, cases: list[ca.Function]) -> sp.sparray:
-        """Return the same of a function whose first argument chooses one of several."""
+        """Return the same for a function whose first argument selects one of several."""
         any_case = sum((self.function(case) for case in cases[1:]), self.function(cases[0]))
         return sp.hstack([_everything(any_case.shape[0], 1), any_case])
 
 
 def _entry_by_entry(node: ca.MX, operands: Pattern) -> Pattern | None:
-    """Return the same of an operation on each entry; None where entries do not correspond."""
+    """Return the same for an elementwise operation; None if entries do not correspond."""
     sizes = [node.dep(i).nnz() for i in range(node.n_dep())]
     if any(size not in (1, node.nnz()) for size in sizes):
         return None
@@ -194,7 +194,7 @@ def _everything(n_rows: int, n_columns: int) -> sp.csr_array:
 
 
 def _of_all(operands: Pattern, n_rows: int) -> Pattern:
-    """Return the pattern of results that each depend on all operands, however many these are."""
+    """Return the pattern of results that each depend on all operands, of any number."""
     if isinstance(operands, np.ndarray):
         return np.repeat(operands.any(axis=0, keepdims=True), n_rows, axis=0)
     columns = np.unique(operands.nonzero()[1])
@@ -229,5 +229,5 @@ def _sizes_out(function: ca.Function) -> list[int]:
 
 
 def _ends(sizes: list[int]) -> np.ndarray:
-    """Return where each of several pieces ends that lie one behind the other."""
+    """Return the ends of consecutive pieces."""
     return np.cumsum(np.array(sizes, dtype=int))

@@ -10,7 +10,7 @@ from pfsc_drake.compiled.operations import COMPARISONS, declarations, operation
 
 __all__ = ["Assembly"]
 
-# A block's constants are kept for it as a whole: long ones are translated twice as slowly, into
+# A block's constants are handled together: long blocks are translated twice as slowly, into
 # code that takes half as long again.
 _BLOCK = 200
 
@@ -18,7 +18,7 @@ _BYTES = np.array([f"\\{byte:02X}" for byte in range(256)], dtype="S3")
 
 _HELPERS = """\
 define internal i64 @index(double %x) nounwind alwaysinline {
-; what does not fit, and NaN, is the smallest number, as from the processor's conversion
+; NaN and numbers out of range become the smallest integer, as in the processor's conversion
 %a = fcmp oge double %x, 0xC3E0000000000000
 %b = fcmp olt double %x, 0x43E0000000000000
 %c = and i1 %a, %b
@@ -126,7 +126,7 @@ class Assembly(Code):
     """Instructions of one function in LLVM assembly.
 
     Args:
-        tables: Where constant tables go.
+        tables: Store of the constant tables.
     """
 
     nowhere = "null"
@@ -165,21 +165,21 @@ class Assembly(Code):
         return "\n".join([declarations(text), *constants, _helpers(text), text])
 
     def text(self, name: str, parameters: Sequence[str]) -> str:
-        """Return the function."""
+        """Return the text of the function."""
         return _function(name, parameters, [*self._buffers, *self._lines])
 
     @staticmethod
-    def repeated(
+    def loop(
         name: str, parameters: Sequence[str], sizes: Sequence[int], called: str, repetitions: int
     ) -> str:
-        """Return a function that calls another with one part of its arrays after the other."""
+        """Return a function that calls another for one part of its arrays after the other."""
         lines = ["br label %next", "next:", "%i = phi i64 [0, %0], [%following, %next]"]
         for k, (parameter, size) in enumerate(zip(parameters, sizes, strict=True)):
             lines.append(f"%o{k} = mul i64 %i, {size}")
             lines.append(f"%p{k} = getelementptr double, ptr %{parameter}, i64 %o{k}")
-        given = ", ".join(f"ptr %p{k}" for k in range(len(parameters)))
+        passed = ", ".join(f"ptr %p{k}" for k in range(len(parameters)))
         lines += [
-            f"call void @{called}({given})",
+            f"call void @{called}({passed})",
             "%following = add i64 %i, 1",
             f"%done = icmp sge i64 %following, {repetitions}",
             "br i1 %done, label %end, label %next",
@@ -188,10 +188,10 @@ class Assembly(Code):
         return _function(name, parameters, lines)
 
     @staticmethod
-    def switched(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
-        """Return a function whose first argument says which of several others is called."""
+    def switch(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
+        """Return a function that calls one of several others, by its first argument."""
         index, *others = parameters
-        given, last = ", ".join(f"ptr %{p}" for p in others), len(cases) - 1
+        passed, last = ", ".join(f"ptr %{p}" for p in others), len(cases) - 1
         choices = " ".join(f"i64 {i}, label %case{i}" for i in range(last))
         lines = [
             f"%x = load double, ptr %{index}",
@@ -199,7 +199,7 @@ class Assembly(Code):
             f"switch i64 %chosen, label %case{last} [{choices}]",
         ]
         for i, case in enumerate(cases):
-            lines += [f"case{i}:", f"call void @{case}({given})", "br label %end"]
+            lines += [f"case{i}:", f"call void @{case}({passed})", "br label %end"]
         return _function(name, parameters, [*lines, "end:"])
 
     def buffer(self, size: int) -> str:
@@ -213,7 +213,7 @@ class Assembly(Code):
         if not index:
             return pointer
         self._names += 1
-        self._emit(f"%p{self._names} = {_place(pointer, index)}")
+        self._emit(f"%p{self._names} = {_element_pointer(pointer, index)}")
         return f"p{self._names}"
 
     def _emit(self, line: str) -> None:
@@ -222,22 +222,22 @@ class Assembly(Code):
             self._lines += [f"br label %next{self._block_end}", f"next{self._block_end}:"]
         super()._emit(line)
 
-    def _operated(self, name: str, code: int, x: str, y: str) -> str:
+    def _operation(self, name: str, code: int, x: str, y: str) -> str:
         return operation(code).format(v=f"%{name}", x=_operand(x), y=_operand(y))
 
-    def _compared(self, name: str, code: int, x: str, y: str) -> str:
+    def _comparison(self, name: str, code: int, x: str, y: str) -> str:
         return f"%{name} = fcmp {COMPARISONS[code]} double {_operand(x)}, {_operand(y)}"
 
-    def _negated(self, name: str, condition: str) -> str:
+    def _negation(self, name: str, condition: str) -> str:
         return f"%{name} = xor i1 %{condition}, true"
 
-    def _both(self, name: str, first: str, second: str) -> str:
+    def _conjunction(self, name: str, first: str, second: str) -> str:
         return f"%{name} = and i1 %{first}, %{second}"
 
-    def _either(self, name: str, first: str, second: str) -> str:
+    def _disjunction(self, name: str, first: str, second: str) -> str:
         return f"%{name} = or i1 %{first}, %{second}"
 
-    def _chosen(self, name: str, condition: str, x: str) -> str:
+    def _select(self, name: str, condition: str, x: str) -> str:
         # without a branch
         return (
             f"%{name}m = sext i1 %{condition} to i64\n"
@@ -252,35 +252,35 @@ class Assembly(Code):
     def _read(self, name: str, pointer: str, index: int) -> str:
         if not index:
             return f"%{name} = load double, ptr {_operand(pointer)}"
-        return f"%{name}p = {_place(pointer, index)}\n%{name} = load double, ptr %{name}p"
+        return f"%{name}p = {_element_pointer(pointer, index)}\n%{name} = load double, ptr %{name}p"
 
-    def _written(self, x: str, pointer: str, index: int) -> str:
+    def _store(self, x: str, pointer: str, index: int) -> str:
         return f"store double {_operand(x)}, ptr {_operand(self.element(pointer, index))}"
 
-    def _rounded(self, name: str, x: str) -> str:
+    def _index(self, name: str, x: str) -> str:
         return f"%{name} = call i64 @index(double {_operand(x)})"
 
-    def _summed(self, name: str, i: str, j: int | str) -> str:
+    def _sum(self, name: str, i: str, j: int | str) -> str:
         return f"%{name} = add i64 %{i}, {j if isinstance(j, int) else '%' + j}"
 
     def _element_or_nan(self, name: str, pointer: str, size: int, index: str) -> str:
-        place = f"ptr {_operand(pointer)}, i64 {size}, i64 %{index}"
-        return f"%{name} = call double @element({place})"
+        element = f"ptr {_operand(pointer)}, i64 {size}, i64 %{index}"
+        return f"%{name} = call double @element({element})"
 
-    def _written_if_there(self, pointer: str, size: int, index: str, x: str) -> str:
-        place = f"ptr {_operand(pointer)}, i64 {size}, i64 %{index}"
-        return f"call void @put({place}, double {_operand(x)})"
+    def _checked_store(self, pointer: str, size: int, index: str, x: str) -> str:
+        element = f"ptr {_operand(pointer)}, i64 {size}, i64 %{index}"
+        return f"call void @put({element}, double {_operand(x)})"
 
-    def _looked_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str:
+    def _look_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str:
         table = f"ptr {_operand(grid)}, i64 {size}"
         return f"%{name} = call double @low_{mode}(double {_operand(x)}, {table})"
 
-    def _called(self, name: str, pointers: Sequence[str]) -> str:
+    def _function_call(self, name: str, pointers: Sequence[str]) -> str:
         return f"call void @{name}({', '.join(f'ptr {_operand(p)}' for p in pointers)})"
 
 
 def _written_out(content: bytes) -> str:
-    # numbers one by one take LLVM ten times as long
+    # single numbers take LLVM ten times as long
     return _BYTES[np.frombuffer(content, np.uint8)].tobytes().decode()
 
 
@@ -290,18 +290,18 @@ def _function(name: str, parameters: Sequence[str], lines: Sequence[str]) -> str
 
 
 def _operand(name: str) -> str:
-    """Return a name or literal as assembly has it."""
+    """Return a name or literal in assembly."""
     if name.startswith("0x") or name == Assembly.nowhere:
         return name
     return f"@{name}" if name.startswith("table") else f"%{name}"
 
 
-def _place(pointer: str, index: int) -> str:
+def _element_pointer(pointer: str, index: int) -> str:
     return f"getelementptr double, ptr {_operand(pointer)}, i64 {index}"
 
 
 def _helpers(text: str) -> str:
-    """Return the functions that instructions call, as far as assembly needs them."""
+    """Return the helper functions that a text needs."""
     functions = re.findall(r"define internal \w+ (@\w+)\(.*?\n}\n", _HELPERS, re.DOTALL)
     texts = re.findall(r"define internal .*?\n}\n", _HELPERS, re.DOTALL)
     needed = [body for name, body in zip(functions, texts, strict=True) if f"{name}(" in text]

@@ -1,7 +1,7 @@
 """Instructions of CasADi's matrix functions as instructions on numbers.
 
-Moving numbers about (slices, concatenation, transposition) costs nothing: it only gives them other
-names. The order of every sum is the interpreter's.
+Moving numbers (slices, concatenation, transposition) costs nothing: they only get other names. The
+order of every sum is the interpreter's.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,18 +16,18 @@ __all__ = [
     "get_computed",
     "indices",
     "look_up",
-    "projected",
+    "project",
     "set_computed",
     "translate_instruction",
 ]
 
 
 def look_up(code: Code, operands: Sequence[Values], mode: str) -> Values:
-    """Add a look-up in a table, and return the places.
+    """Add a look-up in a table, and return the indices.
 
     Args:
-        code: Where it goes.
-        operands: The grid and what is looked for.
+        code: Code that it is added to.
+        operands: The grid and the numbers to look up.
         mode: ``linear``, ``binary`` or ``exact``.
     """
     grid, sought = operands
@@ -36,19 +36,19 @@ def look_up(code: Code, operands: Sequence[Values], mode: str) -> Values:
 
 
 def get_computed(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    """Add instructions that read elements at computed indices; beyond the end there is NaN."""
-    source, *places = operands
-    given = [[code.index(x) for x in p] for p in places]
+    """Add instructions that read elements at computed indices; out of range there is NaN."""
+    source, *indices_in = operands
+    computed = [[code.index(x) for x in p] for p in indices_in]
     part = node.info()
     sums: list[str]
     if "inner" in part:
-        sums = [code.plus(i, j) for i in given[0] for j in indices(part["inner"])]
+        sums = [code.plus(i, j) for i in computed[0] for j in indices(part["inner"])]
     elif "outer" in part:
-        sums = [code.plus(i, j) for j in indices(part["outer"]) for i in given[0]]
-    elif len(given) == 2:
-        sums = [code.plus(i, j) for j in given[1] for i in given[0]]
+        sums = [code.plus(i, j) for j in indices(part["outer"]) for i in computed[0]]
+    elif len(computed) == 2:
+        sums = [code.plus(i, j) for j in computed[1] for i in computed[0]]
     else:
-        sums = given[0]
+        sums = computed[0]
     if not source:
         return [literal(np.nan)] * len(sums)
     array, size = code.pointer(source), len(source)
@@ -56,15 +56,15 @@ def get_computed(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
 
 
 def set_computed(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    """Add instructions that replace or raise elements at computed indices, if there are such."""
-    # of other kinds the node does not say the slice
+    """Add instructions that replace, or add to, elements at computed indices within range."""
+    # for other kinds the node does not contain the slice
     if len(operands) != 3 or "ParamVector" not in node.class_name():
         raise Untranslatable("assignment at several computed indices")
-    old, new, places = operands
+    old, new, indices_in = operands
     if not old:
         return old
     array, size = code.copy(old), len(old)
-    for value, x in zip(new, places, strict=True):
+    for value, x in zip(new, indices_in, strict=True):
         index = code.index(x)
         if node.op() == ca.OP_ADDNONZEROS_PARAM:
             value = code.apply(ca.OP_ADD, code.get(array, size, index), value)
@@ -83,9 +83,9 @@ def translate_instruction(
     """Add an instruction of a matrix function, and return its results' nonzeros.
 
     Args:
-        code: Where it goes.
+        code: Code that it is added to.
         operation: The instruction as CasADi counts them; no input, output, call or table look-up.
-        node: The expression that it calculates.
+        node: Expression of the instruction.
         operands: Nonzeros of its operands.
 
     Raises:
@@ -100,10 +100,10 @@ def translate_instruction(
     return [_INSTRUCTIONS[operation](code, node, operands)]
 
 
-def projected(values: Values, given: ca.Sparsity, wanted: ca.Sparsity) -> Values:
+def project(values: Values, source: ca.Sparsity, target: ca.Sparsity) -> Values:
     """Return the nonzeros of a matrix with another pattern."""
-    place = {element: i for i, element in enumerate(given.find())}
-    return [values[place[i]] if i in place else literal(0.0) for i in wanted.find()]
+    number_of = {element: i for i, element in enumerate(source.find())}
+    return [values[number_of[i]] if i in number_of else literal(0.0) for i in target.find()]
 
 
 def _elementwise(code: Code, operation: int, operands: Sequence[Values]) -> Values:
@@ -122,7 +122,7 @@ def _same(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     return operands[0]
 
 
-def _concatenated(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
+def _concatenate(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     return [value for values in operands for value in values]
 
 
@@ -131,11 +131,11 @@ def _split(node: ca.MX, values: Values) -> list[Values]:
     return [values[start:end] for start, end in zip([0, *ends], ends, strict=False)]
 
 
-def _repeated(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
+def _repeat(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     return [*operands[0]] * (node.nnz() // max(len(operands[0]), 1))
 
 
-def _summed(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
+def _sum(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     result: list[Value] = [literal(0.0)] * node.nnz()
     for start in range(0, len(operands[0]), max(node.nnz(), 1)):
         block = operands[0][start : start + node.nnz()]
@@ -143,17 +143,17 @@ def _summed(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     return result
 
 
-def _transposed(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
+def _transpose(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     _, order = node.dep(0).sparsity().transpose()
     return [operands[0][i] for i in order]
 
 
-def _projected(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    return projected(operands[0], node.dep(0).sparsity(), node.sparsity())
+def _project(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
+    return project(operands[0], node.dep(0).sparsity(), node.sparsity())
 
 
-def _chosen(node: ca.MX) -> list[int]:
-    """Return the nonzeros that an instruction reads or writes; negative ones are none."""
+def _select(node: ca.MX) -> list[int]:
+    """Return the nonzeros that an instruction reads or writes; negative indices are none."""
     what = node.info()
     if "nz" in what:
         return what["nz"]
@@ -163,12 +163,12 @@ def _chosen(node: ca.MX) -> list[int]:
 
 
 def _get(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    return [operands[0][i] if i >= 0 else literal(0.0) for i in _chosen(node)]
+    return [operands[0][i] if i >= 0 else literal(0.0) for i in _select(node)]
 
 
 def _set(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     result, new = list(operands[0]), operands[1]
-    for i, value in zip(_chosen(node), new, strict=True):
+    for i, value in zip(_select(node), new, strict=True):
         if i >= 0:
             result[i] = code.apply(ca.OP_ADD, result[i], value) if node.info()["add"] else value
     return result
@@ -176,12 +176,12 @@ def _set(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
 
 def _product(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     result, x, y = list(operands[0]), operands[1], operands[2]
-    place = {at: i for i, at in enumerate(zip(*node.sparsity().get_triplet(), strict=True))}
+    number_of = {at: i for i, at in enumerate(zip(*node.sparsity().get_triplet(), strict=True))}
     left, right = node.dep(1).sparsity(), node.dep(2).sparsity()
     starts, rows = left.colind(), left.row()
     for k, (inner, column) in enumerate(zip(*right.get_triplet(), strict=True)):
         for i in range(starts[inner], starts[inner + 1]):
-            z = place.get((rows[i], column))
+            z = number_of.get((rows[i], column))
             if z is not None:
                 term = code.apply(ca.OP_MUL, x[i], y[k])
                 result[z] = code.apply(ca.OP_ADD, result[z], term)
@@ -234,32 +234,32 @@ def _norm_2(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
 
 
 def _norm_1(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    return _reduced(code, ca.OP_ADD, 0.0, [code.apply(ca.OP_FABS, x) for x in operands[0]])
+    return _reduce(code, ca.OP_ADD, 0.0, [code.apply(ca.OP_FABS, x) for x in operands[0]])
 
 
 def _norm_inf(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    return _reduced(code, ca.OP_FMAX, 0.0, [code.apply(ca.OP_FABS, x) for x in operands[0]])
+    return _reduce(code, ca.OP_FMAX, 0.0, [code.apply(ca.OP_FABS, x) for x in operands[0]])
 
 
 def _largest(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     start = -np.inf if node.dep(0).is_dense() else 0.0
-    return _reduced(code, ca.OP_FMAX, start, operands[0])
+    return _reduce(code, ca.OP_FMAX, start, operands[0])
 
 
 def _smallest(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     start = np.inf if node.dep(0).is_dense() else 0.0
-    return _reduced(code, ca.OP_FMIN, start, operands[0])
+    return _reduce(code, ca.OP_FMIN, start, operands[0])
 
 
-def _reduced(code: Code, operation: int, start: float, values: Values) -> Values:
+def _reduce(code: Code, operation: int, start: float, values: Values) -> Values:
     result: Value = literal(start)
     for value in values:
-        # of 0 and -0 the interpreter's is the last, the operation's the first
+        # of 0 and -0 the interpreter takes the last, the operation the first
         result = code.apply(operation, value, result)
     return [result]
 
 
-def _found(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
+def _find(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     sparsity = node.dep(0).sparsity()
     result = literal(float(sparsity.size1()))
     for value, row in reversed(list(zip(operands[0], sparsity.row(), strict=True))):
@@ -277,13 +277,13 @@ _INSTRUCTIONS: dict[int, Callable[[Code, ca.MX, Sequence[Values]], Values]] = {
     ca.OP_CONST: _constant,
     ca.OP_RESHAPE: _same,
     ca.OP_SPARSITY_CAST: _same,
-    ca.OP_VERTCAT: _concatenated,
-    ca.OP_HORZCAT: _concatenated,
-    ca.OP_DIAGCAT: _concatenated,
-    ca.OP_HORZREPMAT: _repeated,
-    ca.OP_HORZREPSUM: _summed,
-    ca.OP_TRANSPOSE: _transposed,
-    ca.OP_PROJECT: _projected,
+    ca.OP_VERTCAT: _concatenate,
+    ca.OP_HORZCAT: _concatenate,
+    ca.OP_DIAGCAT: _concatenate,
+    ca.OP_HORZREPMAT: _repeat,
+    ca.OP_HORZREPSUM: _sum,
+    ca.OP_TRANSPOSE: _transpose,
+    ca.OP_PROJECT: _project,
     ca.OP_GETNONZEROS: _get,
     ca.OP_SETNONZEROS: _set,
     ca.OP_ADDNONZEROS: _set,
@@ -300,5 +300,5 @@ _INSTRUCTIONS: dict[int, Callable[[Code, ca.MX, Sequence[Values]], Values]] = {
     ca.OP_NORMINF: _norm_inf,
     ca.OP_MMAX: _largest,
     ca.OP_MMIN: _smallest,
-    ca.OP_FIND: _found,
+    ca.OP_FIND: _find,
 }

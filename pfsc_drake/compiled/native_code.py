@@ -1,12 +1,12 @@
 """CasADi functions as machine code: the interpreter's results, bit for bit, ten times faster.
 
-A CasADi function is a list of instructions, which an interpreter carries out one by one. Here LLVM
-turns the same list into machine code: the same operations in the same order, nothing fused, nothing
-reordered, and CasADi's own mathematical library for sines and the like. Only the sign of a NaN may
-differ. What cannot be translated is left to the interpreter.
+A CasADi function is a list of instructions, which an interpreter executes one by one. Here LLVM
+translates the same list into machine code: the same operations in the same order, nothing fused,
+nothing reordered, and CasADi's own mathematical library for sines and the like. Only the sign of
+a NaN may differ. A function that cannot be translated is left to the interpreter.
 
-Machine code is made without LLVM's optimizations: they take seven times as long, for the whole tick
-of an elastic arm more than a second, and gain a fifth. It is kept for the next process.
+LLVM's optimizations are not used: they take seven times as long, for the whole tick of an elastic
+arm more than a second, and gain a fifth. Machine code is cached on disk for the next process.
 """
 
 import contextlib
@@ -35,18 +35,18 @@ class ObjectStore:
     """A folder of object files.
 
     Any number of processes may share it, and everything in it may be lost or damaged at any time:
-    then there is nothing under that key. Where nothing can be written, nothing is kept.
+    then the key is missing. If the folder cannot be written, nothing is stored.
 
     Args:
         folder: The folder; it need not exist.
-        capacity: Capacity of all files together [bytes]; the oldest give way.
+        capacity: Capacity of all files together [bytes]; the oldest are deleted.
     """
 
     def __init__(self, folder: Path, capacity: int = 200_000_000) -> None:
         self._folder, self._capacity = folder, capacity
 
     def get(self, key: str) -> bytes | None:
-        """Return what is kept under a key, or None.
+        """Return the content under a key, or None.
 
         Args:
             key: A file name.
@@ -59,16 +59,16 @@ class ObjectStore:
         return code if digest == hashlib.sha256(code).digest() else None
 
     def put(self, key: str, code: bytes) -> None:
-        """Keep something under a key.
+        """Store content under a key.
 
         Args:
             key: A file name.
-            code: What to keep.
+            code: The content.
         """
         with contextlib.suppress(OSError):
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            self._make_room(len(code) + _DIGEST)
-            # another name until it is whole: no one reads half a file
+            self._delete_oldest(len(code) + _DIGEST)
+            # under another name until it is complete: no one reads half a file
             handle, name = tempfile.mkstemp(dir=self._folder, prefix=".")
             try:
                 with os.fdopen(handle, "wb") as file:
@@ -77,7 +77,7 @@ class ObjectStore:
             except OSError:
                 Path(name).unlink(missing_ok=True)
 
-    def _make_room(self, size: int) -> None:
+    def _delete_oldest(self, size: int) -> None:
         files = [(entry.stat(), entry.path) for entry in os.scandir(self._folder)]
         excess = sum(status.st_size for status, _ in files) + size - self._capacity
         for status, path in sorted(files, key=lambda file: file[0].st_mtime):
@@ -88,11 +88,11 @@ class ObjectStore:
 
 
 def user_store() -> ObjectStore:
-    """Return the store in the user's folder for what can be made again."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
+    """Return the store in the user's cache folder."""
+    cache_home = os.environ.get("XDG_CACHE_HOME", "")
     try:
-        base = Path(given) if Path(given).is_absolute() else Path.home() / ".cache"
-    except RuntimeError:  # there is no such user; nothing can be kept below what is no folder
+        base = Path(cache_home) if Path(cache_home).is_absolute() else Path.home() / ".cache"
+    except RuntimeError:  # no such user; nothing can be stored below a path that is no folder
         base = Path(os.devnull)
     return ObjectStore(base / "pfsc_drake" / "machine_code")
 
@@ -115,7 +115,7 @@ class NativeCode:
 
     def __init__(self, code: bytes) -> None:
         llvm = _llvm()
-        # the code is gone when the engine is
+        # the code lives as long as the engine
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
@@ -124,13 +124,13 @@ class NativeCode:
     def bind(
         self, arguments: Sequence[np.ndarray], results: Sequence[np.ndarray]
     ) -> Callable[[], None]:
-        """Return a callable that calculates the results from the arguments.
+        """Return a callable that computes the results from the arguments.
 
         The callable keeps code and arrays alive.
 
         Args:
-            arguments: One array for each of the function's arguments: contiguous doubles, as
-                many as it has nonzeros. Nothing is checked here.
+            arguments: One array for each of the function's arguments: contiguous doubles, as many
+                as it has nonzeros. They are not checked.
             results: The same for its results.
         """
         arrays = [*arguments, *results]
@@ -140,61 +140,60 @@ class NativeCode:
         return call
 
 
-# the code, or why there is none, what was asked for last at the end; what is bound lives on without
-_compiled: dict[str, NativeCode | str] = {}
-# of many stations in a process, those whose functions differ need not all be kept
-_MOST_KEPT = 300
+# the code, or the reason why there is none, most recently used last; bound code lives on without it
+_codes: dict[str, NativeCode | str] = {}
+# upper limit: many stations in a process may have different functions
+_MOST_CODES = 300
 
 
 def native_code(function: ca.Function) -> NativeCode | None:
-    """Return the machine code of a function, or None if there can be none.
+    """Return the machine code of a function, or None if it cannot be compiled.
 
-    Functions of the same content are made once per process, as long as not too many others are
-    made in between. It takes 10 to 20 microseconds per
-    instruction the first time, as long as the interpreter takes for some thousand evaluations, and
-    a few milliseconds in every process after that.
+    Functions of the same content are compiled once per process, as long as not too many others are
+    compiled in between. The first compilation takes 10 to 20 microseconds per instruction, as long
+    as some thousand evaluations in the interpreter; each later process takes a few milliseconds.
 
     Args:
-        function: Any function; of scalar expressions (SX) or matrix expressions (MX) that is
-            compiled, with those that it calls.
+        function: Any function; functions of scalar (SX) or matrix expressions (MX) are compiled,
+            with those that they call.
     """
-    made = _made(function)
-    return None if isinstance(made, str) else made
+    code = _code_or_reason(function)
+    return None if isinstance(code, str) else code
 
 
 def why_not(function: ca.Function) -> str | None:
-    """Return why there is no machine code of a function, or None if there is.
+    """Return why a function cannot be compiled, or None if it can.
 
     Args:
         function: Any function.
     """
-    made = _made(function)
-    return made if isinstance(made, str) else None
+    code = _code_or_reason(function)
+    return code if isinstance(code, str) else None
 
 
-def _made(function: ca.Function) -> NativeCode | str:
+def _code_or_reason(function: ca.Function) -> NativeCode | str:
     key = function_digest(function).hex()
-    made = _compiled.pop(key, None)
-    if made is None:
-        made = _new(function, key)
-    _compiled[key] = made
-    while len(_compiled) > _MOST_KEPT:
-        del _compiled[next(iter(_compiled))]
-    return made
+    code = _codes.pop(key, None)
+    if code is None:
+        code = _compile(function, key)
+    _codes[key] = code
+    while len(_codes) > _MOST_CODES:
+        del _codes[next(iter(_codes))]
+    return code
 
 
-def _new(function: ca.Function, key: str) -> NativeCode | str:
+def _compile(function: ca.Function, key: str) -> NativeCode | str:
     try:
         return NativeCode(_object_code(function, key))
     except Untranslatable as reason:
         return str(reason)
     except Exception as error:
-        # whatever is missing or new in llvmlite: it is no reason to stop a controller
+        # a missing or changed part of llvmlite is no reason to stop a controller
         return f"{type(error).__name__}: {error}"
 
 
 def _object_code(function: ca.Function, key: str) -> bytes:
-    """Return the object file of a function, as it was kept or new."""
+    """Return the object file of a function, stored or new."""
     llvm, store = _llvm(), user_store()
     name = hashlib.sha256(f"{_maker()} {key}".encode()).hexdigest()
     code = store.get(name)
@@ -209,7 +208,7 @@ def _object_code(function: ca.Function, key: str) -> bytes:
 
 @functools.cache
 def _maker() -> str:
-    """Return what object files depend on besides the function."""
+    """Return a text of everything that object files depend on besides the function."""
     llvm = _llvm()
     sources = sorted(Path(__file__).parent.glob("*.py"))
     program = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
@@ -220,8 +219,8 @@ def _maker() -> str:
 def _machine() -> Any:
     """Return the code generator.
 
-    It uses no instructions beyond those of every such processor: fused multiplication and addition
-    would round differently.
+    Its instructions are those of every such processor: fused multiplication and addition would
+    round differently.
     """
     return _llvm().Target.from_default_triple().create_target_machine(opt=0, jit=True)
 

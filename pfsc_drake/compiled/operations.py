@@ -34,7 +34,7 @@ _INLINE = {
     ca.OP_SQRT: ("{v} = call double @llvm.sqrt.f64(double {x})",),
     ca.OP_FABS: ("{v} = call double @llvm.fabs.f64(double {x})",),
     ca.OP_COPYSIGN: ("{v} = call double @llvm.copysign.f64(double {x}, double {y})",),
-    # a number rather than NaN; of 0 and -0, which the standard leaves open, CasADi's is the first
+    # a number rather than NaN; of 0 and -0, which the standard leaves open, CasADi takes the first
     ca.OP_FMIN: (
         "{v}a = fcmp olt double {y}, {x}",
         "{v}b = fcmp uno double {x}, {x}",
@@ -92,17 +92,17 @@ _INTRINSIC = [
     "llvm.fabs.f64(double)",
     "llvm.copysign.f64(double, double)",
 ]
-# under names that LLVM does not know: it would put something else in the place of some calls
+# under names that LLVM does not know: it would replace some calls otherwise
 _PREFIX = "pfsc_"
 
 
 class Untranslatable(Exception):
-    """Something that has no assembly; the message says what."""
+    """Error for an operation without assembly; the message names it."""
 
 
 @functools.cache
 def operation(code: int) -> str:
-    """Return an operation's assembly, with places {v} for its result, {x} and {y} for its operands.
+    """Return an operation's assembly, with fields {v} for its result, {x} and {y} for its operands.
 
     Args:
         code: The operation as CasADi counts them; no comparison or logic.
@@ -120,13 +120,13 @@ def operation(code: int) -> str:
 
 
 def function_name(code: int) -> tuple[str, int]:
-    """Return the mathematical function that an operation is, and its number of operands.
+    """Return the mathematical function of an operation, and its number of operands.
 
     Args:
         code: The operation as CasADi counts them.
 
     Raises:
-        Untranslatable: If it is none.
+        Untranslatable: If it is not such a function.
     """
     name = _UNARY_CALLS.get(code) or _BINARY_CALLS.get(code)
     if name is None:
@@ -142,7 +142,7 @@ def is_known(code: int) -> bool:
 
 
 def declarations(text: str) -> str:
-    """Return what declares the functions that operations call, as far as assembly needs it.
+    """Return the declarations of the functions that operations call, as far as they are needed.
 
     Args:
         text: The assembly.
@@ -170,13 +170,13 @@ def function_symbols() -> dict[str, int]:
 
 
 def operation_name(code: int) -> str:
-    """Return what CasADi calls an operation."""
+    """Return CasADi's name of an operation."""
     names = [name for name in dir(ca) if name.startswith("OP_") and getattr(ca, name) == code]
     return names[0] if names else str(code)
 
 
 def literal(value: float) -> str:
-    """Return a constant with all its bits; LLVM wants decimals to be exact."""
+    """Return a constant with all its bits; LLVM requires decimals to be exact."""
     if math.isnan(value):
         return "0x7FF8000000000000"
     return f"0x{struct.pack('>d', value).hex()}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from pfsc_drake.compiled.code import Code, LiteralTable, Tables, Value, Values, elements
 from pfsc_drake.compiled.llvm_assembly import Assembly
-from pfsc_drake.compiled.matrix_instructions import look_up, projected, translate_instruction
+from pfsc_drake.compiled.matrix_instructions import look_up, project, translate_instruction
 from pfsc_drake.compiled.operations import Untranslatable, literal
 
 __all__ = ["Translation", "translate"]
@@ -27,7 +27,7 @@ def translate(function: ca.Function) -> str:
         function: A function of scalar or matrix expressions.
 
     Raises:
-        Untranslatable: If it contains something that has no assembly here.
+        Untranslatable: If it contains an operation without assembly here.
     """
     translation = Translation(Assembly)
     name = translation.function(function)
@@ -36,11 +36,11 @@ def translate(function: ca.Function) -> str:
 
 
 class Translation:
-    """Functions that are translated, each before those that call it.
+    """Functions in another language, each before those that call it.
 
     Args:
         language: Language of the code.
-        tables: Those of other functions, where they are to be shared.
+        tables: Tables of other functions, to be shared; new ones if omitted.
 
     Attributes:
         texts: The functions.
@@ -52,14 +52,14 @@ class Translation:
         self.tables = Tables() if tables is None else tables
         self.texts: list[str] = []
         self._count = 0
-        # by address, so that they are kept: to read a function's content takes long
-        self._seen: dict[int, tuple[ca.Function, str]] = {}
+        # by address, with the functions; to read a function's content takes long
+        self._translated: dict[int, tuple[ca.Function, str]] = {}
         self._digests: dict[int, tuple[ca.Function, bytes]] = {}
         # by name and shape, which functions of the same content share
         self._alike: dict[str, list[tuple[ca.Function, str]]] = {}
 
     def function(self, function: ca.Function) -> str:
-        """Translate a function where that has not been done, and return its name.
+        """Translate a function unless it has been translated, and return its name.
 
         Its parameters are pointers to the nonzeros of each argument, then of each result.
 
@@ -67,10 +67,10 @@ class Translation:
             function: A function of scalar or matrix expressions.
 
         Raises:
-            Untranslatable: If it contains something that cannot be translated.
+            Untranslatable: If it contains an operation without translation.
         """
-        if function.__hash__() in self._seen:
-            return self._seen[function.__hash__()][1]
+        if function.__hash__() in self._translated:
+            return self._translated[function.__hash__()][1]
         name = self._name_of_same(function)
         if name is None:
             kinds: dict[str, Callable[[ca.Function, str], str]] = {
@@ -86,7 +86,7 @@ class Translation:
             self._count += 1
             self._alike.setdefault(str(function), []).append((function, name))
             self.texts.append(kinds[kind](function, name))
-        self._seen[function.__hash__()] = function, name
+        self._translated[function.__hash__()] = function, name
         return name
 
     def _name_of_same(self, function: ca.Function) -> str | None:
@@ -106,28 +106,28 @@ class Translation:
     def _scalars(self, function: ca.Function, name: str) -> str:
         code = self._language(self.tables)
         arguments, results = _arguments(function), _results(function)
-        # the value that each place of the interpreter's memory has at present
-        places: dict[int, Value] = {}
+        # the present value in each slot of the interpreter's memory
+        slots: dict[int, Value] = {}
         for k in range(function.n_instructions()):
             what = function.instruction_id(k)
             operands, target = function.instruction_input(k), function.instruction_output(k)
             if what == ca.OP_CONST:
-                places[target[0]] = literal(function.instruction_constant(k))
+                slots[target[0]] = literal(function.instruction_constant(k))
             elif what == ca.OP_INPUT:
-                places[target[0]] = code.load((arguments[operands[0]], operands[1]))
+                slots[target[0]] = code.load((arguments[operands[0]], operands[1]))
             elif what == ca.OP_OUTPUT:
-                code.store(places[operands[0]], results[target[0]], target[1])
+                code.store(slots[operands[0]], results[target[0]], target[1])
             else:
-                places[target[0]] = code.apply(what, *[places[i] for i in operands])
+                slots[target[0]] = code.apply(what, *[slots[i] for i in operands])
         return code.text(name, [*arguments, *results])
 
     def _matrices(self, function: ca.Function, name: str) -> str:
         code = self._language(self.tables)
         arguments, results = _arguments(function), _results(function)
         look_up_modes = iter(_look_up_modes(function))
-        # the numbers that each place of the interpreter's memory has at present
-        places: dict[int, Values] = {}
-        put_out: list[tuple[str, int, Values]] = []
+        # the present numbers in each slot of the interpreter's memory
+        slots: dict[int, Values] = {}
+        stores: list[tuple[str, int, Values]] = []
         for k in range(function.n_instructions()):
             what, node = function.instruction_id(k), function.instruction_MX(k)
             values: list[Values]
@@ -136,13 +136,13 @@ class Translation:
                 values = [elements(arguments[part["ind"]], node.nnz(), part["offset"])]
             else:
                 operands = [
-                    # what is not there is zero
-                    places[place] if place >= 0 else LiteralTable(np.zeros(node.dep(i).nnz()))
-                    for i, place in enumerate(function.instruction_input(k))
+                    # missing operands are zero
+                    slots[slot] if slot >= 0 else LiteralTable(np.zeros(node.dep(i).nnz()))
+                    for i, slot in enumerate(function.instruction_input(k))
                 ]
                 if what == ca.OP_OUTPUT:
                     part = node.info()
-                    put_out.append((results[part["ind"]], part["offset"], operands[0]))
+                    stores.append((results[part["ind"]], part["offset"], operands[0]))
                     continue
                 if what == ca.OP_CALL:
                     values = self._call(code, node.which_function(), operands)
@@ -150,12 +150,12 @@ class Translation:
                     values = [look_up(code, operands, next(look_up_modes))]
                 else:
                     values = translate_instruction(code, what, node, operands)
-            places |= dict(zip(function.instruction_output(k), values, strict=True))
-        # what is read before anything is written may be overwritten
-        for _, _, numbers in put_out:
+            slots |= dict(zip(function.instruction_output(k), values, strict=True))
+        # an argument may be overwritten, so that everything is read before anything is written
+        for _, _, numbers in stores:
             for number in numbers:
                 code.load(number)
-        for pointer, first, numbers in put_out:
+        for pointer, first, numbers in stores:
             for i, number in enumerate(numbers):
                 code.store(number, pointer, first + i)
         return code.text(name, [*arguments, *results])
@@ -167,40 +167,40 @@ class Translation:
         return [elements(result, function.nnz_out(i)) for i, result in enumerate(results)]
 
     def _map(self, function: ca.Function, name: str) -> str:
-        """Translate a function that is evaluated with one set of columns after another."""
+        """Translate a function that is evaluated for one set of columns after another."""
         once, repetitions = function.info()["f"], function.info()["n"]
         sizes = [once.nnz_in(i) for i in range(once.n_in())]
         sizes += [once.nnz_out(i) for i in range(once.n_out())]
         parameters = [*_arguments(once), *_results(once)]
         called = self.function(once)
-        return self._language.repeated(name, parameters, sizes, called, repetitions)
+        return self._language.loop(name, parameters, sizes, called, repetitions)
 
     def _switch(self, function: ca.Function, name: str) -> str:
-        """Translate a function whose first argument chooses one of several."""
+        """Translate a function whose first argument selects one of several."""
         cases = [*function.info()["f"], function.info()["f_def"]]
         names = [self._case(function, case) for case in cases]
         parameters = [*_arguments(function), *_results(function)]
-        return self._language.switched(name, parameters, names)
+        return self._language.switch(name, parameters, names)
 
     def _case(self, function: ca.Function, case: ca.Function) -> str:
         """Return the name of a case of a switch, with the switch's patterns of nonzeros."""
         inner = self.function(case)
-        given_in = [function.sparsity_in(i + 1) for i in range(case.n_in())]
-        given_out = [function.sparsity_out(i) for i in range(case.n_out())]
-        wanted_in = [case.sparsity_in(i) for i in range(case.n_in())]
-        wanted_out = [case.sparsity_out(i) for i in range(case.n_out())]
-        if given_in == wanted_in and given_out == wanted_out:
+        switch_in = [function.sparsity_in(i + 1) for i in range(case.n_in())]
+        switch_out = [function.sparsity_out(i) for i in range(case.n_out())]
+        case_in = [case.sparsity_in(i) for i in range(case.n_in())]
+        case_out = [case.sparsity_out(i) for i in range(case.n_out())]
+        if switch_in == case_in and switch_out == case_out:
             return inner
         code = self._language(self.tables)
         operands = [
-            projected(elements(pointer, given.nnz()), given, wanted)
-            for pointer, given, wanted in zip(_arguments(case), given_in, wanted_in, strict=True)
+            project(elements(pointer, source.nnz()), source, target)
+            for pointer, source, target in zip(_arguments(case), switch_in, case_in, strict=True)
         ]
         values = self._call(code, case, operands)
-        for result, numbers, given, wanted in zip(
-            _results(case), values, wanted_out, given_out, strict=True
+        for result, numbers, source, target in zip(
+            _results(case), values, case_out, switch_out, strict=True
         ):
-            for i, number in enumerate(projected(numbers, given, wanted)):
+            for i, number in enumerate(project(numbers, source, target)):
                 code.store(number, result, i)
         name = f"case{len(self.texts)}"
         self.texts.append(code.text(name, [*_arguments(case), *_results(case)]))
@@ -208,9 +208,9 @@ class Translation:
 
 
 def _look_up_modes(function: ca.Function) -> list[str]:
-    """Return how each table look-up of a matrix function searches, in the order of instructions.
+    """Return the search mode of each table look-up in a matrix function, in their order.
 
-    Only the C code says it.
+    Only the C code contains it.
     """
     instructions = range(function.n_instructions())
     if all(function.instruction_id(k) != ca.OP_LOW for k in instructions):

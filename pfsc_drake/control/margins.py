@@ -1,4 +1,4 @@
-"""Margins of a sampled linear loop: its modes, disc margins of the drives, and delay."""
+"""Stability margins of a sampled linear loop: modes, disc margins of the drives, and delay."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import scipy.linalg
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
-# 1/s; what grows or decays by less is neutral: numbers that nothing calls back
+# 1/s; slower modes are neutral: variables without feedback
 NEUTRAL = 0.1
 _SMALLEST = 1e-300
 
@@ -21,7 +21,7 @@ class Modes:
     Attributes:
         rate: ``log|lambda| / T_s`` [1/s], shape (k,); positive grows.
         frequency: ``|arg lambda| / T_s`` [rad/s], shape (k,).
-        neutral: Number of modes that neither grow nor decay; they are not among the others.
+        neutral: Number of modes that neither grow nor decay; they are not included above.
     """
 
     rate: np.ndarray
@@ -50,7 +50,7 @@ class Modes:
 
     @property
     def is_stable(self) -> bool:
-        """Whether nothing grows."""
+        """Whether no mode grows."""
         return self.slowest <= 0.0
 
 
@@ -70,26 +70,26 @@ def modes(A: np.ndarray, period: float) -> Modes:
 
 
 def in_loop(changes: np.ndarray, core: np.ndarray) -> np.ndarray:
-    """Return which variables are in a loop with others: what they do comes back to them.
+    """Return the variables that are part of a feedback loop.
 
-    Counters, memories that are overwritten, integrals without gain and disturbances are not;
-    without them the others behave the same.
+    Counters, overwritten memories, integrals without gain and disturbances are not; the others do
+    not depend on them.
 
     Args:
-        changes: Whether the variable in the column changes that in the row, shape (n, n).
-        core: Whether a variable is of the controlled system itself, shape (n,).
+        changes: Whether the variable of the column changes the one of the row, shape (n, n).
+        core: Whether a variable belongs to the controlled system itself, shape (n,).
 
     Returns:
-        Shape (n,): whether a variable is changed by the core and changes it, at however many
-        removes; those of the core included.
+        Shape (n,): whether a variable is changed by the core and changes it, directly or
+        indirectly; including the core.
     """
-    reached = _reached(changes, core)
-    reaching = _reached(changes.T, core)
+    reached = _reachable(changes, core)
+    reaching = _reachable(changes.T, core)
     return core | (reached & reaching)
 
 
-def _reached(changes: np.ndarray, core: np.ndarray) -> np.ndarray:
-    """Return what is changed by the core, at however many removes, and the core."""
+def _reachable(changes: np.ndarray, core: np.ndarray) -> np.ndarray:
+    """Return the variables changed by the core, directly or indirectly, and the core."""
     n = len(core)
     # one more node that changes all of the core
     graph = np.zeros((n + 1, n + 1), dtype=bool)
@@ -100,7 +100,7 @@ def _reached(changes: np.ndarray, core: np.ndarray) -> np.ndarray:
     return reached[:n]
 
 
-_POINTS = 400  # frequencies that are looked at first
+_POINTS = 400  # frequencies of the first grid
 _SLOWEST = 0.01  # rad/s; neutral modes are at 0
 _REFINEMENTS, _FINER = 3, 20
 _BALANCING = 30  # sweeps at most
@@ -109,11 +109,11 @@ _BALANCED = 1e-3
 
 @dataclass(frozen=True)
 class DiscMargin:
-    """What gain and phase errors a loop bears.
+    """Tolerated gain and phase errors of a loop.
 
     Attributes:
         alpha: Disc margin, 0 (none) to 2 (any gain).
-        frequency: Where the loop is weakest [rad/s].
+        frequency: Frequency of the smallest margin [rad/s].
     """
 
     alpha: float
@@ -121,14 +121,14 @@ class DiscMargin:
 
     @property
     def gain(self) -> tuple[float, float]:
-        """Least and largest factor of the gain that are borne."""
+        """Least and largest tolerated factor of the gain."""
         if self.alpha >= 2.0:
             return 0.0, np.inf
         return (2.0 - self.alpha) / (2.0 + self.alpha), (2.0 + self.alpha) / (2.0 - self.alpha)
 
     @property
     def phase(self) -> float:
-        """Phase error that is borne [rad]."""
+        """Tolerated phase error [rad]."""
         return 2.0 * float(np.arctan(self.alpha / 2.0))
 
 
@@ -138,7 +138,7 @@ NO_MARGIN = DiscMargin(0.0, 0.0)
 class BrokenLoop:
     """``S - T`` of a loop broken at its holds.
 
-    With the Schur form ``A = Q R Q^H`` every frequency takes a triangular system only.
+    With the Schur form ``A = Q R Q^H`` every frequency needs only a triangular system.
 
     Args:
         A: Map of one sampling interval, shape (n, n).
@@ -147,7 +147,7 @@ class BrokenLoop:
 
     Attributes:
         num_drives: N.
-        is_stable: Whether nothing grows.
+        is_stable: Whether no mode grows.
         frequencies: A grid, and all resonances [rad/s].
     """
 
@@ -179,7 +179,7 @@ class BrokenLoop:
 
 
 def disc_margins(loop: BrokenLoop) -> list[DiscMargin]:
-    """Return the disc margin of every drive, the others being as they are.
+    """Return the disc margin of every drive, with the others unchanged.
 
     Args:
         loop: The loop, N drives.
@@ -193,10 +193,10 @@ def disc_margins(loop: BrokenLoop) -> list[DiscMargin]:
 
 
 def common_disc_margin(loop: BrokenLoop) -> DiscMargin:
-    """Return a disc margin for all drives at once, each with an error of its own.
+    """Return a disc margin for independent simultaneous errors of all drives.
 
-    The structured singular value is bounded by scaling the drives, so that the loop bears at
-    least what is returned.
+    The structured singular value is bounded by scaling the drives, so that the loop tolerates at
+    least the returned margin.
 
     Args:
         loop: The loop.
@@ -233,7 +233,7 @@ def _scaled_norm(M: np.ndarray) -> np.ndarray:
             others = diagonal != i
             row = np.linalg.norm(M[:, i, others], axis=1)
             column = np.linalg.norm(M[:, others, i], axis=1)
-            # a drive that is alone, one way, keeps its scale
+            # a drive without coupling in one direction retains its scale
             alone = (row == 0.0) | (column == 0.0)
             factor = np.sqrt(np.where(alone, 1.0, column) / np.where(alone, 1.0, row))
             M[:, i, :] *= factor[:, None]
@@ -244,11 +244,11 @@ def _scaled_norm(M: np.ndarray) -> np.ndarray:
     return np.linalg.norm(M, 2, axis=(1, 2))
 
 
-MOST = 50  # sampling intervals that are tried
+MOST = 50  # largest delay in sampling intervals
 
 
-def delayed(A: np.ndarray, holds: np.ndarray, intervals: int) -> np.ndarray:
-    """Return the map of a loop whose drives get what they are told some intervals later.
+def with_delay(A: np.ndarray, holds: np.ndarray, intervals: int) -> np.ndarray:
+    """Return the map of a loop whose commands reach the drives some intervals later.
 
     Args:
         A: Map of one sampling interval, shape (n, n).
@@ -256,15 +256,15 @@ def delayed(A: np.ndarray, holds: np.ndarray, intervals: int) -> np.ndarray:
         intervals: Further delay in sampling intervals.
 
     Returns:
-        Shape (n + intervals N, n + intervals N); behind the loop's own variables those of the
-        bus, newest first.
+        Shape (n + intervals N, n + intervals N); the loop's own variables, then the
+        variables of the bus, newest first.
     """
     n, N = len(A), len(holds)
     result = np.zeros((n + intervals * N, n + intervals * N))
     result[:n, :n] = A
     if intervals == 0:
         return result
-    # the last on the bus acts in place of what has just been told
+    # the oldest command on the bus acts instead of the newest one
     result[:n, holds] = 0.0
     result[:n, n + (intervals - 1) * N :] = A[:, holds]
     result[np.arange(n, n + N), holds] = 1.0
@@ -274,7 +274,7 @@ def delayed(A: np.ndarray, holds: np.ndarray, intervals: int) -> np.ndarray:
 
 
 def delay_margin(A: np.ndarray, holds: np.ndarray, period: float) -> int:
-    """Return how many further sampling intervals of delay in all drives a loop bears.
+    """Return the delay margin of all drives in sampling intervals.
 
     Args:
         A: Map of one sampling interval, shape (n, n).
@@ -282,9 +282,9 @@ def delay_margin(A: np.ndarray, holds: np.ndarray, period: float) -> int:
         period: Sampling time [s].
 
     Returns:
-        -1 if the loop is unstable as it is; at most ``MOST``.
+        -1 if the loop is unstable without further delay; at most ``MOST``.
     """
     for intervals in range(MOST + 1):
-        if not modes(delayed(A, holds, intervals), period).is_stable:
+        if not modes(with_delay(A, holds, intervals), period).is_stable:
             return intervals - 1
     return MOST

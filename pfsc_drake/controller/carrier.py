@@ -1,4 +1,4 @@
-"""A robot or a turntable that carries the workpiece: its motion, for another controller."""
+"""Motion of a workpiece on a robot or a turntable, for another controller."""
 
 from typing import Literal
 
@@ -16,7 +16,7 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 Derivatives = Literal["known", "differenced", "planned"]
 
 
-class CarriedFrame(Extension):
+class WorkpieceFrame(Extension):
     """Motion of the workpiece that a robot holds, for the controller of another one.
 
     Ports:
@@ -24,8 +24,8 @@ class CarriedFrame(Extension):
 
     Args:
         order: Highest derivative.
-        derivatives: Source of the derivatives: those of the joints as the law moves them,
-            differences of the measured pose, or the plan.
+        derivatives: Source of the derivatives: the joint motion by the law, differences of the
+            measured pose, or the plan.
         highest: Highest derivative that is known; the others are zero.
         placement: Nominal pose of the base relative to the model's, ``[p, R by rows]``, (12,).
     """
@@ -117,7 +117,7 @@ class TurntableMotion(Extension):
         table = TurntableFrame(self._axes, order, known)
         sources = {"measured": assembly.open("table_angles", n)}
         if known:
-            command = TimedReference(delayed(self._command, self._delay), order, n, period)
+            command = TimedReference(delay_curve(self._command, self._delay), order, n, period)
             sources["planned"] = assembly.add("table_command", command).GetOutputPort("reference")
         frame = assembly.add("table_frame", table, **sources).GetOutputPort("frame_jet")
         if self._derivatives == "differenced":
@@ -130,8 +130,8 @@ class TurntableMotion(Extension):
         assembly.show(frame_jet=frame)
 
 
-def delayed(curve: PiecewisePolynomialCurve, delay: float) -> PiecewisePolynomialCurve:
-    """Return a curve of time that comes later.
+def delay_curve(curve: PiecewisePolynomialCurve, delay: float) -> PiecewisePolynomialCurve:
+    """Return a delayed curve of time.
 
     Args:
         curve: The curve.

@@ -9,8 +9,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.compliance.impedance import DAMPING, MASS, STIFFNESS, ImpedanceLaw
 from pfsc_drake.control.compliance.impedance_filter import (
+    GuidedMotion,
     ImpedanceFilter,
-    LedMotion,
     ManifoldForceTransform,
 )
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance
@@ -31,18 +31,18 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 
-# up to which derivative the filter knows the external reference, see ImpedanceLaw
+# highest derivative of the external reference in the filter, see ImpedanceLaw
 _DESIRED_ORDER = 4
 
 
 def has_impedance(compliance: ComplianceParameters, manifold: Manifold) -> bool:
-    """Return whether the reference of the law is one that an impedance lets yield.
+    """Return whether an impedance changes the reference of the law.
 
-    In space a tool is led along by guidance, so that only the angles need an impedance.
+    In space guidance moves the tool, so that only the angles need an impedance.
 
     Args:
-        compliance: How the tool yields.
-        manifold: What is followed.
+        compliance: Compliance of the tool.
+        manifold: Followed manifold.
     """
     if manifold.name != SpaceManifold.name:
         return compliance.is_given
@@ -53,18 +53,18 @@ def reference_order(compliance: ComplianceParameters, linearization: Linearizati
     """Return the highest derivative of the external reference that is needed.
 
     Args:
-        compliance: How the tool yields.
+        compliance: Compliance of the tool.
         linearization: Linearization of the law.
 
     Raises:
-        InputError: If there is compliance that the law cannot have.
+        InputError: If the law does not support the compliance.
     """
     if not has_impedance(compliance, linearization.manifold):
         return linearization.relative_degree
     if linearization.manifold.follows_time:
         raise InputError(
             "compliance: controller.manifold = trajectory has no path coordinates that could "
-            "yield; must be path"
+            "comply; must be path"
         )
     return max(linearization.relative_degree, _DESIRED_ORDER)
 
@@ -72,12 +72,12 @@ def reference_order(compliance: ComplianceParameters, linearization: Linearizati
 def force_ports(
     compliance: ComplianceParameters, ports: dict[str, OutputPort]
 ) -> tuple[OutputPort, OutputPort]:
-    """Return the wrench that a tool yields to, and whether it is to be trusted.
+    """Return the wrench for the compliance of a tool, and whether it is valid.
 
     Args:
-        compliance: How the tool yields.
+        compliance: Compliance of the tool.
         ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
-            ``ready``; ``wrench_led``, where a tool is led by more than what is measured.
+            ``ready``; ``wrench_led`` with further forces than the measured ones, if there is one.
     """
     names = ("wrench_measured", "tared")
     if compliance.source == "observed":
@@ -98,9 +98,9 @@ def add_compliance(
 
     Args:
         builder: Builder of the diagram.
-        options: How the tool complies, whether its motion ends, and an operator's settings.
+        options: Compliance of the tool, stream of its motion, and an operator's settings.
         linearization: Linearization of the law that follows the reference.
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model of the robot, N joints.
         task: Task of the tool without forces.
         posture: Joint coordinates at the start, shape (N,) [rad or m].
         ports: Those of :func:`force_ports`, and ``joint_state``, ``manifold_point``,
@@ -110,7 +110,7 @@ def add_compliance(
     Returns:
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
         a force reference ``press``, with an operator ``impedance`` and ``tank``, else where it
-        varies ``damping`` of every coordinate; where a hand leads the tool along, ``limit_force``;
+        varies ``damping`` of every coordinate; with hand guiding, ``limit_force``;
         ``compliance_status``, an :class:`ImpedanceStatus`, and with a force reference
         ``press_lost``, whether the force is too far from it.
 
@@ -121,7 +121,7 @@ def add_compliance(
     period = options.controller.sampling_time
     impedance_parameters = compliance.impedance()
     if manifold.name == SpaceManifold.name:
-        # guidance leads along, see add_guidance
+        # guidance moves the tool, see add_guidance
         impedance_parameters.tangential = CoordinateImpedance()
     law = ImpedanceLaw(
         impedance_parameters.on_path(task.length),
@@ -129,7 +129,7 @@ def add_compliance(
         linearization.relative_degree,
         period,
         desired_order=reference_order(compliance, linearization),
-        lap=task.lap,
+        revolution=task.revolution,
     )
     limits = _limits(compliance, linearization.manifold, robot, posture, period)
     free = None if limits is None else limits.tangential
@@ -145,9 +145,9 @@ def add_compliance(
     builder.Connect(ports["manifold_point"], transform.GetInputPort("manifold_point"))
     if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
-    told = {"manifold_force": force, "reference": reference, "ready": ready}
+    force_signals = {"manifold_force": force, "reference": reference, "ready": ready}
     end = task.end if options.stream is None else math.inf
-    signals = _add_press(builder, compliance, law, manifold.coordinates, told, end)
+    signals = _add_press(builder, compliance, law, manifold.coordinates, force_signals, end)
     builder.Connect(signals.pop("pressed_force", force), impedance.GetInputPort("manifold_force"))
     builder.Connect(ready, impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
@@ -155,7 +155,7 @@ def add_compliance(
     desired = ports["desired_reference"]
     if limits is not None:
         signals["limit_force"] = _add_limits(builder, limits, impedance, ports)
-    # where guidance leads along, the impedance is the one given
+    # where guidance moves the tool, the impedance is constant
     operator = options.operator
     if operator is not None and manifold.name != SpaceManifold.name:
         signals |= _add_tuner(builder, operator.tuning, manifold.coordinates, law, impedance, ports)
@@ -170,7 +170,7 @@ def add_compliance(
 
 
 def _ends(law: ImpedanceLaw, manifold: Manifold, settling: float) -> PathEnds | None:
-    """Return the ends that the reference stays between, of an open path."""
+    """Return the ends of an open path, between which the reference stays."""
     for k, coordinate in enumerate(manifold.coordinates):
         if np.isfinite(coordinate.ends).all():
             return PathEnds(law, k, coordinate.ends, settling)
@@ -183,11 +183,11 @@ def _limits(
     robot: RobotModel,
     start: np.ndarray,
     period: float,
-) -> LedMotion | None:
-    """Return what of the robot limits a hand that leads it along a manifold, if one does."""
+) -> GuidedMotion | None:
+    """Return the robot's limits for hand guiding along a manifold, if the tool is guided."""
     parameters, stiffness = compliance.limits, compliance.tangential.stiffness
-    led = bool(stiffness.at) or np.isfinite(stiffness.value)
-    if not (led and parameters.on and isinstance(manifold, PathManifold | SurfaceManifold)):
+    guided = bool(stiffness.at) or np.isfinite(stiffness.value)
+    if not (guided and parameters.on and isinstance(manifold, PathManifold | SurfaceManifold)):
         return None
     limits = RobotLimits(
         robot,
@@ -197,18 +197,18 @@ def _limits(
         tool_axis=manifold.tool.tool_axis,
         yaw_axis=manifold.tool.yaw_axis,
     )
-    return LedMotion(limits, manifold, period)
+    return GuidedMotion(limits, manifold, period)
 
 
 def _add_limits(
     builder: DiagramBuilder,
-    limits: LedMotion,
+    limits: GuidedMotion,
     impedance: BlockSystem,
     ports: dict[str, OutputPort],
 ) -> OutputPort:
-    """Let the filter move no faster than the robot can; return the forces that hold the hand."""
+    """Limit the filter to the speed of the robot; return the forces against the operator."""
     system = builder.AddNamedSystem("motion_limits", BlockSystem(limits, impedance.period))
-    sources = {"wanted_speed": impedance.GetOutputPort("wanted_speed")}
+    sources = {"desired_speed": impedance.GetOutputPort("desired_speed")}
     sources |= {name: ports[name] for name in ("joint_state", "manifold_point")}
     for name, port in sources.items():
         builder.Connect(port, system.GetInputPort(name))
@@ -224,13 +224,13 @@ def _add_tuner(
     impedance: BlockSystem,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
-    """Let an operator change the impedance; return it as it is, and the tank that pays for it."""
-    given = _impedance_at_origin(law)
-    # what is rigid has no mass of its own
-    soft = np.isfinite(given[STIFFNESS])
-    along = given[MASS, indices(coordinates, Kind.TANGENTIAL)].max()
-    masses = np.where(soft, given[MASS], along)
-    masses[indices(coordinates, Kind.ROTATIONAL)] = given[
+    """Let an operator change the impedance; return the present impedance and its energy tank."""
+    initial = _impedance_at_origin(law)
+    # rigid coordinates have no mass of their own
+    soft = np.isfinite(initial[STIFFNESS])
+    along = initial[MASS, indices(coordinates, Kind.TANGENTIAL)].max()
+    masses = np.where(soft, initial[MASS], along)
+    masses[indices(coordinates, Kind.ROTATIONAL)] = initial[
         MASS, indices(coordinates, Kind.ROTATIONAL)
     ]
     block = ImpedanceTuner(tuning, law, coordinates, masses)
@@ -255,7 +255,7 @@ def _add_press(
     ports: dict[str, OutputPort],
     end: float,
 ) -> dict[str, OutputPort]:
-    """Return what :class:`Pressing` gives, if there is a force reference."""
+    """Add :class:`Pressing`, if there is a force reference, and return its outputs."""
     press = compliance.press
     if press is None:
         return {}
@@ -279,7 +279,7 @@ def _add_press(
         ports["reference"].size(),
         law.period,
         press.allowed_difference,
-        press.taken_off(end),
+        press.retreat_begin(end),
     )
     system = builder.AddNamedSystem("pressing", BlockSystem(pressing, law.period))
     for name, port in ports.items():

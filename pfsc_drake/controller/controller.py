@@ -1,4 +1,4 @@
-"""A whole controller as one diagram: all between what is measured and the drives."""
+"""Complete controller as one diagram, from the measured state to the commands."""
 
 import dataclasses as dc
 from typing import Self
@@ -13,13 +13,13 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import SampledRobot
 from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
-from pfsc_drake.control.planning.joint_course import CourseStart
+from pfsc_drake.control.planning.joint_trajectory import TrajectoryStart
 from pfsc_drake.controller.assembly import Assembly
-from pfsc_drake.controller.believed import Believed
 from pfsc_drake.controller.fault_description import FaultInstant, FaultScene, describe
 from pfsc_drake.controller.law import make_law, sampled_robot
 from pfsc_drake.controller.law_warnings import law_warnings, observed_force_warnings
 from pfsc_drake.controller.moving_start import resting_point
+from pfsc_drake.controller.nominal_robot import NominalRobot
 from pfsc_drake.controller.options.follower_options import FollowerOptions
 from pfsc_drake.controller.planning.drive_limits import keep_drive_limits
 from pfsc_drake.controller.tasks.task import StartPoint, Task
@@ -40,67 +40,67 @@ _PUBLIC = (
 class Controller(Diagram):
     """Path or surface following, or hand guiding, of one robot.
 
-    All of its systems are blocks of one sampling time, so that it can be one function
+    All of its systems are blocks with one sampling time, so that it can be one function
     (:attr:`network`): stepped without Drake, differentiated, exported as C. The exception is
     guidance through more than eight regions, whose distances are computed in turns.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,) [rad, rad/s or m,
-            m/s]; of elastic joints the motors' side alone is read if ``controller.state`` is not
+            m/s]; of elastic joints only the motors' side is used unless ``controller.state`` is
             ``measured``.
-        joint_torque (input): With ``controller.state`` = ``from_torque``: torques that are measured
-            in elastic joints, shape (N,) [Nm or N].
+        joint_torque (input): With ``controller.state`` = ``from_torque``: measured torques in
+            elastic joints, shape (N,) [Nm or N].
         override (input): With ``override``: speed scaling of the motion, shape (1,); see
             :class:`TimedReference`.
         goal (input): With ``stream``: arc length of the last waypoint [m], shape (1,), and
-        speed (input, optional): how fast to go there [m/s]; see :class:`StreamedReference`.
+        speed (input, optional): speed towards it [m/s]; see :class:`StreamedReference`.
         obstacles (input): With ``obstacles``: position and velocity of each as measured, shape
             (6K,) [m, m/s]; NaN or infinite values stop the motion.
-        waypoints (input): On a path of waypoints that come: a message of the last of them, see
+        waypoints (input): On a streamed path: a message with the last waypoints, see
             :func:`~pfsc_drake.add_path_streaming`.
         wrench (input): Force and torque on the tool at the tool point, world axes, shape (6,)
-            [N, Nm], the load of the tool itself taken off: where a hand guides the tool, where it
-            complies, and where law or posture receive known or measured forces. NaN is a fault.
+            [N, Nm], without the load of the tool: for hand guiding, compliance, and law or posture
+            with known or measured forces. NaN is a fault.
         wrench_ext, push_torque (input): With ``known_forces``.
         impedance_request, regions_on (input): With ``operator``.
-        frame_jet (input): With ``frame``: motion of the frame that path or surface are in,
+        frame_jet (input): With ``frame``: motion of the frame of path or surface,
             derivatives 0..r of ``[p_WC, R_WC by rows]``, shape (12 (r + 1),) [m, 1, per s, ..].
-        stop_request (input): With ``stop_request``: any value but 0 stops the robot, shape (1,).
+        stop_request (input): With ``stop_request``: any value except 0 stops the robot, shape (1,).
         drive_torque (output): Drive torques within their limits, shape (N,) [Nm or N]; of velocity
             servos
         velocity_reference (output): joint velocities, shape (N,) [rad/s or m/s].
         reference (output): Derivatives 0..r of the virtual output's reference by rows.
         manifold_force (output): With compliance: forces along the coordinates, shape (m,) [N, Nm].
-        limit_force (output): Where a hand guides the tool along a manifold: forces by which limits
-            of the robot hold it, see :class:`LedMotion`.
-        mode, guides, guidance (output): Where a hand guides it through space, see
+        limit_force (output): With hand guiding along a manifold: forces by which limits of the
+            robot hold the tool, see :class:`GuidedMotion`.
+        mode, guides, guidance (output): With hand guiding through space, see
             :class:`FixtureGuidance`.
         watch (output): With ``obstacles``: ``record`` of :class:`ObstacleWatch`.
-        stream (output): On a path of waypoints that come: their status.
+        stream (output): On a streamed path: status of the stream.
         manifold_state (output): Derivatives 0..r-1 of the virtual output by rows, shape (r m,).
-        manifold_point (output): Point of the manifold next to the tool.
+        manifold_point (output): Point of the manifold closest to the tool.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).
         stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`, shape
-            (1,): at 0 the robot's brakes are to be closed.
+            (1,): at 0 the robot's brakes must close.
 
     Extensions add ports of their own.
 
     Args:
-        task: Task of the tool; receives its plan, and the motion that the drives can follow.
-        believed: Nominal model of the robot.
+        task: Task of the tool; receives its plan, and the motion within the limits of the drives.
+        nominal: Nominal model of the robot.
         options: Options.
         start: Start of the tool, in the frame of a manifold that moves.
         posture: Joint coordinates there, shape (N,) [rad or m].
-        duration: Duration of the run [s]; 0 for that of the motion.
+        duration: Duration of the run [s]; 0 for the duration of the motion.
         progress: Receives the fraction done and the name of the step.
-        like: A controller of the same task whose plan of waiting for obstacles is taken.
+        like: A controller of the same task, whose plan of waiting for obstacles is reused.
         logged: Whether all signals are outputs, for a log.
 
     Attributes:
         task: The task.
         robot: Nominal model of the robot.
-        believed: The same, with its friction and how well its motion is measured.
+        nominal: The same, with friction and properties of its encoders.
         options: The options.
         law: The law.
         rest: Posture and manifold point at the start.
@@ -108,9 +108,9 @@ class Controller(Diagram):
         start_posture: Joint coordinates at the start, shape (N,) [rad or m].
         drive_port: Name of the output with the commands to the drives.
         deviations: Names of the outputs with standard deviations, of links that are not measured.
-        estimates_state: Whether the law takes another joint state than the measured one.
+        estimates_state: Whether the law gets an estimated joint state.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
-        waiting: Motion that waits for obstacles, if it does.
+        waiting: Motion that waits for obstacles, if there is one.
         logged: Names of the outputs for a log, if there is one.
 
     Raises:
@@ -120,7 +120,7 @@ class Controller(Diagram):
     def __init__(
         self,
         task: Task,
-        believed: Believed,
+        nominal: NominalRobot,
         options: FollowerOptions,
         start: StartPoint,
         posture: np.ndarray,
@@ -131,18 +131,18 @@ class Controller(Diagram):
         logged: bool = False,
     ) -> None:
         super().__init__()
-        self._plan(task, believed, options, start, posture)
-        begun = CourseStart(posture, start.place)
-        friction = believed.friction
+        self._plan(task, nominal, options, start, posture)
+        initial = TrajectoryStart(posture, start.projection)
+        friction = nominal.friction
         if options.reference is not None:
-            known = task, self.law, begun, friction
+            known = task, self.law, initial, friction
             keep_drive_limits(options, *known, duration, progress)
         self.waiting: Waiting | None = None if like is None else like.waiting
         if options.obstacles is not None and like is None:
-            self.waiting = plan_waiting(options, task, self.law, begun, friction, posture)
+            self.waiting = plan_waiting(options, task, self.law, initial, friction, posture)
         builder = DiagramBuilder()
-        self._assembly = Assembly(builder, task, self.law, believed, options, begun, self.waiting)
-        self._assembly.build(self._measured())
+        self._assembly = Assembly(builder, task, self.law, nominal, options, initial, self.waiting)
+        self._assembly.build(self._add_measurement())
         self.estimates_state = self._assembly.estimates_state
         self.on_motors, self.drive_port = self._assembly.on_motors, self._law_system.drive_port
         names = ("position_deviation", "tool_deviation", "velocity_deviation")
@@ -153,14 +153,14 @@ class Controller(Diagram):
     def _plan(
         self,
         task: Task,
-        believed: Believed,
+        nominal: NominalRobot,
         options: FollowerOptions,
         start: StartPoint,
         posture: np.ndarray,
     ) -> None:
-        """Find the law."""
-        self.task, self.robot, self.options = task, believed.robot, options
-        self.believed = believed
+        """Set task, robot and options, and create the law."""
+        self.task, self.robot, self.options = task, nominal.robot, options
+        self.nominal = nominal
         self.start_posture, self.period = posture, options.controller.sampling_time
         point, manifold = task.point(start), task.manifold
         if options.frame is not None:
@@ -171,15 +171,15 @@ class Controller(Diagram):
             options.controller, self.robot, manifold, lambda: self.rest, options.faults
         )
 
-    def _measured(self) -> OutputPort:
-        """Add the input with what is measured, and return the joint state."""
+    def _add_measurement(self) -> OutputPort:
+        """Add the input of the measured state, and return the joint state."""
         block = Collect({"joint_state": 4 * self.robot.dimension})
         measured = self._assembly.add("measured_state", block)
         self._assembly.inputs["joint_state"] = [measured.GetInputPort("joint_state")]
         return measured.GetOutputPort("all")
 
     def _export(self, builder: DiagramBuilder, *, logged: bool) -> None:
-        """Make ports of the assembly those of the diagram."""
+        """Export ports of the assembly as ports of the diagram."""
         assembly, law = self._assembly, self._law_system
         for name, (port, *others) in assembly.inputs.items():
             builder.ExportInput(port, name)
@@ -189,7 +189,7 @@ class Controller(Diagram):
         for name in _ALWAYS:
             builder.ExportOutput(law.GetOutputPort(name), name)
         self.logged = [name for name in assembly.outputs if name not in _ALWAYS] if logged else []
-        further = ["closest_point", "world_pose", "found_state", "course"] if logged else []
+        further = ["closest_point", "world_pose", "found_state", "growing_path"] if logged else []
         names = dict.fromkeys([*_PUBLIC, *assembly.public, *self.logged, *further])
         for name in (name for name in names if name in assembly.signals):
             builder.ExportOutput(assembly.signals[name], name)
@@ -206,21 +206,21 @@ class Controller(Diagram):
 
     @property
     def access(self) -> ControllerAccess:
-        """Faults and commands, whether its blocks are fused with others or not."""
+        """Access to faults and commands, with or without fused blocks."""
         return ControllerAccess(self._law_system, f"{self.get_name()}.")
 
     @property
     def network(self) -> Network:
-        """All that it does, as functions between its ports."""
+        """Network of functions between its ports."""
         return network_of(self)
 
     def stepper(self, connected: tuple[str, ...] = ()) -> Stepper:
-        """Return the controller as something to call at every sample, without Drake.
+        """Return the controller as an object to call at every sample, without Drake.
 
-        ``stepper.step(joint_state=..)["drive_torque"]``; all outputs are in what it returns.
+        ``stepper.step(joint_state=..)["drive_torque"]``; the result has all outputs.
 
         Args:
-            connected: Optional inputs that are given at every sample.
+            connected: Optional inputs with a value at every sample.
         """
         return Stepper(self.network, connected)
 
@@ -252,12 +252,12 @@ class Controller(Diagram):
         link_state = np.append(self.start_posture, np.zeros(self.robot.dimension))
         return [
             *self.task.warnings,
-            *([] if plan is None else plan.said),
-            *law_warnings(chosen, self.robot, law, link_state, self.sampled),
+            *([] if plan is None else plan.messages),
+            *law_warnings(chosen, self.robot, law, link_state, self.sampled_loop),
             *observed_force_warnings(self.options.compliance, self.robot, law, self.rest),
         ]
 
-    def sampled(self) -> SampledRobot:
+    def sampled_loop(self) -> SampledRobot:
         """Return the law, which commands torques, on its robot at rest at the start."""
         law = self.law
         return sampled_robot(
@@ -277,12 +277,18 @@ class Controller(Diagram):
         Args:
             fault: The fault.
             now: Signals of the first sample with it.
-            before: Those of the last sample without it, if there is one.
+            before: Signals of the last sample without it, if there is one.
             suspects: Implausible components of the joint state, nonzero if so, shape (4N,).
             oscillating: Drives whose commands oscillated before, by index.
         """
         scene = FaultScene(
-            self.law, self.robot, self.task.place, self.on_motors, now, before, suspects
+            self.law,
+            self.robot,
+            self.task.projected_manifold,
+            self.on_motors,
+            now,
+            before,
+            suspects,
         )
         if oscillating is not None:
             scene = dc.replace(scene, oscillating=oscillating)

@@ -1,4 +1,4 @@
-"""Further blocks of a controller, beside those of every one."""
+"""Extensions: further blocks of a controller."""
 
 from typing import Protocol
 
@@ -7,29 +7,29 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.controller.believed import Believed
+from pfsc_drake.controller.nominal_robot import NominalRobot
 from pfsc_drake.controller.tasks.task import Task
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.systems.block_system import BlockSystem
 
 
 class OpenController(Protocol):
-    """A controller while it is assembled, see :class:`~pfsc_drake.controller.assembly.Assembly`.
+    """Controller during assembly, see :class:`~pfsc_drake.controller.assembly.Assembly`.
 
     Attributes:
         builder: Builder of its diagram.
         task: Task of the tool.
         law: Law.
-        believed: Nominal model of the robot.
+        nominal: Nominal model of the robot.
         period: Sampling time [s].
         signals: Output ports of its systems, by name.
-        public: Names of further signals that are outputs of the controller.
+        public: Names of further outputs of the controller.
     """
 
     builder: DiagramBuilder
     task: Task
     law: FollowingLaw
-    believed: Believed
+    nominal: NominalRobot
     period: float
     signals: dict[str, OutputPort]
     public: list[str]
@@ -38,7 +38,7 @@ class OpenController(Protocol):
         """Add a block with the sources of its inputs, and return its system."""
 
     def show(self, **signals: OutputPort) -> None:
-        """Take signals by name, and into the log."""
+        """Add signals by name, and log them."""
 
     def open(self, name: str, size: int) -> OutputPort:
         """Add an input of the controller, and return its signal."""
@@ -48,31 +48,31 @@ class OpenController(Protocol):
 
 
 class Extension:
-    """Adds blocks to a controller at one of three moments of its assembly.
+    """Extension that adds blocks at one of three stages of the assembly of a controller.
 
     Attributes:
-        measures: Whether it provides the measured force on the tool: the signals
+        measures: Whether it provides the measured force on the tool, with the signals
             ``wrench_measured``, ``tared`` and ``sensor_fault``.
     """
 
     measures: bool = False
 
     def before_projection(self, assembly: OpenController) -> None:
-        """Add blocks where a moving manifold is about to be projected on.
+        """Add blocks before the projection onto a moving manifold.
 
         Args:
             assembly: The controller.
         """
 
     def before_law(self, assembly: OpenController) -> None:
-        """Add blocks where projection and inputs of forces exist.
+        """Add blocks after the projection and the inputs of forces.
 
         Args:
             assembly: The controller.
         """
 
     def after_law(self, assembly: OpenController) -> None:
-        """Add blocks where all others exist.
+        """Add blocks after all others.
 
         Args:
             assembly: The controller.

@@ -1,4 +1,4 @@
-"""Sentences on faults: cause, place and joints, from the signals of that instant."""
+"""Descriptions of faults: cause, location and joints, from the signals of the instant."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,28 +9,28 @@ import numpy as np
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.coordinate import Kind
-from pfsc_drake.control.manifolds.manifold import PlaceManifold, indices
+from pfsc_drake.control.manifolds.manifold import ProjectedManifold, indices
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import euler_margin
-from pfsc_drake.robot.coordinate_text import coordinate_text, listed, posture_text
+from pfsc_drake.robot.coordinate_text import coordinate_text, enumeration, eta_text, posture_text
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture, singularity_name
 
 _STATE = ("q_J", "v_J", "q_M", "v_M")
-# m, from which on a distance from the path is worth a word where an arm becomes singular
+# m, from which on a distance from the path is reported where an arm becomes singular
 _BESIDE = 1e-3
-# of singular values of the Jacobian, from which on a joint that runs away is the posture's fault
+# of singular values of the Jacobian, from which on the posture is the cause of a fast joint
 _NEARLY = 0.1
 
 
 @dataclass(frozen=True)
-class FoundFault:
+class FaultReport:
     """Cause of a stop.
 
     Attributes:
-        sentence: What, and where.
-        time: Since when [s].
+        sentence: Cause and location.
+        time: Begin of the fault [s].
     """
 
     sentence: str
@@ -42,7 +42,7 @@ class FaultInstant:
     """Signals of one instant.
 
     Attributes:
-        time: When [s].
+        time: Time [s].
         signals: By name, each of shape (size,).
     """
 
@@ -51,7 +51,7 @@ class FaultInstant:
 
     @property
     def measured_state(self) -> np.ndarray:
-        """``[q_J, v_J, q_M, v_M]`` as the law is given it, shape (4N,)."""
+        """``[q_J, v_J, q_M, v_M]`` as the input of the law, shape (4N,)."""
         return self.signals.get("joint_state_measured", self.signals["joint_state"])
 
 
@@ -60,20 +60,20 @@ class FaultScene:
     """Robot, law and signals of a fault.
 
     Attributes:
-        law: The law that moved the robot.
-        robot: The robot as the law knows it.
-        place: Manifold of the log's ``manifold_point``.
+        law: Law of the controller.
+        robot: Nominal model of the robot.
+        manifold: Manifold of the log's ``manifold_point``.
         on_motors: Whether the law acts on the tool pose of the motors.
         now: The first instant with the fault.
-        before: The last one without, if there is any.
-        suspects: Which components of the measured state are implausible, nonzero if so, shape
-            (4N,); empty if that is not known.
-        oscillating: Drives whose commands swung to and fro before, by index.
+        before: The last instant without it, if there is any.
+        suspects: Implausible components of the measured state, nonzero if so, shape (4N,); empty
+            if unknown.
+        oscillating: Drives whose commands oscillated before, by index.
     """
 
     law: FollowingLaw
     robot: RobotModel
-    place: PlaceManifold
+    manifold: ProjectedManifold
     on_motors: bool
     now: FaultInstant
     before: FaultInstant | None
@@ -82,11 +82,11 @@ class FaultScene:
 
 
 def describe(fault: Fault, scene: FaultScene) -> str:
-    """Return one sentence on a fault: what, where on the path, when, and through which joints.
+    """Return one sentence on a fault: cause, location on the path, time, and joints.
 
     Args:
         fault: The fault.
-        scene: Where it happened.
+        scene: Robot, law and signals of the fault.
     """
     descriptions: dict[Fault, Callable[[FaultScene], str]] = {
         Fault.INPUT_NOT_FINITE: _not_finite,
@@ -100,20 +100,20 @@ def describe(fault: Fault, scene: FaultScene) -> str:
         Fault.DRIVE_SATURATED: partial(_at_limit, Fault.DRIVE_SATURATED),
         Fault.DRIVE_CHATTERS: partial(_at_limit, Fault.DRIVE_CHATTERS),
         Fault.PRESS_FORCE_LOST: _press_lost,
-        Fault.ORIENTATION_ERROR: _turned_away,
+        Fault.ORIENTATION_ERROR: _orientation_error,
     }
     if fault in descriptions:
         return descriptions[fault](scene)
-    return f"{fault.explanation} {_place(scene)}"
+    return f"{fault.explanation} {_location(scene)}"
 
 
 def _not_finite(scene: FaultScene) -> str:
-    """Name the signals, those first that others follow from."""
+    """Return the names of the signals, causes first."""
     n, signals = scene.robot.dimension, scene.now.signals
     wrong = np.flatnonzero(~np.isfinite(scene.now.measured_state))
     names = _component_names(wrong, n)
     if names:
-        return f"a measured value is not a finite number: {listed(names)} {_place(scene)}"
+        return f"a measured value is not a finite number: {enumeration(names)} {_location(scene)}"
     known = {
         "wrench_measured": "measured force",
         "wrench_ext": "force on the tool",
@@ -125,25 +125,25 @@ def _not_finite(scene: FaultScene) -> str:
         if name in signals and not np.isfinite(signals[name]).all()
     ]
     what = f": {found[0]}" if found else ""
-    return f"{Fault.INPUT_NOT_FINITE.explanation}{what} {_place(scene)}"
+    return f"{Fault.INPUT_NOT_FINITE.explanation}{what} {_location(scene)}"
 
 
 def _component_names(components: np.ndarray, num_joints: int) -> list[str]:
-    """Return what components of the joint state are called, ``q_J_1`` and so on."""
+    """Return the names of components of the joint state, ``q_J_1`` and so on."""
     return [f"{_STATE[i // num_joints]}_{i % num_joints + 1}" for i in components]
 
 
 def _implausible(scene: FaultScene) -> str:
     names = _component_names(np.flatnonzero(scene.suspects), scene.robot.dimension)
-    what = f": {listed(names)}" if names else ""
-    sentence = f"{Fault.MEASUREMENT_IMPLAUSIBLE.explanation}{what} {_place(scene)}"
+    what = f": {enumeration(names)}" if names else ""
+    sentence = f"{Fault.MEASUREMENT_IMPLAUSIBLE.explanation}{what} {_location(scene)}"
     if not len(scene.oscillating):
         return sentence
-    axes = listed(map(str, scene.oscillating + 1))
+    axes = enumeration(map(str, scene.oscillating + 1))
     return (
-        f"the loop oscillates: commands of {axes} swung to and fro, and {sentence}; an unstable "
-        "loop does that with good sensors ('margins' tells whether it is stable), a faulty "
-        "sensor can make it unstable"
+        f"the loop oscillates: commands of {axes} oscillated, and {sentence}; an "
+        "unstable loop does that with good sensors ('margins' shows whether it is stable), a "
+        "faulty sensor can make it unstable"
     )
 
 
@@ -154,7 +154,7 @@ def _joint_limit(scene: FaultScene) -> str:
     i = int(np.argmax(np.where(np.isfinite(beyond), beyond, -np.inf)))
     limit = limits[i, int(q[i] > limits[i].mean())]
     text = coordinate_text(float(limit), revolute=bool(robot.gather("is_revolute")[i]))
-    return f"joint {i + 1} '{robot.names[i]}' is at its limit of {text} {_place(scene)}"
+    return f"joint {i + 1} '{robot.names[i]}' is at its limit of {text} {_location(scene)}"
 
 
 def _joint_speed(scene: FaultScene) -> str:
@@ -166,8 +166,13 @@ def _joint_speed(scene: FaultScene) -> str:
     found, limit = (coordinate_text(float(x[i]), revolute=revolute) for x in (speed, limits))
     q, posture = _posture(scene)
     nearly = posture.rcond < _NEARLY and i in posture.free_joints
-    return f"joint {i + 1} '{robot.names[i]}' moves at {found}/s of {limit}/s {_place(scene)}" + (
-        f"; {describe_singularity(scene.robot, q, posture, 'nearly singular')}" if nearly else ""
+    return (
+        f"joint {i + 1} '{robot.names[i]}' moves at {found}/s of {limit}/s {_location(scene)}"
+        + (
+            f"; {describe_singularity(scene.robot, q, posture, 'nearly singular')}"
+            if nearly
+            else ""
+        )
     )
 
 
@@ -179,64 +184,68 @@ def _at_limit(fault: Fault, scene: FaultScene) -> str:
         share = np.abs(before["law"][scene.law.layout.drive]) / scene.law.limits
     # one that goes from limit to limit may be between them now
     axes = map(str, np.flatnonzero(share >= min(1.0, float(share.max())) * (1.0 - 1e-9)) + 1)
-    return f"{fault.explanation}: {listed(axes)} {_place(scene)}"
+    return f"{fault.explanation}: {enumeration(axes)} {_location(scene)}"
 
 
 def _press_lost(scene: FaultScene) -> str:
     signals = scene.now.signals
     across = indices(scene.law.linearization.manifold.coordinates, Kind.TRANSVERSAL)
-    measured, asked = signals["manifold_force"][across.start], signals["press"].item()
+    measured, desired = signals["manifold_force"][across.start], signals["press"].item()
     return (
-        f"{Fault.PRESS_FORCE_LOST.explanation}: {measured:.3g} N are measured, {asked:.3g} N asked "
-        f"for {_place(scene)}"
+        f"{Fault.PRESS_FORCE_LOST.explanation}: {measured:.3g} N measured, {desired:.3g} N desired "
+        f"{_location(scene)}"
     )
 
 
-def _turned_away(scene: FaultScene) -> str:
-    return f"{Fault.ORIENTATION_ERROR.explanation} {_place(scene)}: {_map_state(scene)}"
+def _orientation_error(scene: FaultScene) -> str:
+    return f"{Fault.ORIENTATION_ERROR.explanation} {_location(scene)}: {_map_state(scene)}"
 
 
 def _projection_failed(scene: FaultScene) -> str:
-    y_t = np.round(scene.now.signals["tool_pose"][:3], 4).tolist()
-    return f"{Fault.PROJECTION_FAILED.explanation} {_place(scene)}: tool at {y_t} m"
+    y_t = (np.round(scene.now.signals["tool_pose"][:3], 4) + 0.0).tolist()
+    return f"{Fault.PROJECTION_FAILED.explanation} {_location(scene)}: tool at {y_t} m"
 
 
 def _outside(scene: FaultScene) -> str:
-    alpha = scene.now.signals["manifold_point"][scene.place.layout.alpha].item()
-    xi = ", ".join(f"{1e3 * x:.1f}" for x in _beside(scene))
+    alpha = scene.now.signals["manifold_point"][scene.manifold.layout.alpha].item()
+    xi = ", ".join(
+        f"{x:.1f}" for x in np.round(1e3 * _transversal_offset(scene), 1) + 0.0
+    )  # no "-0.0"
     return (
-        f"{Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD.explanation} {_place(scene)}: "
+        f"{Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD.explanation} {_location(scene)}: "
         f"xi = [{xi}] mm, alpha = {alpha:.3g}"
     )
 
 
 def _beyond_end(scene: FaultScene) -> str:
-    eta = scene.now.signals["manifold_point"][scene.place.layout.eta].item()
-    first, last = scene.place.coordinates[0].ends
+    eta = scene.now.signals["manifold_point"][scene.manifold.layout.eta].item()
+    first, last = scene.manifold.coordinates[0].ends
     end, beyond = ("start", first - eta) if eta < first else ("end", eta - last)
-    return f"{Fault.BEYOND_END.explanation} {_place(scene)}: {1e3 * beyond:.1f} mm beyond its {end}"
+    return (
+        f"{Fault.BEYOND_END.explanation} {_location(scene)}: {1e3 * beyond:.1f} mm beyond its {end}"
+    )
 
 
 def _singular(scene: FaultScene) -> str:
     q, posture = _posture(scene)
     A = _decoupling_matrix(scene)
-    distance = float(np.linalg.norm(_beside(scene)))
+    distance = float(np.linalg.norm(_transversal_offset(scene)))
     beside = f"; the tool is {1e3 * distance:.0f} mm beside the path" if distance > _BESIDE else ""
     if _is_map_singular(A, posture):
         bend = _bend(scene)
-        return f"{Fault.SINGULAR.explanation} {_place(scene)}: {_map_state(scene)}{beside}{bend}"
-    return describe_singularity(scene.robot, q, posture, f"singular {_place(scene)}") + beside
+        return f"{Fault.SINGULAR.explanation} {_location(scene)}: {_map_state(scene)}{beside}{bend}"
+    return describe_singularity(scene.robot, q, posture, f"singular {_location(scene)}") + beside
 
 
 def _posture(scene: FaultScene) -> tuple[np.ndarray, SingularPosture]:
-    """Return the joint coordinates the law acts on, and how close to singular they are."""
+    """Return the joint coordinates on which the law acts, and their singular posture."""
     n, state = scene.robot.dimension, scene.now.measured_state
     q = state[2 * n : 3 * n] if scene.on_motors else state[:n]
-    place, tool = scene.place, scene.place.tool
+    manifold, tool = scene.manifold, scene.manifold.tool
     posture = singular_posture(
         scene.robot,
         q,
-        oriented=place.is_oriented,
+        oriented=manifold.is_oriented,
         tool_axis=tool.tool_axis,
         yaw_axis=tool.yaw_axis,
     )
@@ -246,18 +255,18 @@ def _posture(scene: FaultScene) -> tuple[np.ndarray, SingularPosture]:
 def describe_singularity(
     robot: RobotModel, q: np.ndarray, posture: SingularPosture, how: str
 ) -> str:
-    """Return which part of a robot is singular, through which joints, and which can move.
+    """Return which part of a robot is singular, its causing joints, and its free joints.
 
     Args:
         robot: The robot.
         q: Joint coordinates, shape (N,).
-        posture: How close to singular they are.
-        how: How and where, after the part's name.
+        posture: Distance to the singularity.
+        how: Text after the name of the part: degree and location.
     """
     name = None
     if isinstance(robot, SerialChain):
         name = singularity_name(robot, q, posture)
-    free = listed(f"q_{i + 1}" for i in posture.free_joints)
+    free = enumeration(f"q_{i + 1}" for i in posture.free_joints)
     return (
         f"{name or 'robot'} {how}: {posture_text(robot, q, posture.causing_joints)} "
         f"({free} can move without the tool)"
@@ -265,23 +274,23 @@ def describe_singularity(
 
 
 def _bend(scene: FaultScene) -> str:
-    """Return that the path bends too sharply for the tool's distance from it, if it does."""
-    if not isinstance(scene.place, PathManifold):
+    """Return a text if the path bends too sharply for the tool's distance from it."""
+    if not isinstance(scene.manifold, PathManifold):
         return ""
-    point, layout = scene.now.signals["manifold_point"], scene.place.layout
+    point, layout = scene.now.signals["manifold_point"], scene.manifold.layout
     _, slope, second = point[layout.position][:9].reshape(3, 3)
     turning = float(np.linalg.norm(np.cross(slope, second)))
     radius = float(np.linalg.norm(slope)) ** 3 / turning if turning > 0.0 else np.inf
-    if radius > np.linalg.norm(_beside(scene)):
+    if radius > np.linalg.norm(_transversal_offset(scene)):
         return ""
     return (
-        f"; the path bends with a radius of {1e3 * radius:.3g} mm there, less than the tool is "
-        "beside it: look at the waypoints"
+        f"; the path bends with a radius of {1e3 * radius:.3g} mm there, less than the "
+        "distance of the tool: check the waypoints"
     )
 
 
 def _decoupling_matrix(scene: FaultScene) -> np.ndarray:
-    """Return ``A = d yhat / dq``; what drives and reference do has no part in it."""
+    """Return ``A = d yhat / dq``, independent of drives and reference."""
     linearization, now = scene.law.linearization, scene.now
     arguments = {
         "state": now.measured_state,
@@ -295,7 +304,7 @@ def _decoupling_matrix(scene: FaultScene) -> np.ndarray:
 
 
 def _is_map_singular(A: np.ndarray, posture: SingularPosture) -> bool:
-    """Return whether the manifold's coordinates are to blame rather than the arm's posture.
+    """Return whether the manifold's coordinates are singular rather than the arm's posture.
 
     ``A = T J`` with the map T from the tool's velocity to the coordinates' rates; the condition
     number of A is at most the product of the others.
@@ -323,24 +332,24 @@ def _map_state(scene: FaultScene) -> str:
         words.append(
             f"the tool's {euler} angles are {np.rad2deg(margin):.3g} deg from their singularity"
         )
-    alpha = signals["manifold_point"][scene.place.layout.alpha].item()
+    alpha = signals["manifold_point"][scene.manifold.layout.alpha].item()
     return ", ".join([*words, f"alpha = {alpha:.3g}"])
 
 
-def _beside(scene: FaultScene) -> np.ndarray:
+def _transversal_offset(scene: FaultScene) -> np.ndarray:
     """Return the transversal coordinates of the tool [m]."""
-    point, layout = scene.now.signals["manifold_point"], scene.place.layout
+    point, layout = scene.now.signals["manifold_point"], scene.manifold.layout
     offset = scene.now.signals["tool_pose"][:3] - point[layout.position][:3]
-    across = indices(scene.place.coordinates, Kind.TRANSVERSAL)
-    return scene.place.axes(point).full()[:, across].T @ offset
+    across = indices(scene.manifold.coordinates, Kind.TRANSVERSAL)
+    return scene.manifold.axes(point).full()[:, across].T @ offset
 
 
-def _place(scene: FaultScene) -> str:
-    """Return ``at eta = 0.43 m, t = 0.93 s``, with the last eta that is known."""
-    layout, known = scene.place.layout, None
+def _location(scene: FaultScene) -> str:
+    """Return ``at eta = 0.43 m, t = 0.93 s``, with the last known eta."""
+    layout, known = scene.manifold.layout, None
     for instant in (scene.before, scene.now):
         if instant is not None:
             eta = instant.signals["manifold_point"][layout.eta]
             known = eta if np.isfinite(eta).all() else known
-    where = "" if known is None else f"eta = {', '.join(f'{x:.4g}' for x in known)} m, "
+    where = "" if known is None else f"{eta_text(known)}, "
     return f"at {where}t = {scene.now.time:.3f} s"

@@ -1,4 +1,4 @@
-"""The reference of a tool that is led by hand, within virtual fixtures (Sec. 5.1.1, 5.2.4)."""
+"""Reference of a hand-guided tool within virtual fixtures (Sec. 5.1.1, 5.2.4)."""
 
 import casadi as ca
 import numpy as np
@@ -7,12 +7,16 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pfsc_drake.blocks.wiring_blocks import Linear
 from pfsc_drake.control.compliance.impedance_parameters import Profile
 from pfsc_drake.control.compliance.tuned_impedance import REQUESTS, requests_of
+from pfsc_drake.control.fixtures.command_dynamics import (
+    CommandDynamics,
+    FilterDynamics,
+    ServoDynamics,
+)
 from pfsc_drake.control.fixtures.contact_program import MOST_NEAR
-from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
+from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, GuidedTool
 from pfsc_drake.control.fixtures.fixture_parameters import Admittance
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.guides import GuidePaths
-from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.near_regions import ScheduledRegions, near_rows, reaches
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.manifolds.coordinate import Kind
@@ -27,14 +31,14 @@ from pfsc_drake.systems.near_regions_system import NearRegions
 
 
 def free_motion(compliance: ComplianceParameters, period: float) -> Admittance:
-    """Return the motion of a tool that is led through space.
+    """Return the admittance of a hand-guided tool in space.
 
     Args:
-        compliance: How the tool yields.
+        compliance: Compliance of the tool.
         period: Sampling time [s].
 
     Raises:
-        InputError: If a hand could not move it.
+        InputError: If an operator could not move the tool.
     """
     along = compliance.tangential
     mass, damping, stiffness = along.mass, along.damping, along.stiffness
@@ -43,26 +47,26 @@ def free_motion(compliance: ComplianceParameters, period: float) -> Admittance:
     if not (free and constant and isinstance(damping, Profile) and damping.value > 0.0):
         raise InputError(
             "compliance.tangential: controller.manifold = space needs a constant mass, a constant "
-            "positive damping, and stiffness: {value: 0}, so that a hand can lead the tool"
+            "positive damping, and stiffness: {value: 0}, so that an operator can guide the tool"
         )
     return Admittance(mass.value, damping.value, period)
 
 
-def make_lead(
+def make_command_dynamics(
     relative_degree: int, options: FixtureOptions, period: float, *, lag: float, delay: float
-) -> Lead:
-    """Return what is between the velocity that is asked for and the tool.
+) -> CommandDynamics:
+    """Return the dynamics between the commanded velocity and the tool.
 
     Args:
         relative_degree: r of the law.
-        options: What is chosen.
+        options: Options of the fixtures.
         period: Sampling time [s].
         lag: Lag of velocity servos [s], for r = 1.
-        delay: Delay of commands on their way to them [s].
+        delay: Delay of their commands [s].
     """
     if relative_degree > 1:
-        return FilterLead(relative_degree, options.smoothing, period)
-    return ServoLead(lag, delay, period)
+        return FilterDynamics(relative_degree, options.smoothing, period)
+    return ServoDynamics(lag, delay, period)
 
 
 def add_fixture_guidance(
@@ -74,16 +78,16 @@ def add_fixture_guidance(
     ports: dict[str, OutputPort],
     start: np.ndarray,
 ) -> BlockSystem:
-    """Add what leads the tool.
+    """Add the hand guiding of a tool.
 
     Args:
         builder: Builder of the diagram.
         task: Task of the tool.
-        compliance: Where the forces that lead it come from.
-        robot: The robot as it is believed.
+        compliance: Source of the forces that guide it.
+        robot: Nominal model of the robot.
         order: Highest derivative of the reference that is needed.
-        ports: ``joint_state`` as measured, and those of :func:`force_ports`; where a person can
-            change them, ``regions_on`` and ``impedance_request``, see :class:`ImpedanceTuner`.
+        ports: ``joint_state`` as measured, and those of :func:`force_ports`; with changes by
+            an operator also ``regions_on`` and ``impedance_request``, see :class:`ImpedanceTuner`.
         start: Joint coordinates at the start, shape (N,).
 
     Raises:
@@ -95,7 +99,9 @@ def add_fixture_guidance(
     if guidance.tool.near is None:
         regions = NearRegions(scheduled_regions(task), count, period)
         near = builder.AddNamedSystem("near_regions", regions)
-        builder.Connect(system.GetOutputPort("place"), near.GetInputPort("place"))
+        builder.Connect(
+            system.GetOutputPort("evaluation_point"), near.GetInputPort("evaluation_point")
+        )
         builder.Connect(near.GetOutputPort("near"), system.GetInputPort("near"))
         if "regions_on" in ports:
             of_regions = np.eye(count, guidance.tool.num_switches)
@@ -110,8 +116,8 @@ def add_fixture_guidance(
         builder.Connect(ports["regions_on"], system.GetInputPort("active"))
     if "impedance_request" in ports:
         picked = np.zeros((1, REQUESTS))
-        _, place = requests_of(Kind.TANGENTIAL)
-        picked[0, place] = 1.0
+        _, index = requests_of(Kind.TANGENTIAL)
+        picked[0, index] = 1.0
         damping = builder.AddNamedSystem("free_damping", BlockSystem(Linear(picked), period))
         builder.Connect(ports["impedance_request"], damping.GetInputPort("vector"))
         builder.Connect(damping.GetOutputPort("product"), system.GetInputPort("damping"))
@@ -121,11 +127,11 @@ def add_fixture_guidance(
 def make_guidance(
     task: SpaceTask, robot: RobotModel, order: int, start: np.ndarray
 ) -> FixtureGuidance:
-    """Return the rules that lead a tool.
+    """Return the rules of hand guiding.
 
     Args:
         task: Task of the tool.
-        robot: The robot as it is believed.
+        robot: Nominal model of the robot.
         order: Highest derivative of the reference that is needed.
         start: Joint coordinates at the start, shape (N,).
 
@@ -133,14 +139,14 @@ def make_guidance(
         InputError: If the rules do not suit the law.
     """
     parameters = task.options.guidance
-    tool = LedTool(
+    tool = GuidedTool(
         tool_motion_function(robot),
-        task.lead,
+        task.command_dynamics,
         task.admittance,
         len(task.fixtures),
         near_expression(task),
         order,
-        len(task.place.coordinates),
+        len(task.projected_manifold.coordinates),
         GuidePaths([*task.guides.values()], task.admittance.period) if task.guides else None,
     )
     stiffness = [fixture.stiffness for fixture in task.fixtures]
@@ -148,25 +154,25 @@ def make_guidance(
 
 
 def _robot_limits(task: SpaceTask, robot: RobotModel, start: np.ndarray) -> RobotLimits | None:
-    """Return what of the robot limits the hand, if anything is to."""
-    options, place = task.options, task.place
+    """Return the robot's limits for hand guiding, if they are switched on."""
+    options, manifold = task.options, task.projected_manifold
     if not options.limits.on:
         return None
     return RobotLimits(
         robot,
         options.limits,
         start,
-        oriented=place.is_oriented,
-        tool_axis=place.tool.tool_axis,
-        yaw_axis=place.tool.yaw_axis,
+        oriented=manifold.is_oriented,
+        tool_axis=manifold.tool.tool_axis,
+        yaw_axis=manifold.tool.yaw_axis,
         fastest=options.guidance.largest_speed + max(task.speeds, default=0.0),
     )
 
 
 def near_expression(task: SpaceTask) -> ca.Function | None:
-    """Return what is near as an expression; None where that takes a schedule of distances.
+    """Return near regions as an expression; None if their distances need a schedule.
 
-    Many regions do, those whose distances are bounded in number, and what has no formula.
+    Many regions need one, a limited number of distance evaluations, and regions without formula.
 
     Args:
         task: Task of the tool.
@@ -193,5 +199,5 @@ def scheduled_regions(task: SpaceTask) -> ScheduledRegions:
         options.guidance,
         task.admittance.period,
         speeds=task.speeds,
-        looks=options.looks or None,
+        budget=options.looks or None,
     )

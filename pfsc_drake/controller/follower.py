@@ -1,4 +1,4 @@
-"""A controller for a plant of the user's: the ports of a robot, and the plant's order of joints."""
+"""Controller for a plant of the user: ports of a robot, in the plant's order of joints."""
 
 import copy
 import dataclasses as dc
@@ -14,10 +14,10 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE
 from pfsc_drake.control.streams.messages import WaypointLayout
-from pfsc_drake.controller.believed import Believed
 from pfsc_drake.controller.controller import Controller
 from pfsc_drake.controller.fault_description import FaultInstant
-from pfsc_drake.controller.moving_start import placed
+from pfsc_drake.controller.moving_start import target_in_world
+from pfsc_drake.controller.nominal_robot import NominalRobot
 from pfsc_drake.controller.options.compliance_parameters import ComplianceParameters
 from pfsc_drake.controller.options.controller_parameters import (
     ControllerParameters,
@@ -54,8 +54,8 @@ class Follower(Controller):
         plant: The robot, finalized: its nominal model.
         tool: Name of the frame whose origin follows the manifold.
         law: Name of the law.
-        make: ``(robot, posture, r) -> Task``: task of a law of relative degree r, and of a robot
-            from which posture on.
+        make: ``(robot, posture, r) -> Task``: creates the task for a robot, its initial posture and
+            a law of relative degree r.
         options: Options.
 
     Attributes:
@@ -86,13 +86,13 @@ class Follower(Controller):
         task = make(robot, near, RELATIVE_DEGREE[law])
         refuse_unused(options, law, robot, task)
         if isinstance(task, StreamTask):
-            only = "no override and no stream: waypoints themselves come"
+            only = "no override and no stream: waypoints are received"
             require(not (options.override or options.stream), "options", "both given", only)
         start = task.start(np.zeros(3))
         target = start.target
         if options.frame is not None:
             frame = _frame_of(options.frame, options.compliance)
-            options, target = dc.replace(options, frame=frame), placed(target, frame)
+            options, target = dc.replace(options, frame=frame), target_in_world(target, frame)
         if options.reference is not None:
             assert task.motion is not None  # as refuse_unused requires
             limits = limits_of(task.motion, options.reference)
@@ -100,7 +100,7 @@ class Follower(Controller):
         chosen = _with_gains(options.controller, law, options.bandwidth)
         super().__init__(
             task,
-            Believed(robot, options.friction),
+            NominalRobot(robot, options.friction),
             dc.replace(options, controller=chosen),
             start,
             solve_pose(robot, target, near, "start"),
@@ -117,7 +117,7 @@ class Follower(Controller):
 
     @property
     def start_state(self) -> np.ndarray:
-        """State ``[q, v]`` of the plant at rest at the start; elastic joints carry the weight."""
+        """State ``[q, v]`` of the plant at rest at the start, elastic joints under the weight."""
         return state_at_rest(self._chain, self._coordinates, self.start_posture)
 
     @property
@@ -125,7 +125,7 @@ class Follower(Controller):
         """Layout of messages with waypoints.
 
         Raises:
-            InputError: If the path does not come as waypoints.
+            InputError: If the path is not streamed.
         """
         if not isinstance(self.task, StreamTask):
             raise InputError("messages: this path is known beforehand; see add_path_streaming")
@@ -136,8 +136,8 @@ class Follower(Controller):
 
         Args:
             fault: Value of the port ``fault``.
-            context: Own context at the sample at which the fault is new; with it the sentence names
-                joints, values and the position on the manifold, unless that moves.
+            context: Context at the first sample of the fault; with it the sentence names joints,
+                values and the position on the manifold, unless the manifold moves.
 
         Raises:
             InputError: If there is no such fault.
@@ -166,9 +166,9 @@ class Follower(Controller):
             return None
         return self._coordinates.actuation_rows(plant.num_actuators())
 
-    def _measured(self) -> OutputPort:
+    def _add_measurement(self) -> OutputPort:
         if self.options.measures == "joint_state":
-            return super()._measured()
+            return super()._add_measurement()
         measured = self._assembly.add("joint_state", Linear(self._coordinates.rows))
         self._assembly.inputs["plant_state"] = [measured.GetInputPort("vector")]
         return measured.GetOutputPort("product")
@@ -187,7 +187,7 @@ class Follower(Controller):
 
 
 def _near(robot: RobotModel, posture: np.ndarray | None) -> np.ndarray:
-    """Return from where the posture at the start is looked for, shape (N,)."""
+    """Return the initial guess of the posture at the start, shape (N,)."""
     if posture is None:
         return middle_posture(robot)
     if np.shape(posture) != (robot.dimension,):
@@ -206,12 +206,12 @@ def _frame_of(frame: np.ndarray, compliance: ComplianceParameters) -> np.ndarray
         )
     check_rotation_matrix(pose[3:].reshape(3, 3), "frame")
     if compliance.is_given:
-        raise InputError("frame: given; must be None where the tool yields to forces")
+        raise InputError("frame: given; must be None if the tool complies with forces")
     return pose
 
 
 def _with_gains(options: ControllerParameters, law: str, bandwidth: float) -> ControllerParameters:
-    """Return options for a law, with gains of a bandwidth where there are none."""
+    """Return options for a law, with gains by a bandwidth where gains are missing."""
     chosen = copy.deepcopy(options)
     chosen.law = law
     gains = chosen.gains.setdefault(law, LawGains())

@@ -1,4 +1,4 @@
-"""What the joints of a robot do that its task leaves free."""
+"""Null-space motion of redundant joints: posture and its reference."""
 
 from collections.abc import Callable
 
@@ -6,9 +6,9 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.compliance.posture_impedance import (
+    CompliantPosture,
     NullSpaceImpedance,
     NullSpaceImpedanceParameters,
-    YieldingPosture,
 )
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
@@ -27,9 +27,9 @@ from pfsc_drake.systems.following_controller import FollowingController
 from pfsc_drake.yaml.fields import spread
 
 _KEY = "controller.posture"
-# of the largest speed of a joint, what a posture may make of it together with the outputs
+# share of the largest speed of a joint for the posture and the outputs together
 _SPEED_SHARE = 0.8
-# what it leaves to the ends of joints [rad or m]
+# margin to the ends of joints [rad or m]
 _END_MARGIN = 0.02
 
 
@@ -39,13 +39,13 @@ def make_posture(
     gains: Stabilization | None,
     rest: Callable[[], RestPosture] | None,
 ) -> Posture | None:
-    """Return how joints beyond the number of outputs keep next to their reference.
+    """Return the posture control of redundant joints, if there are any.
 
     Args:
-        parameters: What is chosen.
-        robot: The robot as it is believed.
-        gains: Gains of the joints, if there are more than outputs.
-        rest: Tells where the robot starts at rest; needed to keep an elbow.
+        parameters: Parameters of the posture.
+        robot: Nominal model of the robot.
+        gains: Gains of the joints, if they are redundant.
+        rest: Returns the rest posture at the start; needed for the task ``elbow``.
 
     Raises:
         InputError: If the parameters do not suit the robot.
@@ -65,11 +65,13 @@ def make_posture(
 
 def _weight(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None:
     n = robot.dimension
-    given = spread(parameters.joint_weights, n)
-    if given:
-        if len(given) != n:
-            raise InputError(f"{_KEY}.joint_weights: {len(given)} values; the robot has {n} joints")
-        return np.array(given, dtype=float)
+    values = spread(parameters.joint_weights, n)
+    if values:
+        if len(values) != n:
+            raise InputError(
+                f"{_KEY}.joint_weights = {list(values)}; allowed: {n} values, one per joint"
+            )
+        return np.array(values, dtype=float)
     return {"identity": np.ones(n), "range": range_weight(robot), "inertia": None}[
         parameters.weight
     ]
@@ -79,8 +81,7 @@ def _swivel(parameters: PostureParameters, robot: RobotModel, q: np.ndarray) -> 
     numbers = parameters.elbow_joints
     if not isinstance(robot, SerialChain) or max(numbers) > robot.dimension:
         raise InputError(
-            f"{_KEY}.elbow_joints = {numbers}; the robot has {robot.dimension} joints one after "
-            "the other"
+            f"{_KEY}.elbow_joints = {numbers}; the robot has {robot.dimension} joints in series"
         )
     shoulder, elbow, wrist = (number - 1 for number in numbers)
     joints = (shoulder, elbow, wrist)
@@ -96,15 +97,15 @@ def add_posture_reference(
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
-    """Add the posture reference of a robot with more joints than outputs.
+    """Add the posture reference of a redundant robot.
 
     Args:
         builder: Builder of the diagram.
-        robot: The robot as it is believed.
-        options: What is chosen of the controller.
-        law: The law that follows it.
-        controller: The controller of this law.
-        ports: ``joint_state``, ``manifold_point``, and ``posture_torque`` if it is to yield.
+        robot: Nominal model of the robot.
+        options: Parameters of the controller.
+        law: The law.
+        controller: System of the law.
+        ports: ``joint_state``, ``manifold_point``, and ``posture_torque`` if it complies.
 
     Returns:
         ``posture_reference``, derivatives 0..r by rows, shape ((r + 1) N,), if there is one.
@@ -126,7 +127,7 @@ def add_posture_reference(
         controller.period,
     )
     pulled = (parameters.task, parameters.stiffness) if parameters.is_pulled else ("", 0.0)
-    block = YieldingPosture(
+    block = CompliantPosture(
         robot, manifold, law.posture, impedance, *pulled, _goal(parameters, robot)
     )
     posture = builder.AddNamedSystem("posture_reference", BlockSystem(block, controller.period))
@@ -140,15 +141,16 @@ def add_posture_reference(
 
 
 def _goal(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None:
-    """Return where the posture goes, shape (N,) [rad or m], or None for where it starts."""
-    given, key = spread(parameters.reference_deg, robot.dimension), f"{_KEY}.reference_deg"
-    if not given:
+    """Return the goal of the posture, shape (N,) [rad or m], or None for its start."""
+    values, key = spread(parameters.reference_deg, robot.dimension), f"{_KEY}.reference_deg"
+    if not values:
         return None
-    if len(given) != robot.dimension:
-        raise InputError(f"{key}: {len(given)} values; the robot has {robot.dimension} joints")
-    goal = np.where(robot.gather("is_revolute"), np.deg2rad(given), given)
+    if len(values) != robot.dimension:
+        allowed = f"{robot.dimension} values, one per joint"
+        raise InputError(f"{key} = {list(values)}; allowed: {allowed}")
+    goal = np.where(robot.gather("is_revolute"), np.deg2rad(values), values)
     lower, upper = robot.gather("position_limits").T
-    for value, q, low, high, name in zip(given, goal, lower, upper, robot.names, strict=True):
+    for value, q, low, high, name in zip(values, goal, lower, upper, robot.names, strict=True):
         if not low <= q <= high:
             turns = robot.gather("is_revolute")[robot.names.index(name)]
             ends = np.rad2deg([low, high]) if turns else np.array([low, high])
@@ -160,10 +162,10 @@ def _goal(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None
 
 
 def warn_unused(parameters: ControllerParameters, law: FollowingLaw) -> list[str]:
-    """Return what is said of a posture that a robot cannot choose, one sentence each.
+    """Return warnings of posture parameters without effect, one sentence each.
 
     Args:
-        parameters: What is chosen.
+        parameters: Parameters of the controller.
         law: The law.
     """
     if law.posture is not None or parameters.posture == PostureParameters():

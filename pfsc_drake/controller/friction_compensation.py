@@ -1,4 +1,4 @@
-"""What the law is told about friction."""
+"""Friction compensation: friction model, observer, and torque at rest."""
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -16,7 +16,7 @@ from pfsc_drake.control.estimation.momentum import (
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.rest_hold import RestHold
 from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
-from pfsc_drake.controller.believed import Believed, Coefficients
+from pfsc_drake.controller.nominal_robot import Coefficients, NominalRobot
 from pfsc_drake.controller.options.controller_parameters import ControllerParameters
 from pfsc_drake.controller.options.friction_parameters import FrictionCompensationParameters
 from pfsc_drake.errors import InputError
@@ -25,34 +25,34 @@ from pfsc_drake.systems.following_controller import FollowingController
 
 # rad or m, and s; see RestHold
 _DRIFT, _SHAKING, _WINDOW, _SETTLING = 1e-3, 0.02, 2e-4, 0.03
-# m or rad; up to which error a law with an integral part leaves the rest to friction
+# m or rad; largest error at which a law with an integral part relies on friction
 _LARGEST_ERROR = 2e-3
-# m or rad; by which a workpiece may get away from the tool before the law goes on
+# m or rad; largest motion of a workpiece relative to the tool while the torques are constant
 _LARGEST_CHANGE = 3e-4
-# by which part of itself a coefficient is thought to change from sample to sample
+# relative change of a coefficient from sample to sample
 _COEFFICIENT_DRIFT = 1e-3
 
 
 def rest_hold(
-    law: FollowingLaw, believed: Believed, options: ControllerParameters
+    law: FollowingLaw, nominal: NominalRobot, options: ControllerParameters
 ) -> RestHold | None:
-    """Return what holds the torques of drives that stick, if friction is known and compensated.
+    """Return the constant torque of sticking drives, if friction is known and compensated.
 
-    Where a manifold's point moves with time, nothing tells whether it rests: there the law goes on.
+    With a manifold point that moves with time rest is not detected: the law stays active.
 
     Args:
         law: The law.
-        believed: The robot.
-        options: What is chosen of the controller.
+        nominal: Nominal model of the robot.
+        options: Parameters of the controller.
     """
     friction, linearization = options.friction, law.linearization
-    if friction.source == "none" or not friction.hold_at_rest or believed.friction is None:
+    if friction.source == "none" or not friction.hold_at_rest or nominal.friction is None:
         return None
     if linearization.relative_degree == 1 or linearization.manifold.follows_time:
         return None
     largest = _LARGEST_ERROR if law.stabilization.has_integral_part else np.inf
     return RestHold(
-        np.asarray(believed.friction[0], dtype=float),
+        np.asarray(nominal.friction[0], dtype=float),
         _DRIFT,
         _SHAKING,
         _WINDOW,
@@ -64,22 +64,22 @@ def rest_hold(
 
 def add_friction_compensation(
     builder: DiagramBuilder,
-    believed: Believed,
+    nominal: NominalRobot,
     options: ControllerParameters,
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> tuple[OutputPort | None, dict[str, OutputPort]]:
-    """Let the law overcome friction, if it is to.
+    """Add the compensation of friction, if it is chosen.
 
     Args:
         builder: Builder of the diagram.
-        believed: The robot.
-        options: What is chosen of the controller.
+        nominal: Nominal model of the robot.
+        options: Parameters of the controller.
         controller: The controller.
-        ports: ``joint_state`` as measured, and ``tau_ext`` if the law is told of it.
+        ports: ``joint_state`` as measured, and ``tau_ext`` if the law uses it.
 
     Returns:
-        The friction torque that is compensated, if any is, shape (N,); and for the log
+        The compensated friction torque, shape (N,), if there is one; and for the log
         ``friction_estimate``, torques of shape (N,), or from the Kalman filter of shape (3N,),
         ``[tau_f, f_c, f_v]``, if there is any.
 
@@ -87,7 +87,7 @@ def add_friction_compensation(
         InputError: If the compensation does not suit the robot, or lacks coefficients.
     """
     parameters = options.friction
-    # servos overcome friction themselves, and do not tell their torques; law_warnings says so
+    # servos overcome friction themselves, and do not report their torques; law_warnings warns
     if not parameters.is_given or controller.relative_degree == 1:
         return None, {}
     signals = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
@@ -96,11 +96,11 @@ def add_friction_compensation(
     logged, compensated = {}, None
     if parameters.source == "model":
         compensated = _add_model(
-            builder, parameters, believed.friction, signals, options.sampling_time
+            builder, parameters, nominal.friction, signals, options.sampling_time
         )
         logged = {"friction_estimate": compensated}
     if parameters.source == "observer" or parameters.watched:
-        torque, estimate = _add_observer(builder, believed, options, signals)
+        torque, estimate = _add_observer(builder, nominal, options, signals)
         logged = {"friction_estimate": estimate}
         if parameters.source == "observer":
             compensated = torque
@@ -112,12 +112,12 @@ def add_friction_compensation(
 def _add_model(
     builder: DiagramBuilder,
     parameters: FrictionCompensationParameters,
-    believed: Coefficients | None,
+    coefficients: Coefficients | None,
     ports: dict[str, OutputPort],
     period: float,
 ) -> OutputPort:
-    """Add friction of believed coefficients, and return its torque."""
-    f_c, f_v = _required(believed, "source = model")
+    """Add friction with nominal coefficients, and return its torque."""
+    f_c, f_v = _require_coefficients(coefficients, "source = model")
     velocity = ports.get("velocity", ports["joint_state"])
     friction = FrictionModel(f_c, f_v, parameters.smoothing, velocity.size())
     model = builder.AddNamedSystem("friction_compensation", BlockSystem(friction, period))
@@ -127,16 +127,16 @@ def _add_model(
 
 def _add_observer(
     builder: DiagramBuilder,
-    believed: Believed,
+    nominal: NominalRobot,
     options: ControllerParameters,
     ports: dict[str, OutputPort],
 ) -> tuple[OutputPort, OutputPort]:
-    """Add an observer of friction, and return the torque and all that it tells."""
+    """Add an observer of friction, and return its torque and its whole estimate."""
     parameters, period = options.friction, options.sampling_time
-    momentum = drive_momentum(believed.robot).with_delay(believed.velocity_delay)
+    momentum = drive_momentum(nominal.robot).with_delay(nominal.velocity_delay)
     block: FrictionKalmanFilter | MomentumObserver
     if parameters.observer == "kalman":
-        coefficients = _required(believed.friction, "observer = kalman")
+        coefficients = _require_coefficients(nominal.friction, "observer = kalman")
         block, torque = _kalman(parameters, momentum, coefficients, period), "friction_torque"
     else:
         block, torque = MomentumObserver(momentum, parameters.rate, period), "estimate"
@@ -145,48 +145,48 @@ def _add_observer(
         if name in ports and observer.HasInputPort(name):
             builder.Connect(ports[name], observer.GetInputPort(name))
     if "tau_ext" in ports and momentum.known_weight.any():
-        # laws for rigid joints are told torques without derivatives
+        # laws for rigid joints get torques without derivatives
         builder.Connect(ports["tau_ext"], observer.GetInputPort("known_torque"))
     return observer.GetOutputPort(torque), observer.GetOutputPort("estimate")
 
 
-def _required(believed: Coefficients | None, choice: str) -> Coefficients:
-    """Return coefficients, or say where they can be written."""
-    if believed is None:
+def _require_coefficients(coefficients: Coefficients | None, choice: str) -> Coefficients:
+    """Return coefficients, or raise an error with the place to write them."""
+    if coefficients is None:
         raise InputError(
-            f"controller.friction.{choice}: nothing is believed of friction; write "
+            f"controller.friction.{choice}: no nominal friction; write "
             "controller.friction.believed: {f_c: [..], f_v: [..]} or {file: ..}, in a diagram "
             "FollowerOptions(friction=(f_c, f_v))"
         )
-    return believed
+    return coefficients
 
 
 def _kalman(
     parameters: FrictionCompensationParameters,
     momentum: MomentumModel,
-    believed: Coefficients,
+    coefficients: Coefficients,
     period: float,
 ) -> FrictionKalmanFilter:
     kalman, n = parameters.kalman, momentum.dimension
 
-    def values(key: str, believed: np.ndarray | None = None) -> np.ndarray:
-        given = getattr(kalman, key)
-        if believed is not None and not given:
-            return (_COEFFICIENT_DRIFT * believed) ** 2
-        if len(given) not in (1, n):
+    def values(key: str, nominal: np.ndarray | None = None) -> np.ndarray:
+        noise = getattr(kalman, key)
+        if nominal is not None and not noise:
+            return (_COEFFICIENT_DRIFT * nominal) ** 2
+        if len(noise) not in (1, n):
             raise InputError(
-                f"controller.friction.kalman.{key}: {len(given)} values; allowed: 1 or {n}, the "
+                f"controller.friction.kalman.{key}: {len(noise)} values; allowed: 1 or {n}, the "
                 "robot's joints"
             )
-        return np.broadcast_to(np.array(given, dtype=float), n)
+        return np.broadcast_to(np.array(noise, dtype=float), n)
 
     return FrictionKalmanFilter(
         momentum,
-        kalman.start * np.array(believed),
+        kalman.start * np.array(coefficients),
         FrictionNoise(
             values("momentum_noise"),
-            values("coulomb_noise", believed[0]),
-            values("viscous_noise", believed[1]),
+            values("coulomb_noise", coefficients[0]),
+            values("viscous_noise", coefficients[1]),
             values("measurement_noise"),
             kalman.initial_variance,
         ),

@@ -1,4 +1,4 @@
-"""A tool that is led through space by hand, kept out of regions, in one call."""
+"""Hand guiding of a tool through space, outside of regions, in one call."""
 
 import dataclasses as dc
 import math
@@ -15,7 +15,7 @@ from pfsc_drake.control.fixtures.fixture_parameters import Fixture
 from pfsc_drake.control.fixtures.guides import Guide
 from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.controller.fixtures import free_motion, make_lead
+from pfsc_drake.controller.fixtures import free_motion, make_command_dynamics
 from pfsc_drake.controller.follower import Follower
 from pfsc_drake.controller.options.compliance_parameters import ComplianceParameters
 from pfsc_drake.controller.options.controller_parameters import ExternalTorqueParameters
@@ -27,11 +27,11 @@ from pfsc_drake.geometry.regions.region import Region
 from pfsc_drake.geometry.regions.region_checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
-# 1/s; slower ones let a hand's changes of force push the tool by tenths of a millimetre
+# 1/s; with slower poles changes of the operator's force push the tool by tenths of a millimetre
 _BANDWIDTH = 50.0
 # of the free motion: kg, N s/m
 _MASS, _DAMPING = 3.0, 60.0
-# rad/s, of the hand's force as laws for elastic joints are told of it
+# rad/s, of the operator's force for laws of elastic joints
 _FORCE_BANDWIDTH = 200.0
 
 
@@ -42,18 +42,17 @@ def _light() -> ComplianceParameters:
 
 @dc.dataclass
 class GuidanceOptions(FollowerOptions):
-    """What can be chosen where a hand leads the tool; further attributes: :class:`FollowerOptions`.
+    """Options of hand guiding; further attributes: :class:`FollowerOptions`.
 
     Attributes:
-        compliance: ``tangential``: mass and damping that the hand feels; ``rotational``: how the
-            tool yields to torques about the orientation that it keeps, if it does.
-        fixtures: How it is kept out of regions, and where the robot cannot go on.
-        tells_law: Whether a law that gives torques is told of the hand's force, which would push
-            the tool away from its reference else; where ``controller.external_torque`` says where
-            from, that counts.
+        compliance: ``tangential``: mass and damping for the operator; ``rotational``: compliance of
+            the orientation with torques, if it complies.
+        fixtures: Virtual fixtures, and limits of the robot.
+        tells_law: Whether a law that commands torques compensates the operator's force, which would
+            otherwise push the tool away from its reference; a source in
+            ``controller.external_torque`` has priority.
         servo_lag: ``tau`` [s] of velocity servos, the inverse of their bandwidth.
-        servo_delay: How long commands are on their way to them [s], a multiple of the sampling
-            time.
+        servo_delay: Delay of their commands [s], a multiple of the sampling time.
     """
 
     bandwidth: float = _BANDWIDTH
@@ -76,7 +75,7 @@ def add_guidance(
     oriented: bool = True,
     options: GuidanceOptions | None = None,
 ) -> Follower:
-    """Add a controller that lets a hand lead a tool through space, and not into regions.
+    """Add a controller for hand guiding of a tool through space, outside of regions.
 
     ::
 
@@ -88,18 +87,16 @@ def add_guidance(
 
     Args:
         builder: Builder of the diagram.
-        plant: The robot, finalized, as the controller believes it.
-        tool: Name of the frame whose origin is kept out of the regions.
-        regions: Where the tool point may be, each at rest or moving; hard, or as a
+        plant: The robot, finalized: its nominal model.
+        tool: Name of the frame whose origin stays outside of the regions.
+        regions: Regions for the tool point, each at rest or moving; hard, or as a
             :class:`~pfsc_drake.Fixture` with a stiffness.
-        law: Which law follows, with its gains.
-        guides: Paths that attract the tool, see :class:`~pfsc_drake.Guide`: it follows the one that
-            the hand brings it to, until the hand pulls it away.
-        start: Where the tool is at the start, in the world; where ``options.posture`` has it if
-            omitted.
-        oriented: Whether it keeps the orientation that it has at the start; False for robots of
-            fewer than six joints.
-        options: What else is chosen.
+        law: Name of the law.
+        guides: Paths that attract the tool, see :class:`~pfsc_drake.Guide`: it follows the one
+            to which the operator guides it, until the operator pulls it away.
+        start: Pose of the tool at the start, in the world; by ``options.posture`` if omitted.
+        oriented: Whether its orientation is constant; False for robots of fewer than six joints.
+        options: Further options.
 
     Returns:
         The controller, one diagram with the ports of :class:`Follower`.
@@ -108,7 +105,7 @@ def add_guidance(
         InputError: If robot, regions, law and options do not go together, the start is out of
             reach or in a region.
     """
-    chosen = _told(options or GuidanceOptions(), law)
+    chosen = _with_force(options or GuidanceOptions(), law)
     period = chosen.controller.sampling_time
     motion = free_motion(chosen.compliance, period)
     for key in ("servo_lag", "servo_delay"):
@@ -119,29 +116,29 @@ def add_guidance(
         y_t, R_e = _pose(robot, start, near)
         _check_start(fixtures, y_t)
         quaternion = matrix_to_quaternion(R_e) if oriented else None
-        lead = make_lead(
+        lead = make_command_dynamics(
             relative_degree,
             chosen.fixtures,
             period,
             lag=chosen.servo_lag,
             delay=chosen.servo_delay,
         )
-        place = SpaceManifold(relative_degree, quaternion)
+        manifold = SpaceManifold(relative_degree, quaternion)
         named = {f"guides[{number}]": guide for number, guide in enumerate(guides)}
-        return SpaceTask(place, y_t, fixtures, motion, lead, chosen.fixtures, named)
+        return SpaceTask(manifold, y_t, fixtures, motion, lead, chosen.fixtures, named)
 
     follower = Follower(plant, tool, law, task, chosen)
     builder.AddSystem(follower)
     return follower
 
 
-def _told(options: GuidanceOptions, law: str) -> GuidanceOptions:
-    """Return the options, with what the law is told of the hand's force if it is to be."""
+def _with_force(options: GuidanceOptions, law: str) -> GuidanceOptions:
+    """Return the options, with the operator's force as input of the law if it uses it."""
     degree, controller = RELATIVE_DEGREE.get(law, 1), options.controller
     if degree == 1 or not options.tells_law or controller.external_torque.source != "none":
         return options
     bandwidth = controller.external_torque.bandwidth
-    if degree > 2:  # for rigid joints no derivatives count
+    if degree > 2:  # rigid joints need no derivatives
         bandwidth = bandwidth or _FORCE_BANDWIDTH
     torque = ExternalTorqueParameters("measured", bandwidth)
     return dc.replace(options, controller=dc.replace(controller, external_torque=torque))
@@ -150,7 +147,7 @@ def _told(options: GuidanceOptions, law: str) -> GuidanceOptions:
 def _pose(
     robot: RobotModel, start: RigidTransform | None, posture: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the tool is at the start, position [m] and orientation."""
+    """Return the pose of the tool at the start, position [m] and orientation."""
     if start is not None:
         return start.translation(), start.rotation().matrix()
     pose = pose_function(robot)(posture).full().ravel()
@@ -158,7 +155,7 @@ def _pose(
 
 
 def _check_start(fixtures: Sequence[Fixture], y_t: np.ndarray) -> None:
-    """Refuse regions that are given twice, and a start in a hard one."""
+    """Refuse duplicate regions, and a start in a hard one."""
     names = {f"regions[{number}]": fixture for number, fixture in enumerate(fixtures)}
     refuse_same_regions({name: fixture.region for name, fixture in names.items()}, y_t)
     hard = {name: f.region for name, f in names.items() if f.stiffness == math.inf}

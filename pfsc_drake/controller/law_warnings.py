@@ -7,8 +7,8 @@ import numpy as np
 
 from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.compliance.tuned_impedance import (
-    bearable_inertia_error,
-    bearable_mass_error,
+    tolerable_inertia_error,
+    tolerable_mass_error,
 )
 from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -24,12 +24,11 @@ from pfsc_drake.controller.options.controller_parameters import ControllerParame
 from pfsc_drake.robot.robot_model import RobotModel, joint_resonances
 from pfsc_drake.yaml.fields import spread
 
-# relative, of masses and of stiffnesses, which gains should bear
-_BORNE_ERROR = 0.05
-# m per m/s^2, from which on joints are soft for laws that take them for stiff. Of the arms of
-# docs/studies/joint_stiffness.md, the errors that linear theory tells as 5, 0.36 and 0.08 are 1.1,
-# 0.2 and 0.07 mm at accelerations up to 2 m/s^2; where it tells that the loop is unstable, they
-# are 90 mm
+# relative, of masses and of stiffnesses, which gains should tolerate
+_TOLERATED_ERROR = 0.05
+# m per m/s^2, from which on joints are soft for laws of stiff joints. Of the arms of
+# docs/studies/joint_stiffness.md, the errors of 5, 0.36 and 0.08 mm of linear theory are 1.1, 0.2
+# and 0.07 mm at accelerations up to 2 m/s^2; where the loop is unstable in theory, they are 90 mm
 _LARGEST_SOFTNESS = 1e-3
 
 
@@ -40,21 +39,21 @@ def law_warnings(
     link_state: np.ndarray,
     sampled: Callable[[], SampledRobot],
 ) -> list[str]:
-    """Return what a sampled law will not do well, one sentence each.
+    """Return warnings of the performance of a sampled law, one sentence each.
 
     Args:
         parameters: The controller.
         robot: The robot.
         law: Its law.
         link_state: ``[q_J, v_J]`` at the start, shape (2N,).
-        sampled: Returns the law, if it commands torques, on its robot at rest.
+        sampled: Returns the sampled loop at rest, if the law commands torques.
     """
     causes = [
         *_fast_resonance(parameters, robot, link_state),
         *_fast_damping(parameters, robot),
         *_soft_joints(parameters, robot, law, link_state),
     ]
-    # where the law does not suit the robot, gains are not to blame
+    # if the law does not suit the robot, gains are not the cause
     return causes or _fragile_gains(parameters, law, sampled)
 
 
@@ -78,24 +77,24 @@ def _fast_resonance(
 def _fragile_gains(
     parameters: ControllerParameters, law: FollowingLaw, sampled: Callable[[], SampledRobot]
 ) -> list[str]:
-    """Warn of gains that do not bear a small error of the model, on the loop at rest."""
+    """Warn of gains that do not tolerate a small error of the model, on the loop at rest."""
     if law.linearization.relative_degree == 1:
         return []
     at_rest, gains = sampled(), law.gains
-    advice = "poles: auto with a bandwidth chooses some that do; 'margins' tells more"
+    advice = "poles: auto with a bandwidth chooses gains that do; 'margins' shows more"
     if at_rest.rate(gains, RobotError()) > 0.0:
         return [
             f"the loop of the law '{parameters.law}' with these gains is unstable at the start "
             f"even on a perfect model, sampled at {1e3 * parameters.sampling_time:g} ms: lower "
             "the gains or sample faster"
         ]
-    unborne = at_rest.unborne(gains, _BORNE_ERROR)
-    if unborne is None:
+    error = at_rest.destabilizing_error(gains, _TOLERATED_ERROR)
+    if error is None:
         return []
     return [
-        f"the gains of the law '{parameters.law}' do not bear {100.0 * _BORNE_ERROR:g} %: with "
-        f"{unborne} the loop is unstable at the start, and about "
-        f"{100.0 * at_rest.borne(gains, unborne):.1f} % is borne; {advice}"
+        f"the gains of the law '{parameters.law}' do not tolerate "
+        f"{100.0 * _TOLERATED_ERROR:g} %: with {error} the loop is unstable at the start, and "
+        f"about {100.0 * at_rest.largest_error(gains, error):.1f} % is tolerated; {advice}"
     ]
 
 
@@ -118,7 +117,7 @@ def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[s
 def _soft_joints(
     parameters: ControllerParameters, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
 ) -> list[str]:
-    """Warn of joints that are too soft for a law that takes them for stiff."""
+    """Warn of joints that are too soft for a law of stiff joints."""
     manifold = law.linearization.manifold
     record = parameters.law_record
     if not (record.damps_springs or record.on_motors) or not robot.is_elastic:
@@ -136,7 +135,7 @@ def _soft_joints(
         posture = None if law.posture is None else law.posture.stabilization.proportional
         damping = np.array(spread(parameters.boundary_layer_damping, robot.dimension))
         softness = composite_law_error(joints, damping, _transversal_gains(law), posture)
-        what = "takes the joints for stiff, and lets the tool leave the path"
+        what = "assumes stiff joints, and lets the tool leave the path"
     resonance = joint_resonances(robot, q_J)[0] / (2.0 * np.pi)
     instead = "take the law 'elastic' or 'visco_elastic'"
     if np.isinf(softness):
@@ -153,7 +152,7 @@ def _soft_joints(
 
 
 def _transversal_gains(law: FollowingLaw) -> np.ndarray:
-    """Return the gains of a law, as if tangential and free coordinates had transversal ones."""
+    """Return the gains of a law, with transversal ones for tangential and free coordinates."""
     coordinates = law.linearization.manifold.coordinates
     along, across = (indices(coordinates, k) for k in (Kind.TANGENTIAL, Kind.TRANSVERSAL))
     gains = law.stabilization.proportional.copy()
@@ -164,9 +163,9 @@ def _transversal_gains(law: FollowingLaw) -> np.ndarray:
 
 
 def servo_warnings(bandwidth: float, robot: RobotModel, link_state: np.ndarray) -> list[str]:
-    """Return what is said of servos that are faster than the joints behind them.
+    """Return a warning of servos that are faster than the joints behind them.
 
-    They hold the motors against the links' oscillation, which nothing damps then.
+    They hold the motors against the oscillation of the links, and do not damp it.
 
     Args:
         bandwidth: Bandwidth of the servos [rad/s].
@@ -186,7 +185,7 @@ def servo_warnings(bandwidth: float, robot: RobotModel, link_state: np.ndarray) 
 
 
 def unused_parameters(parameters: ControllerParameters, law: FollowingLaw) -> list[str]:
-    """Return which parameters of a controller its law does not use, one sentence each.
+    """Return warnings of parameters that the law does not use, one sentence each.
 
     Args:
         parameters: The controller.
@@ -207,11 +206,11 @@ def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
 def observed_force_warnings(
     compliance: ComplianceParameters, robot: RobotModel, law: FollowingLaw, rest: RestPosture
 ) -> list[str]:
-    """Return what is said of a compliance that takes what wrong masses do not need for forces.
+    """Return a warning of a compliance that does not tolerate wrong masses of the model.
 
     Args:
-        compliance: How the tool yields.
-        robot: The robot, as it is believed.
+        compliance: Compliance of the tool.
+        robot: Nominal model of the robot.
         law: The law behind the compliance.
         rest: The start, and the manifold's point there.
     """
@@ -220,22 +219,22 @@ def observed_force_warnings(
         return []
     rate, impedance = compliance.observed.rate, compliance.impedance()
     kinds = [impedance.of(coordinate.kind) for coordinate in linearization.manifold.coordinates]
-    bearable = np.array(
+    errors = np.array(
         [
-            bearable_inertia_error(
+            tolerable_inertia_error(
                 least_of(kind.mass), least_of(kind.damping), _most(kind.stiffness), rate
             )
             for kind in kinds
         ]
     )
     inertia = ca.evalf(robot.mass_matrix(ca.SX(rest.q_J))).full()
-    borne = bearable_mass_error(inertia, slope_at_rest(law, rest), bearable)
-    if borne >= _BORNE_ERROR:
+    tolerated = tolerable_mass_error(inertia, slope_at_rest(law, rest), errors)
+    if tolerated >= _TOLERATED_ERROR:
         return []
     return [
-        f"compliance.source = observed bears masses believed {100.0 * borne:.1f} % too high at the "
-        f"start, not {100.0 * _BORNE_ERROR:g} %: larger masses or damping in compliance, or "
-        "a slower compliance.observed.rate"
+        f"compliance.source = observed tolerates nominal masses {100.0 * tolerated:.1f} % too "
+        f"high at the start, not {100.0 * _TOLERATED_ERROR:g} %: larger masses or damping in "
+        "compliance, or a slower compliance.observed.rate"
     ]
 
 
@@ -253,7 +252,7 @@ def slope_at_rest(law: FollowingLaw, rest: RestPosture) -> np.ndarray:
 
 
 def least_of(profile: Profile | SlowEnds) -> float:
-    """Return the least value that a profile has.
+    """Return the least value of a profile.
 
     Args:
         profile: The profile.

@@ -1,4 +1,4 @@
-"""Links' side of elastic joints, found from motors and torques where it is not measured."""
+"""Estimate of the links' side of elastic joints from motors and torques."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ from pfsc_drake.control.estimation.link_errors import (
 )
 from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
 from pfsc_drake.control.estimation.robot_state import LinkState
-from pfsc_drake.controller.believed import Coefficients
+from pfsc_drake.controller.nominal_robot import Coefficients
 from pfsc_drake.controller.options.controller_parameters import ControllerParameters
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_system import BlockSystem
@@ -25,14 +25,14 @@ DEVIATION = "link_deviation"
 
 
 @dataclass(frozen=True)
-class FoundLinks:
-    """What a controller has instead of the links' side of elastic joints.
+class LinkEstimate:
+    """Estimated state of the links of elastic joints.
 
     Attributes:
-        joint_state: ``[q_J, v_J, q_M, v_M]`` as the controller takes it.
-        drive_torque: Port that wants to know what the drives are told, if there is one.
-        signals: For the log: ``found_joint_state``, ``joint_torque`` where that is measured, and
-            standard deviations, see :class:`LinkDeviation`; none where nothing is found.
+        joint_state: ``[q_J, v_J, q_M, v_M]`` for the controller.
+        drive_torque: Input for the commands to the drives, if there is one.
+        signals: For the log: ``found_joint_state``, ``joint_torque`` if it is measured, and
+            standard deviations, see :class:`LinkDeviation`; empty without an estimate.
     """
 
     joint_state: OutputPort
@@ -49,8 +49,8 @@ def add_links(
     friction: Coefficients | None,
     torque: OutputPort | None = None,
     motors: MotorEncoders | None = None,
-) -> FoundLinks:
-    """Add what finds the links' side of elastic joints.
+) -> LinkEstimate:
+    """Add the estimate of the links' side of elastic joints.
 
     Args:
         builder: Builder of the diagram.
@@ -60,11 +60,13 @@ def add_links(
         start: Joint coordinates at the start, at rest, shape (N,).
         friction: Coefficients f_c and f_v of the nominal model, each (N,), if there are any.
         torque: Measured joint torques, shape (N,) [Nm or N]; observed from the motors if omitted.
-        motors: Encoders of the motors, for standard deviations; there are none without.
+        motors: Encoders of the motors, for standard deviations; no deviations if omitted.
     """
-    period, wants, signals = controller.sampling_time, None, dict[str, OutputPort]()
+    period, drive_input, signals = controller.sampling_time, None, dict[str, OutputPort]()
     if torque is None:
-        torque, wants = _add_torque_observer(builder, robot, controller, measured, start, friction)
+        torque, drive_input = _add_torque_observer(
+            builder, robot, controller, measured, start, friction
+        )
     else:
         signals["joint_torque"] = torque
     found = LinkState(robot, controller.state_bandwidth, period)
@@ -73,12 +75,12 @@ def add_links(
     builder.Connect(torque, system.GetInputPort("joint_torque"))
     joint_state = system.GetOutputPort("joint_state")
     if motors is not None:
-        observes = wants is not None
+        observes = drive_input is not None
         block = _deviation(robot.numeric, controller, motors, start, friction, observes=observes)
         deviation = builder.AddNamedSystem(DEVIATION, BlockSystem(block, period))
         builder.Connect(joint_state, deviation.get_input_port())
         signals = {name: deviation.GetOutputPort(name) for name in block.outputs} | signals
-    return FoundLinks(joint_state, wants, signals | {"found_joint_state": joint_state})
+    return LinkEstimate(joint_state, drive_input, signals | {"found_joint_state": joint_state})
 
 
 def _deviation(
@@ -90,7 +92,7 @@ def _deviation(
     *,
     observes: bool,
 ) -> LinkDeviation:
-    """Return what reports how far links may be from where they are found."""
+    """Return the block with standard deviations of the estimate."""
     period, rate = controller.sampling_time, controller.state_bandwidth
     known = robot, controller.state_uncertainty, motors, start, rate, period
     errors = (
@@ -109,7 +111,7 @@ def _add_torque_observer(
     start: np.ndarray,
     friction: Coefficients | None,
 ) -> tuple[OutputPort, InputPort]:
-    """Add what observes springs from their motors; at the start they bear the weight."""
+    """Add the observer of spring torques from the motors; it starts with the weight."""
     period, known = controller.sampling_time, friction or (np.zeros(robot.dimension),) * 2
 
     def add(name: str, block: Block) -> BlockSystem:
@@ -120,10 +122,10 @@ def _add_torque_observer(
         "spring_torque_observer", MomentumObserver(model, controller.state_bandwidth, period)
     )
     weight = gravity_function(robot.numeric)(start).full().ravel()
-    borne = add("weight_at_start", Constant(weight)).GetOutputPort("value")
+    torque_at_start = add("weight_at_start", Constant(weight)).GetOutputPort("value")
     total = add("spring_torque", Sum(2, robot.dimension))
     builder.Connect(measured, observer.GetInputPort("joint_state"))
-    builder.Connect(borne, observer.GetInputPort("known_torque"))
-    builder.Connect(borne, total.GetInputPort("term_0"))
+    builder.Connect(torque_at_start, observer.GetInputPort("known_torque"))
+    builder.Connect(torque_at_start, total.GetInputPort("term_0"))
     builder.Connect(observer.GetOutputPort("estimate"), total.GetInputPort("term_1"))
     return total.GetOutputPort("sum"), observer.GetInputPort("drive_torque")

@@ -1,22 +1,22 @@
-"""A manifold in a frame that moves: where the tool starts, and what the law is told."""
+"""Manifold in a moving frame: start of the tool, and inputs of the law."""
 
 from dataclasses import replace
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from pfsc_drake.control.manifolds.frame_motion import FramedPoint, SeenTool
+from pfsc_drake.control.manifolds.frame_motion import FramedPoint, RelativeTool
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, FramedLayout
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.block_system import BlockSystem
 
 
-def placed(target: ToolTarget, frame: np.ndarray) -> ToolTarget:
-    """Return where in the world a pose in a frame is.
+def target_in_world(target: ToolTarget, frame: np.ndarray) -> ToolTarget:
+    """Return a target in a frame as a target in the world.
 
     Args:
-        target: The pose in the frame.
+        target: Target in the frame.
         frame: ``[p_WC, R_WC by rows]`` [m, 1], shape (12,).
     """
     R_WC = frame[3:].reshape(3, 3)
@@ -26,24 +26,24 @@ def placed(target: ToolTarget, frame: np.ndarray) -> ToolTarget:
 
 
 def resting_point(point: np.ndarray, frame: np.ndarray, order: int) -> np.ndarray:
-    """Return a manifold's point with a frame at rest, laid out by :class:`FramedLayout`.
+    """Return a manifold point with a frame at rest, laid out by :class:`FramedLayout`.
 
     Args:
-        point: The manifold's point in the frame.
+        point: Manifold point in the frame.
         frame: ``[p_WC, R_WC by rows]`` [m, 1], shape (12,).
         order: Relative degree of the law.
     """
     return np.concatenate([point, frame, np.zeros(POSE_SIZE * order)])
 
 
-def add_seen_tool(
+def add_relative_tool(
     builder: DiagramBuilder,
     tool_pose: OutputPort,
     frame_jet: OutputPort,
     order: int,
     period: float,
 ) -> OutputPort:
-    """Add what sees the tool from the frame, and return its pose there, shape (12,).
+    """Add the pose of the tool relative to a frame, and return it, shape (12,).
 
     Args:
         builder: Builder of the diagram.
@@ -52,10 +52,10 @@ def add_seen_tool(
         order: Relative degree of the law.
         period: Sampling time [s].
     """
-    seen = builder.AddNamedSystem("seen_tool", BlockSystem(SeenTool(order), period))
-    builder.Connect(tool_pose, seen.GetInputPort("tool_pose"))
-    builder.Connect(frame_jet, seen.GetInputPort("frame_jet"))
-    return seen.GetOutputPort("seen")
+    relative = builder.AddNamedSystem("seen_tool", BlockSystem(RelativeTool(order), period))
+    builder.Connect(tool_pose, relative.GetInputPort("tool_pose"))
+    builder.Connect(frame_jet, relative.GetInputPort("frame_jet"))
+    return relative.GetOutputPort("relative_pose")
 
 
 def add_framed_point(
@@ -65,12 +65,12 @@ def add_framed_point(
     frame_jet: OutputPort,
     period: float,
 ) -> OutputPort:
-    """Add what puts a manifold's point and its frame together, and return both for the law.
+    """Add a manifold point with the motion of its frame, and return both for the law.
 
     Args:
         builder: Builder of the diagram.
         own: The manifold in its frame.
-        manifold_point: Its point there.
+        manifold_point: Its point in the frame.
         frame_jet: Derivatives of the frame up to the manifold's order.
         period: Sampling time [s].
     """

@@ -34,11 +34,11 @@ def add_path_following(
         builder.Connect(plant.get_state_output_port(), follower.GetInputPort("plant_state"))
         builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
 
-    Nothing is connected: what is measured may come from encoders, and the drives be real ones.
+    No port is connected: the measured state may come from encoders, and the drives may be real.
 
     Args:
         builder: Builder of the diagram.
-        plant: The robot, finalized, as the controller believes it.
+        plant: The robot, finalized: its nominal model.
         tool: Name of the frame whose origin follows the path, with its orientation if the path
             has one.
         path: The path, smooth enough for the law.
@@ -46,8 +46,8 @@ def add_path_following(
             ``elastic``.
         motion: Arc length over time [m], e.g. from :func:`~pfsc_drake.rest_to_rest`; along the
             whole path once if omitted.
-        options: What else is chosen; with ``controller.manifold`` = ``trajectory`` the point that
-            time prescribes is tracked, for comparison (Sec. 3.8.4).
+        options: Further options; with ``controller.manifold`` = ``trajectory`` a trajectory is
+            tracked, for comparison (Sec. 3.8.4).
 
     Returns:
         The controller, one diagram with the ports of :class:`Follower`.
@@ -63,9 +63,9 @@ def add_path_following(
 
     def task(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> PathTask:
         tracks = chosen.controller.manifold == MovingPoint.name
-        made = PathTask(path, along, relative_degree, tracks=tracks)
-        made.warnings += path_warnings(path, made.shape, "path_from_waypoints: ")
-        return made
+        path_task = PathTask(path, along, relative_degree, tracks=tracks)
+        path_task.warnings += path_warnings(path, path_task.shape, "path_from_waypoints: ")
+        return path_task
 
     follower = Follower(plant, tool, law, task, chosen)
     builder.AddSystem(follower)

@@ -1,4 +1,4 @@
-"""Following a path whose way points come while the tool moves, in one call."""
+"""Following of a path through waypoints that are received during the motion, in one call."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,34 +23,34 @@ def add_path_streaming(
     stream: StreamParameters | None = None,
     options: FollowerOptions | None = None,
 ) -> Follower:
-    """Add a controller that lets a tool follow way points that come while it moves.
+    """Add a controller that lets a tool follow waypoints that are received during the motion.
 
     ::
 
         follower = add_path_streaming(builder, plant, "tcp", [0.9, 0.0, 0.8], law="rigid")
         sender = WaypointSender(follower.messages)
         sender.add([0.91, 0.01, 0.8])
-        # at every tick, or whenever there is something new
+        # at every sample, or for every new message
         port.FixValue(context, sender.message)
 
-    Its ports are those of :func:`~pfsc_drake.add_path_following` but for ``override``, and
+    Its ports are the ports of :func:`~pfsc_drake.add_path_following` except ``override``, and
 
-    - waypoints (input): a message of the last way points, see
+    - waypoints (input): a message with the last waypoints, see
       :class:`~pfsc_drake.control.streams.messages.WaypointLayout`;
-    - stream (output): ``[status, taken, way left, largest speed]``, shape (4,), see
+    - stream (output): ``[status, accepted, remaining length, largest speed]``, shape (4,), see
       :class:`~pfsc_drake.control.streams.intake.WaypointIntake`.
 
     Args:
         builder: Builder of the diagram.
-        plant: The robot, finalized, as the controller believes it.
-        tool: Name of the frame whose origin follows the path, with its orientation if way points
+        plant: The robot, finalized: its nominal model.
+        tool: Name of the frame whose origin follows the path, with its orientation if waypoints
             have one.
-        start: Where the tool rests before the first way point: position [m], shape (3,), or with
-            a quaternion (w, x, y, z), shape (7,), where way points have one.
+        start: Pose of the tool at rest before the first waypoint: position [m], shape (3,), or with
+            a quaternion (w, x, y, z), shape (7,), if waypoints have one.
         law: ``velocity_servo``, ``rigid``, ``singular_perturbation``, ``visco_elastic`` or
             ``elastic``.
-        stream: How way points become a path, and how fast it is followed.
-        options: What else is chosen.
+        stream: Parameters of the path through waypoints, and of the motion along it.
+        options: Further options.
 
     Returns:
         The controller, one diagram with the ports of :class:`Follower`.

@@ -1,4 +1,4 @@
-"""The measured force on the tool, from the reading of a sensor that carries the tool."""
+"""Measured force on the tool, from the reading of a sensor behind the tool."""
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class SensedForce(Extension):
 
     def before_law(self, assembly: OpenController) -> None:
         """Add the compensation."""
-        robot, period = assembly.believed.robot, assembly.period
+        robot, period = assembly.nominal.robot, assembly.period
         compensation = assembly.add(
             "tool_compensation",
             ToolCompensation(robot, self._load, self._range, self._parameters, period),
@@ -44,10 +44,10 @@ class SensedForce(Extension):
 
 
 class Payload(Extension):
-    """Compensation of a payload behind a force/torque sensor while a gripper holds it.
+    """Compensation of a grasped payload behind a force/torque sensor.
 
     Ports:
-        held (input): Share that is held, 0 to 1, shape (1,).
+        held (input): Grasped share, 0 to 1, shape (1,).
 
     Args:
         mass: Nominal mass [kg].

@@ -33,17 +33,17 @@ def add_surface_following(
 
     Args:
         builder: Builder of the diagram.
-        plant: The robot, finalized, as the controller believes it.
+        plant: The robot, finalized: its nominal model.
         tool: Name of the frame whose origin follows the surface.
         surface: The surface, smooth enough for the law.
         motion: Two tangential coordinates over time [m], e.g. from
             :func:`~pfsc_drake.straight_lines`.
-        law: Which law follows, with its gains.
-        orientation: ``normal``: the tool's axes are those of the surface, turned by ``offset``;
+        law: Name of the law.
+        orientation: ``normal``: the tool's axes are the axes of the surface, rotated by ``offset``;
             None if its orientation does not matter.
         offset: Rotation from the surface's axes to the tool's, shape (3, 3).
-        start: Parameters theta where the motion begins; the middle of the surface if omitted.
-        options: What else is chosen.
+        start: Parameters theta of the start; the middle of the surface if omitted.
+        options: Further options.
 
     Returns:
         The controller, one diagram with the ports of :class:`Follower`.

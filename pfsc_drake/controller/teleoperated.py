@@ -1,11 +1,15 @@
-"""Teleoperation: the follower's side of a channel to an operator's device."""
+"""Teleoperation: follower's side of a channel to a leader device."""
 
 import numpy as np
 
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Linear, Sum
+from pfsc_drake.control.teleoperation.commanded_point import (
+    CommandedOrientation,
+    CommandedPoint,
+    FixtureReaction,
+)
 from pfsc_drake.control.teleoperation.coupling_parameters import CouplingParameters, PortLimits
-from pfsc_drake.control.teleoperation.led_point import FixtureReaction, LedOrientation, LedPoint
 from pfsc_drake.control.teleoperation.message import MESSAGE
 from pfsc_drake.control.teleoperation.port import TeleoperationPort
 from pfsc_drake.controller.extension import Extension, OpenController
@@ -14,11 +18,11 @@ from pfsc_drake.systems.block_system import BlockSystem
 
 
 class Teleoperated(Extension):
-    """A tool that complies with an operator's device and with what is measured at the tool.
+    """Tool that complies with a leader device and with forces measured at the tool.
 
     Ports:
         message (input): Newest message of the leader's side, shape (15,).
-        message (output): Message to it.
+        message (output): Message to the leader's side.
 
     Args:
         coupling: Coupling of both sides.
@@ -34,7 +38,7 @@ class Teleoperated(Extension):
         self._lag = lag
 
     def before_law(self, assembly: OpenController) -> None:
-        """Add the follower's port, and the force that the tool complies with."""
+        """Add the follower's port, and the force for the compliance of the tool."""
         message = assembly.open("message", MESSAGE)
         port = self._port = assembly.add("follower_port", self._block, message=message)
         force = port.GetOutputPort("force")
@@ -52,20 +56,25 @@ class Teleoperated(Extension):
 
     def after_law(self, assembly: OpenController) -> None:
         """Connect the position of the tool and the force on it with the port."""
-        task, robot, signals = assembly.task, assembly.believed.robot, assembly.signals
+        task, robot, signals = assembly.task, assembly.nominal.robot, assembly.signals
         wrench, joint_state = signals["wrench_measured"], signals["joint_state"]
         if isinstance(task, SpaceTask):
             block: Block = FixtureReaction(len(task.fixtures), self._axes, len(task.guides))
             sources = {"record": signals["guidance"]}
             sources |= {"guides": signals["guides"]} if task.guides else {}
         else:
-            block, sources = LedPoint(robot, self._lag, self._axes), {"joint_state": joint_state}
+            block, sources = (
+                CommandedPoint(robot, self._lag, self._axes),
+                {"joint_state": joint_state},
+            )
         view = assembly.add("follower_view", block, wrench=wrench, **sources)
         for name in ("position", "felt"):
             self._connect(assembly, view, name)
         if self._axes > 3:
             turned = assembly.add(
-                "follower_orientation", LedOrientation(robot, self._lag), joint_state=joint_state
+                "follower_orientation",
+                CommandedOrientation(robot, self._lag),
+                joint_state=joint_state,
             )
             self._connect(assembly, turned, "orientation")
 

@@ -29,9 +29,9 @@ class Rule:
     """A condition under which an option has an effect.
 
     Attributes:
-        key: The option, with all that is below it.
+        key: Option, including all keys below it.
         is_used: Whether it has an effect.
-        reason: Why it has none, for messages.
+        reason: Reason why it has none, for messages.
     """
 
     key: str
@@ -49,12 +49,12 @@ def refuse_unused(options: FollowerOptions, law: str, robot: RobotModel, task: T
         task: Task of the tool.
 
     Raises:
-        InputError: If there is one; the message names it, and what would let it have an effect.
+        InputError: If there is one; the message names it, and its requirement.
     """
     kinds = {coordinate.kind for coordinate in task.manifold.coordinates}
     is_redundant = robot.dimension > len(task.manifold.coordinates)
     used = [kind.value for kind in Kind if kind in kinds] + ["posture"] * is_redundant
-    changed = dict(_changed(options, type(options)()))
+    changed = dict(_changes(options, type(options)()))
     rules = [
         *_law_rules(options, law, task),
         *_state_rules(options, law, robot),
@@ -81,12 +81,12 @@ def refuse_unused(options: FollowerOptions, law: str, robot: RobotModel, task: T
         _refuse_unused_limits(options.reference)
 
 
-def _changed(value: Any, default: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield keys and values of the fields that differ from a default, those within blocks too."""
+def _changes(value: Any, default: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Iterate over keys and values that differ from a default, including nested blocks."""
     if dc.is_dataclass(value) and type(value) is type(default):
         for field in dc.fields(value):
             below = getattr(value, field.name), getattr(default, field.name)
-            yield from _changed(*below, f"{key}.{field.name}" if key else field.name)
+            yield from _changes(*below, f"{key}.{field.name}" if key else field.name)
     elif content(value) != content(default):
         yield key, value
 
@@ -155,7 +155,7 @@ def _posture_rules(options: FollowerOptions, is_redundant: bool) -> list[Rule]:
         Rule(
             "controller.posture.observer_rate",
             posture.yields == "observed",
-            "needs yields observed",
+            "needs yields = observed",
         ),
     ]
 
@@ -165,11 +165,13 @@ def _friction_rules(options: FollowerOptions, law: str) -> list[Rule]:
     observed = friction.source == "observer"
     kalman = observed and friction.observer == "kalman"
     overcome = friction.source != "none"
-    held = overcome and friction.hold_at_rest
-    told = friction.has_coefficients or held or options.obstacles is not None
+    holds = overcome and friction.hold_at_rest
+    uses_friction = friction.has_coefficients or holds or options.obstacles is not None
     return [
         Rule(key, RELATIVE_DEGREE[law] > 1, "needs a law that commands torques"),
-        Rule("friction", told, "needs controller.friction with coefficients, or obstacles"),
+        Rule(
+            "friction", uses_friction, "needs controller.friction with coefficients, or obstacles"
+        ),
         Rule(f"{key}.velocity", friction.has_coefficients, "needs source model or observer kalman"),
         Rule(
             f"{key}.smoothing", friction.has_coefficients, "needs source model or observer kalman"
@@ -264,14 +266,14 @@ def _input_rules(options: FollowerOptions, task: Task) -> list[Rule]:
 
 
 def _refuse_unused_limits(limits: MotionLimits) -> None:
-    """Refuse numbers of a motion that is as it is asked for."""
+    """Refuse limits without effect on a requested motion."""
     fastest = limits.speed == "fastest"
     unused = {"velocity": fastest, "dwell": fastest, "torque_rate": fastest, "acceleration": False}
     for key, is_used in unused.items():
-        given = getattr(limits, key)
-        if not is_used and given != getattr(MotionLimits(), key):
+        value = getattr(limits, key)
+        if not is_used and value != getattr(MotionLimits(), key):
             reason = "the motion has its own" if key == "acceleration" else "needs speed fastest"
-            raise InputError(f"reference.{key} = {given:g}: has no effect; {reason}")
+            raise InputError(f"reference.{key} = {value:g}: has no effect; {reason}")
 
 
 def _fixture_rules(options: FollowerOptions, law: str, task: Task) -> list[Rule]:
@@ -300,29 +302,29 @@ def _leaves_gains(options: FollowerOptions, law: str, used: list[str]) -> bool:
 
 
 def _refuse_unused_gains(options: FollowerOptions, law: str, used: list[str]) -> None:
-    """Refuse gains of other laws alone or of no posture, and numbers beside given poles."""
-    given_for = options.controller.gains
-    if given_for and law not in given_for:
+    """Refuse gains of other laws or of no posture, and numbers beside given poles."""
+    by_law = options.controller.gains
+    if by_law and law not in by_law:
         raise InputError(
-            f"controller.gains: given for {', '.join(given_for)}, have no effect; the law of the "
+            f"controller.gains: given for {', '.join(by_law)}, have no effect; the law of the "
             f"call is {law}"
         )
-    gains, degree = given_for.get(law), RELATIVE_DEGREE[law]
+    gains, degree = by_law.get(law), RELATIVE_DEGREE[law]
     if gains is None:
         return
     for field in dc.fields(gains):
-        given: GainParameters = getattr(gains, field.name)
+        own: GainParameters = getattr(gains, field.name)
         key = f"controller.gains.{law}.{field.name}"
-        if field.name == "posture" and "posture" not in used and given.is_given:
+        if field.name == "posture" and "posture" not in used and own.is_given:
             raise InputError(f"{key}: given, has no effect; allowed: gains of {', '.join(used)}")
-        slow = rule_of_poles(given.bandwidth, 1.0, degree)[:2]
-        if given.bandwidth and given.poles and [*given.poles[:2]] != slow:
+        slow = rule_of_poles(own.bandwidth, 1.0, degree)[:2]
+        if own.bandwidth and own.poles and [*own.poles[:2]] != slow:
             raise InputError(
-                f"{key}.bandwidth = {given.bandwidth:g}: has no effect beside poles; allowed: 0"
+                f"{key}.bandwidth = {own.bandwidth:g}: has no effect beside poles; allowed: 0"
             )
-        chosen = given.bandwidth > 0.0 and degree > 2
-        if given.bears != GainParameters().bears and not chosen:
+        chosen = own.bandwidth > 0.0 and degree > 2
+        if own.bears != GainParameters().bears and not chosen:
             raise InputError(
-                f"{key}.bears = {given.bears:g}: has no effect; needs a bandwidth and a law of "
+                f"{key}.bears = {own.bears:g}: has no effect; needs a bandwidth and a law of "
                 "elastic joints"
             )

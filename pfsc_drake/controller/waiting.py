@@ -1,4 +1,4 @@
-"""Progress that waits for obstacles: the arm's way ahead, how it can be stopped, and the blocks."""
+"""Motion that waits for obstacles: predicted arm motion, stopping, and blocks."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,14 +10,14 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.control.law.waiting_reference import WaitingReference
-from pfsc_drake.control.obstacles.elbow_room import ElbowParameters, ElbowRoom
+from pfsc_drake.control.obstacles.elbow_clearance import ElbowClearance, ElbowParameters
 from pfsc_drake.control.obstacles.obstacle_watch import STEPS, ArmAhead, ObstacleWatch
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
-from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
+from pfsc_drake.control.obstacles.stoppable_scaling import StoppableScaling
 from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
-from pfsc_drake.control.planning.joint_course import CourseStart
+from pfsc_drake.control.planning.joint_trajectory import TrajectoryStart
 from pfsc_drake.control.planning.stopping import stopping_bandwidth
-from pfsc_drake.controller.believed import Coefficients
+from pfsc_drake.controller.nominal_robot import Coefficients
 from pfsc_drake.controller.options.follower_options import FollowerOptions
 from pfsc_drake.controller.options.motion_limits import MotionLimits, limits_of
 from pfsc_drake.controller.planning.drive_limits import DrivePlanner
@@ -28,11 +28,11 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.outline import arm_outline, outline_points
 from pfsc_drake.systems.block_system import BlockSystem
 
-# s, from sample to sample of a course on which stops begin
-_COURSE_STEP = 4e-3
-# of the planned pace, the most that may count as rest
+# s, between samples of a trajectory on which stops begin
+_TRAJECTORY_STEP = 4e-3
+# largest share of the planned speed that counts as rest
 _MOST_REST = 0.2
-# m or rad, from which on a tool starts beside its path
+# m or rad, distance from which on a tool starts beside its path
 _AT_THE_PATH = 5e-3
 
 
@@ -41,13 +41,13 @@ def waiting_motion(
     law: FollowingLaw,
     watch: WatchParameters,
     added: Callable[[np.ndarray], np.ndarray] | None = None,
-) -> tuple[ArmAhead, WaitingPace]:
-    """Return where the arm will be, and how the motion can be stopped.
+) -> tuple[ArmAhead, StoppableScaling]:
+    """Return the predicted motion of the arm, and its stoppable speed scaling.
 
     Args:
-        planner: Finds how the joints move along the motion.
+        planner: Planner of the joint motion.
         law: The law, of an arm that is a serial chain.
-        watch: How it keeps away from obstacles.
+        watch: Parameters of the watch of obstacles.
         added: Derivatives 0..r that are added to those of the reference at times [s], shape
             (samples, r + 1, m), if any are.
 
@@ -58,49 +58,49 @@ def waiting_motion(
     assert isinstance(chain, SerialChain)
     motion, begin = planner.motion, float(planner.motion.domain[0])
     try:
-        step, course = planner.course(_COURSE_STEP, added)
+        step, trajectory = planner.trajectory(_TRAJECTORY_STEP, added)
     except InputError as error:
         raise InputError(f"obstacles: the reference cannot be followed: {error}") from None
-    allowed = planner.allowed(course, watch.reserve)
-    bandwidth = stopping_bandwidth(planner.demand, course, step, allowed, order)
-    known = begin + step * np.arange(len(course))
+    allowed = planner.allowed(trajectory, watch.reserve)
+    bandwidth = stopping_bandwidth(planner.demand, trajectory, step, allowed, order)
+    known = begin + step * np.arange(len(trajectory))
     speed = float(np.abs(motion.derivatives(known, 1)[:, 1]).max())
     resting = min(watch.resting_speed / speed, _MOST_REST)
     coarse = watch.horizon / STEPS
     times = begin + coarse * np.arange(int(np.ceil((known[-1] - begin) / coarse)) + 1)
-    q = np.array([np.interp(times, known, column) for column in course[:, 0].T])
+    q = np.array([np.interp(times, known, column) for column in trajectory[:, 0].T])
     outline = arm_outline(chain, watch.arm_radius)
     points = outline_points(chain, outline).map(len(times))(q).full().T
     return (
         ArmAhead(chain, outline, begin, coarse, points),
-        WaitingPace(order, bandwidth, resting),
+        StoppableScaling(order, bandwidth, resting),
     )
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """Progress that waits for obstacles.
+    """Motion that waits for obstacles.
 
     Attributes:
         shapes: The obstacles.
         watch: Parameters of the watch.
-        ahead: Where the arm will be.
-        pace: How the motion can be stopped.
-        elbow: How the elbow of an arm with joints to spare complies, if it does.
+        ahead: Predicted motion of the arm.
+        scaling: Stoppable speed scaling.
+        elbow: Avoidance by the elbow of a redundant arm, if there is any.
     """
 
     shapes: Sequence[ObstacleShape]
     watch: WatchParameters
     ahead: ArmAhead
-    pace: WaitingPace
+    scaling: StoppableScaling
     elbow: ElbowParameters | None
 
     @property
-    def elbow_room(self) -> ElbowRoom:
-        """Block that lets the elbow avoid obstacles, where it does."""
+    def elbow_clearance(self) -> ElbowClearance:
+        """Block for the avoidance of obstacles by the elbow."""
         assert self.elbow is not None
         ahead, age = self.ahead, self.watch.latency
-        return ElbowRoom(ahead.chain, ahead.outline, self.shapes, self.elbow, age)
+        return ElbowClearance(ahead.chain, ahead.outline, self.shapes, self.elbow, age)
 
 
 def add_waiting(
@@ -110,20 +110,20 @@ def add_waiting(
     period: float,
     joint_state: OutputPort,
 ) -> tuple[BlockSystem, BlockSystem]:
-    """Add a reference that waits, and what watches obstacles for it.
+    """Add a waiting reference, and its watch of obstacles.
 
     Args:
         builder: Builder of the diagram.
         reference: The reference.
-        waiting: How it waits.
+        waiting: Parameters of the waiting motion.
         period: Sampling time [s].
         joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
 
     Returns:
-        The reference and the watch, whose ports ``obstacles`` and ``asked`` are left open.
+        The reference and the watch, whose ports ``obstacles`` and ``requested`` stay open.
     """
     generator = builder.AddNamedSystem("reference_generator", BlockSystem(reference, period))
-    block = ObstacleWatch(waiting.ahead, waiting.shapes, waiting.watch, waiting.pace, period)
+    block = ObstacleWatch(waiting.ahead, waiting.shapes, waiting.watch, waiting.scaling, period)
     watches = builder.AddNamedSystem("obstacle_watch", BlockSystem(block, period))
     builder.Connect(generator.GetOutputPort("clock"), watches.GetInputPort("clock"))
     builder.Connect(joint_state, watches.GetInputPort("joint_state"))
@@ -133,7 +133,7 @@ def add_waiting(
 
 @dataclass(frozen=True)
 class Approach:
-    """Motion of the tool from where it starts to its path.
+    """Motion of the tool from its start to its path.
 
     Attributes:
         q_J: Joint coordinates at the start, shape (N,).
@@ -144,9 +144,9 @@ class Approach:
     duration: float
 
     def reference(
-        self, task: Task, law: FollowingLaw, start: CourseStart
+        self, task: Task, law: FollowingLaw, start: TrajectoryStart
     ) -> Callable[[np.ndarray], np.ndarray] | None:
-        """Return what is added to derivatives 0..r of the reference at times [s], if anything is.
+        """Return the addition to derivatives 0..r of the reference at times [s], if there is one.
 
         Args:
             task: Task of the tool.
@@ -157,17 +157,17 @@ class Approach:
             InputError: If the tool starts beside its path without a transition.
         """
         robot, linearization = law.robot, law.linearization
-        assert task.motion is not None  # else nothing waits
+        assert task.motion is not None  # of a planned task
         y_t = np.array(pose_function(robot)(self.q_J)).ravel()[:3]
         point = task.evaluate(y_t, start.memory)
         output = virtual_output_function(robot, linearization.manifold)
         distance = np.array(output(self.q_J, np.zeros(robot.dimension), point))[:, 0]
-        begun = task.motion.derivatives(task.motion.domain[:1], 0)[0, 0]
-        distance[: len(begun)] -= begun
+        initial = task.motion.derivatives(task.motion.domain[:1], 0)[0, 0]
+        distance[: len(initial)] -= initial
         if self.duration == 0.0:
             far = float(np.abs(distance).max())
             allowed = (
-                f"0.1 to 10 s where the tool starts beside its path (by {far:.3g} m or rad): only "
+                f"0.1 to 10 s if the tool starts beside its path (by {far:.3g} m or rad): only "
                 "a transition waits for obstacles"
             )
             require(far < _AT_THE_PATH, "start.transition", self.duration, allowed)
@@ -185,15 +185,15 @@ def plan_waiting(
     options: FollowerOptions,
     task: Task,
     law: FollowingLaw,
-    start: CourseStart,
+    start: TrajectoryStart,
     friction: Coefficients | None,
     q_J: np.ndarray,
 ) -> Waiting:
-    """Return how progress along a manifold waits for obstacles.
+    """Return the plan of a motion along a manifold that waits for obstacles.
 
     Args:
         options: Options, with obstacles.
-        task: Task of the tool, its motion as the drives can follow it.
+        task: Task of the tool, its motion within the limits of the drives.
         law: Its law.
         start: Start of the robot.
         friction: Coefficients f_c and f_v of the nominal model, each (N,), if there are any.
@@ -210,14 +210,16 @@ def plan_waiting(
     require(waits and not options.swings, "obstacles", "given", allowed)
     assert motion is not None
     if not isinstance(law.robot, SerialChain):
-        raise InputError("obstacles = given: must be null for a robot that is no chain of links")
+        raise InputError("obstacles = given: must be null for a robot that is not a chain of links")
     if obstacles.elbow is not None:
-        allowed = "null for an arm without joints to spare, and one whose posture yields to forces"
+        allowed = (
+            "null for an arm without redundant joints, and one whose posture complies with forces"
+        )
         spare = law.posture is not None and chosen.posture.yields == "none"
         require(spare, "obstacles.elbow", "given", allowed)
     limits = options.reference or limits_of(motion, MotionLimits())
     planned = replace(options, reference=limits)
     planner = DrivePlanner(planned, task, law, start, friction)
     added = Approach(q_J, options.transition).reference(task, law, start)
-    ahead, pace = waiting_motion(planner, law, obstacles.watch, added)
-    return Waiting(obstacles.shapes, obstacles.watch, ahead, pace, obstacles.elbow)
+    ahead, scaling = waiting_motion(planner, law, obstacles.watch, added)
+    return Waiting(obstacles.shapes, obstacles.watch, ahead, scaling, obstacles.elbow)

@@ -1,4 +1,4 @@
-"""What a robot's driver makes of commands: age, mode, rate of torques, low pass."""
+"""Command handling of a robot's driver: age, mode, torque rate, low pass."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,14 +14,14 @@ from pfsc_drake.yaml.rules import Parameters, Range
 
 @dataclass(frozen=True)
 class DriverOptions(Parameters):
-    """How a driver treats commands, as drake-franka-driver does unless it is told otherwise.
+    """Command handling of a driver, by default as in drake-franka-driver.
 
     Attributes:
-        expiry: Age from which a command counts no more [s].
+        expiry: Age from which a command is ignored [s].
         low_pass: Cut-off frequency of commanded torques [Hz]; 0 for none.
-        torque_rate: Largest rate of commanded torques [Nm/s], of strong joints ten times their
+        torque_rate: Largest rate of commanded torques [Nm/s]; for strong joints ten times their
             largest torque per second.
-        damping: Rate with which joints lose their speed while no command counts [1/s].
+        damping: Rate at which joints lose their speed without a valid command [1/s].
     """
 
     expiry: float = 0.1
@@ -37,19 +37,19 @@ class DriverOptions(Parameters):
 
 
 class DriverRules:
-    """A driver's memory: the last command, what of it acts, and whether the driver has ended.
+    """State of a driver: last command, acting command, and end.
 
     Args:
         inertia: Inertias of the N joints [kg m^2], shape (N,).
         effort: Their largest torques [Nm], shape (N,).
-        mode: What the driver is started for.
-        options: How it treats commands.
+        mode: Control mode that the driver is started in.
+        options: Command handling.
         period: Its sampling time [s].
 
     Attributes:
-        acting: What acts on the drives: torques on top of the weight, or velocities, shape (N,).
-        ended: Why it has ended, or None.
-        rejected: How many commands were too old.
+        acting: Acting command: torques on top of gravity compensation, or velocities, shape (N,).
+        ended: Reason of its end, or None.
+        rejected: Number of commands that were too old.
     """
 
     def __init__(
@@ -71,34 +71,34 @@ class DriverRules:
 
     @property
     def robot_mode(self) -> RobotMode:
-        """What the robot does."""
+        """Mode of the robot."""
         return RobotMode.MOVE if self.ended is None else RobotMode.REFLEX
 
     def advance(self, utime: int, command: RobotCommand | None, v: np.ndarray) -> np.ndarray:
-        """Return what acts until the next tick, shape (N,).
+        """Return the acting command until the next tick, shape (N,).
 
         Args:
             utime: The robot's clock [us].
-            command: What has come since the last tick, if anything.
+            command: Command received since the last tick, if any.
             v: Velocities of the joints, shape (N,).
         """
         if command is not None and self.ended is None:
-            self._take(utime, command)
+            self._accept(utime, command)
         torques, last = self.mode is ControlMode.TORQUE, self._last
-        wanted = -self._damping * v if torques else 0.0 * v
+        desired = -self._damping * v if torques else 0.0 * v
         if self.ended is None and last is not None and self._is_fresh(utime, last):
-            wanted = last.values
+            desired = last.values
         if not torques:
-            self.acting = np.array(wanted)
+            self.acting = np.array(desired)
             return self.acting
-        passed = self.acting + self._pass * (wanted - self.acting)
-        self.acting = self.acting + np.clip(passed - self.acting, -self._step, self._step)
+        filtered = self.acting + self._pass * (desired - self.acting)
+        self.acting = self.acting + np.clip(filtered - self.acting, -self._step, self._step)
         return self.acting
 
     def _is_fresh(self, utime: int, command: RobotCommand) -> bool:
         return abs(utime - command.utime) <= 1e6 * self.options.expiry
 
-    def _take(self, utime: int, command: RobotCommand) -> None:
+    def _accept(self, utime: int, command: RobotCommand) -> None:
         if command.mode != self.mode:
             self.ended = f"a command for {command.mode.name}, the driver is in {self.mode.name}"
         elif len(command.values) != len(self.acting):
@@ -113,15 +113,15 @@ class DriverRules:
 
 
 def check_mode(mode: ControlMode, allowed: ControlMode, driver: str) -> None:
-    """Refuse what a driver cannot be commanded by.
+    """Refuse a control mode that a driver does not support.
 
     Args:
-        mode: What the law commands.
-        allowed: What the driver takes.
+        mode: Control mode of the law.
+        allowed: Control modes of the driver.
         driver: Its name, for the message.
 
     Raises:
-        InputError: If it does not.
+        InputError: If it is not supported.
     """
     if mode not in allowed:
         names = ", ".join(str(m.name) for m in ControlMode if m in allowed and m)

@@ -1,4 +1,4 @@
-"""What a controller in C has to know of a robot's messages: their layout, and where they go."""
+"""Byte layout and address of a robot's messages, for a controller in C."""
 
 import ipaddress
 import struct
@@ -17,11 +17,11 @@ from pfsc_drake.drivers.messages import (
 )
 from pfsc_drake.errors import InputError
 
-# LCM's own
+# LCM's defaults
 _ADDRESS, _PORT = "239.255.76.67", 7667
-# every message begins with eight bytes that tell its type; then comes the time
+# every message begins with eight bytes for its type; the time follows
 _TYPE = slice(0, 8)
-_COUNT = 16  # where a status has the number of its joints
+_COUNT = 16  # offset of the number of joints in a status
 
 
 @dataclass(frozen=True)
@@ -29,14 +29,14 @@ class StatusLayout:
     """A status of N joints as bytes.
 
     Attributes:
-        size: How many.
-        fingerprint: The first eight, its type.
-        q: Where its positions begin, as big-endian doubles one after the other.
-        v: Its velocities.
-        torque: Its torques.
-        torque_sign: 1, or -1 where it tells them with the opposite sign.
-        robot_mode: Its robot mode, one byte; None if it tells none.
-        control_mode: What it is commanded by, one byte; None if it tells none.
+        size: Number of bytes.
+        fingerprint: The first eight bytes, its type.
+        q: Offset of the positions, big-endian doubles one after the other.
+        v: Offset of the velocities.
+        torque: Offset of the torques.
+        torque_sign: 1, or -1 if torques have the opposite sign.
+        robot_mode: Offset of the robot mode, one byte; None if there is none.
+        control_mode: Offset of the control mode, one byte; None if there is none.
     """
 
     size: int
@@ -50,7 +50,7 @@ class StatusLayout:
 
     @classmethod
     def of(cls, dialect: Dialect, joints: int) -> "StatusLayout":
-        """Find where a dialect writes what.
+        """Return the layout of a dialect's status.
 
         Args:
             dialect: The dialect.
@@ -68,22 +68,22 @@ class StatusLayout:
             data.index(_doubles(v)),
             data.index(_doubles(sign * torque)),
             sign,
-            _changed(dialect, status, replace(status, robot_mode=RobotMode.MOVE)),
-            _changed(dialect, status, replace(status, control_mode=ControlMode.TORQUE)),
+            _changed_byte(dialect, status, replace(status, robot_mode=RobotMode.MOVE)),
+            _changed_byte(dialect, status, replace(status, control_mode=ControlMode.TORQUE)),
         )
 
 
 def command_layout(dialect: Dialect, mode: ControlMode, joints: int) -> tuple[bytes, int]:
-    """Find where a dialect writes what is commanded.
+    """Return the layout of a dialect's command.
 
     Args:
         dialect: The dialect.
-        mode: What is commanded.
+        mode: Control mode.
         joints: Number N of joints.
 
     Returns:
-        A command, its time and what is commanded being zero; and where that begins, as big-endian
-        doubles one after the other.
+        A command whose time and values are zero; and the offset of the values, big-endian doubles
+            one after the other.
     """
     values = 1.0 + np.arange(joints)
     data = dialect.encode_command(RobotCommand(0, mode, values))
@@ -92,7 +92,7 @@ def command_layout(dialect: Dialect, mode: ControlMode, joints: int) -> tuple[by
 
 
 def wrench_layout() -> tuple[int, bytes]:
-    """Return the size of a force sensor's message, and the bytes that tell its type."""
+    """Return the size of a force sensor's message, and the bytes of its type."""
     data = encode_wrench(0, np.zeros(6))
     return len(data), data[_TYPE]
 
@@ -101,22 +101,22 @@ def _doubles(values: np.ndarray) -> bytes:
     return struct.pack(f">{len(values)}d", *values)
 
 
-def _changed(dialect: Dialect, status: RobotStatus, other: RobotStatus) -> int | None:
-    """Return the one byte in which two statuses differ, None if they do not."""
+def _changed_byte(dialect: Dialect, status: RobotStatus, other: RobotStatus) -> int | None:
+    """Return the index of the only byte in which two statuses differ, None if they are equal."""
     one, two = (np.frombuffer(dialect.encode_status(s), np.uint8) for s in (status, other))
-    places = np.flatnonzero(one != two)
-    assert len(places) <= 1
-    return int(places[0]) if len(places) else None
+    indices = np.flatnonzero(one != two)
+    assert len(indices) <= 1
+    return int(indices[0]) if len(indices) else None
 
 
 @dataclass(frozen=True)
 class UdpmAddress:
-    """Where the messages of a bus are sent.
+    """Multicast address of a message bus.
 
     Attributes:
         address: Multicast address.
         port: Port.
-        ttl: How many routers they may pass; 0 keeps them on this machine.
+        ttl: Number of routers that messages may pass; 0 keeps them on this machine.
     """
 
     address: str
@@ -125,13 +125,13 @@ class UdpmAddress:
 
     @classmethod
     def of(cls, url: str) -> "UdpmAddress":
-        """Read an address as LCM writes it, ``udpm://239.255.76.67:7667?ttl=0``.
+        """Read an address in LCM's form, ``udpm://239.255.76.67:7667?ttl=0``.
 
         Args:
-            url: The address; what is left out of it is as LCM has it.
+            url: The address; omitted parts have LCM's defaults.
 
         Raises:
-            InputError: If it is none.
+            InputError: If it is not such an address.
         """
         try:
             parts = urlsplit(url)

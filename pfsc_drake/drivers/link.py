@@ -1,4 +1,4 @@
-"""Both ends of the link between a robot and its controller."""
+"""Endpoints of the link between a robot and its controller."""
 
 import math
 import struct
@@ -25,29 +25,29 @@ from pfsc_drake.drivers.remote_values import (
     encode_values,
 )
 
-# a queue hands over some of what has come; more rounds are made while there is more
+# a queue hands over some of the received messages; more rounds follow while there are more
 _MOST_ROUNDS = 100
-# commands that are told from those of others, as they come back from the bus
+# recent commands, to recognize them when they come back from the bus
 _RECENT = 1000
-# what decoding something else raises; it is as good as lost
+# errors of decoding other messages, which count as lost
 _UNREADABLE = (ValueError, AttributeError, IndexError, struct.error)
 
 
-class _End:
-    """One end of the link: it keeps the newest message, as it came."""
+class _Endpoint:
+    """An endpoint of the link, which stores the newest message."""
 
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
         self.lcm, self.dialect = lcm, dialect
         self._data: bytes | None = None
 
     def leave(self) -> None:
-        """Leave the bus: what comes from now on is not heard, and costs no time."""
+        """Leave the bus: later messages are not received, and cost no time."""
         del self.lcm
 
     def _listen(self, channel: str) -> None:
-        self.lcm.Subscribe(channel, self._keep)
+        self.lcm.Subscribe(channel, self._store)
 
-    def _keep(self, data: bytes) -> None:
+    def _store(self, data: bytes) -> None:
         self._data = data
 
     def _drain(self) -> None:
@@ -56,8 +56,8 @@ class _End:
                 return
 
 
-class RequestEnd:
-    """The end of whom people and pages ask for something, and who tells them how far it is.
+class RequestEndpoint:
+    """Endpoint that receives requests of operators and pages, and publishes progress.
 
     Args:
         lcm: The bus.
@@ -66,20 +66,20 @@ class RequestEnd:
     def __init__(self, lcm: DrakeLcmInterface) -> None:
         self.lcm = lcm
         self._requests: list[Request] = []
-        lcm.Subscribe(REQUEST_CHANNEL, self._keep_request)
+        lcm.Subscribe(REQUEST_CHANNEL, self._store_request)
 
     def listen(self) -> None:
-        """Hear what has come, without waiting."""
+        """Receive all waiting messages, without blocking."""
         while self.lcm.HandleSubscriptions(0):
             pass
 
     def requests(self) -> list[Request]:
-        """Return what has been asked for since the last time, the oldest first."""
-        asked, self._requests = self._requests, []
-        return asked
+        """Return the requests since the last call, the oldest first."""
+        requests, self._requests = self._requests, []
+        return requests
 
-    def tell(self, utime: int, values: Mapping[str, float]) -> None:
-        """Tell whoever watches how far it is.
+    def publish_progress(self, utime: int, values: Mapping[str, float]) -> None:
+        """Publish the progress.
 
         Args:
             utime: The robot's clock [us].
@@ -87,37 +87,37 @@ class RequestEnd:
         """
         self.lcm.Publish(PROGRESS_CHANNEL, encode_values(utime, values))
 
-    def _keep_request(self, data: bytes) -> None:
+    def _store_request(self, data: bytes) -> None:
         with suppress(*_UNREADABLE):
             self._requests.append(Request.of(decode_values(data)))
 
 
-class ControllerEnd(_End, RequestEnd):
-    """The controller's end: it hears the robot's status and requests, and sends commands.
+class ControllerEndpoint(_Endpoint, RequestEndpoint):
+    """The controller's endpoint: it receives status and requests, and sends commands.
 
     Args:
         lcm: The bus.
         dialect: The robot's messages.
 
     Attributes:
-        wrench: What the force sensor told last, shape (6,) [N, Nm], or None.
-        foreign: Number of commands of other senders that were heard.
+        wrench: Last measurement of the force sensor, shape (6,) [N, Nm], or None.
+        foreign: Number of received commands of other senders.
     """
 
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
-        _End.__init__(self, lcm, dialect)
-        RequestEnd.__init__(self, lcm)
+        _Endpoint.__init__(self, lcm, dialect)
+        RequestEndpoint.__init__(self, lcm)
         self.wrench: np.ndarray | None = None
         self.foreign, self._sent = 0, dict[bytes, None]()
         self._listen(dialect.status_channel)
         lcm.Subscribe(dialect.command_channel, self._compare)
-        lcm.Subscribe(FORCE_TORQUE_CHANNEL, self._keep_wrench)
+        lcm.Subscribe(FORCE_TORQUE_CHANNEL, self._store_wrench)
 
     def receive(self, timeout: float) -> RobotStatus | None:
         """Return the newest status that has not been returned, or None if none comes in time.
 
         Args:
-            timeout: How long to wait [s].
+            timeout: Longest time to wait [s].
         """
         end = time.monotonic() + timeout
         while True:
@@ -144,38 +144,38 @@ class ControllerEnd(_End, RequestEnd):
         self.lcm.Publish(self.dialect.command_channel, data)
 
     def _compare(self, data: bytes) -> None:
-        """Count a command on the bus that is none of those sent from here."""
+        """Count a command on the bus that was not sent from here."""
         self.foreign += bytes(data) not in self._sent
 
-    def _keep_wrench(self, data: bytes) -> None:
+    def _store_wrench(self, data: bytes) -> None:
         with suppress(*_UNREADABLE):
             self.wrench = decode_wrench(data)
 
 
-class WatchingEnd(_End):
-    """The end of who looks on: it hears status and progress, and asks the controller.
+class ObserverEndpoint(_Endpoint):
+    """An observer's endpoint: it receives status and progress, and sends requests.
 
     Args:
         lcm: The bus.
         dialect: The robot's messages.
 
     Attributes:
-        progress: What the controller told last, by name; empty before it has told anything.
-        told: When that was, by ``time.monotonic`` [s].
+        progress: Last progress of the controller, by name; empty before the first.
+        progress_time: Time of its reception, by ``time.monotonic`` [s].
     """
 
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
         super().__init__(lcm, dialect)
         self.progress: dict[str, float] = {}
-        self.told = -math.inf
+        self.progress_time = -math.inf
         self._listen(dialect.status_channel)
-        lcm.Subscribe(PROGRESS_CHANNEL, self._keep_progress)
+        lcm.Subscribe(PROGRESS_CHANNEL, self._store_progress)
 
-    def look(self, timeout: float) -> RobotStatus | None:
-        """Return the newest status after waiting, None if none has come since the last look.
+    def receive(self, timeout: float) -> RobotStatus | None:
+        """Return the newest status after waiting, None if none has come since the last call.
 
         Args:
-            timeout: How long to wait for messages [s].
+            timeout: Time to wait for messages [s].
         """
         self.lcm.HandleSubscriptions(round(1e3 * timeout))
         self._drain()
@@ -184,21 +184,21 @@ class WatchingEnd(_End):
             return None if data is None else self.dialect.decode_status(data)
         return None
 
-    def ask(self, request: Request) -> None:
-        """Ask the controller for something.
+    def send_request(self, request: Request) -> None:
+        """Send a request to the controller.
 
         Args:
-            request: What.
+            request: The request.
         """
         self.lcm.Publish(REQUEST_CHANNEL, encode_values(0, request.values()))
 
-    def _keep_progress(self, data: bytes) -> None:
+    def _store_progress(self, data: bytes) -> None:
         with suppress(*_UNREADABLE):
-            self.progress, self.told = decode_values(data), time.monotonic()
+            self.progress, self.progress_time = decode_values(data), time.monotonic()
 
 
-class RobotEnd(_End):
-    """The robot's end: it tells its status and hears commands.
+class RobotEndpoint(_Endpoint):
+    """The robot's endpoint: it sends status and receives commands.
 
     Args:
         lcm: The bus.
@@ -209,8 +209,8 @@ class RobotEnd(_End):
         super().__init__(lcm, dialect)
         self._listen(dialect.command_channel)
 
-    def tell(self, status: RobotStatus, wrench: np.ndarray | None = None) -> None:
-        """Send a status, and before it what a force sensor measures, if there is one.
+    def send_status(self, status: RobotStatus, wrench: np.ndarray | None = None) -> None:
+        """Send a status, and before it the measurement of a force sensor, if there is one.
 
         Args:
             status: The status.
@@ -220,7 +220,7 @@ class RobotEnd(_End):
             self.lcm.Publish(FORCE_TORQUE_CHANNEL, encode_wrench(status.utime, wrench))
         self.lcm.Publish(self.dialect.status_channel, self.dialect.encode_status(status))
 
-    def hear(self) -> RobotCommand | None:
+    def receive_command(self) -> RobotCommand | None:
         """Return the newest command that has not been returned, None if there is none."""
         self._drain()
         if self._data is None:

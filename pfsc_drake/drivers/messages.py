@@ -1,4 +1,4 @@
-"""The messages of drake-franka-driver and drake-iiwa-driver, in the units and signs used here."""
+"""Messages of drake-franka-driver and drake-iiwa-driver, in the units and signs of this package."""
 
 import enum
 from abc import ABC, abstractmethod
@@ -17,7 +17,7 @@ from pfsc_drake.errors import InputError, suggestion
 
 
 class ControlMode(enum.IntFlag):
-    """What a robot is commanded by, as drake-franka-driver counts."""
+    """Kind of a robot's commands, numbered as in drake-franka-driver."""
 
     NONE = 0
     POSITION = 1
@@ -26,7 +26,7 @@ class ControlMode(enum.IntFlag):
 
 
 class RobotMode(enum.IntEnum):
-    """What a robot does, as libfranka counts; only one that moves takes commands."""
+    """Mode of a robot, numbered as in libfranka; only MOVE accepts commands."""
 
     OTHER = 0
     IDLE = 1
@@ -39,15 +39,15 @@ class RobotMode(enum.IntEnum):
 
 @dataclass(frozen=True)
 class RobotStatus:
-    """What a robot tells at each of its ticks.
+    """Status of a robot at one of its ticks.
 
     Attributes:
-        utime: Its clock [us].
+        utime: Clock of the robot [us].
         q: Measured positions [rad or m], shape (N,).
         v: Measured velocities [rad/s or m/s], shape (N,).
-        torque: Measured torques of the joints, gravity's share in them [Nm or N], shape (N,).
-        robot_mode: What it does.
-        control_mode: What it is commanded by.
+        torque: Measured torques of the joints, including gravity [Nm or N], shape (N,).
+        robot_mode: Mode of the robot.
+        control_mode: Kind of its commands.
     """
 
     utime: int
@@ -60,12 +60,12 @@ class RobotStatus:
 
 @dataclass(frozen=True)
 class RobotCommand:
-    """What a controller tells a robot.
+    """Command of a robot.
 
     Attributes:
-        utime: The ``utime`` of the status that it answers [us]: its age is that of the whole
-            round, whatever the clocks of both say.
-        mode: What ``values`` are.
+        utime: The ``utime`` of the status that it answers [us], so that its age covers the whole
+            round trip, independent of the controller's clock.
+        mode: Kind of ``values``.
         values: Torques on top of the robot's own gravity compensation [Nm or N], velocities
             [rad/s or m/s] or positions [rad or m], shape (N,).
     """
@@ -80,10 +80,10 @@ class Dialect(ABC):
 
     Attributes:
         name: Name of the kind.
-        status_channel: LCM channel on which the robot tells its status.
-        command_channel: LCM channel on which it is commanded.
-        modes: What it can be commanded by.
-        expiry: Age from which its commands count no more [s].
+        status_channel: LCM channel of the robot's status.
+        command_channel: LCM channel of its commands.
+        modes: Supported control modes.
+        expiry: Age from which a command is ignored [s].
     """
 
     name: str
@@ -101,7 +101,7 @@ class Dialect(ABC):
         """Return the status in a message.
 
         Raises:
-            ValueError: If it is none.
+            ValueError: If it is not a status.
         """
 
     @abstractmethod
@@ -113,7 +113,7 @@ class Dialect(ABC):
         """Return the command in a message.
 
         Raises:
-            ValueError: If it is none.
+            ValueError: If it is not a command.
         """
 
 
@@ -161,9 +161,9 @@ class PandaDialect(Dialect):
         message, values = lcmt_panda_command(), command.values.tolist()
         message.utime, message.control_mode_expected = command.utime, int(command.mode)
         for mode, name in _PANDA_FIELDS.items():
-            given = values if mode == command.mode else []
-            setattr(message, f"num_{name}", len(given))
-            setattr(message, name, given)
+            field_values = values if mode == command.mode else []
+            setattr(message, f"num_{name}", len(field_values))
+            setattr(message, name, field_values)
         encoded: bytes = message.encode()
         return encoded
 
@@ -186,8 +186,8 @@ _PANDA_FIELDS = {
 class IiwaDialect(Dialect):
     """drake-iiwa-driver with ``--torque_only``.
 
-    Measured and commanded torques are told with the opposite sign of that used here; torques that
-    are commanded are not.
+    In a status, measured and commanded torques have the opposite sign of the one used here; in a
+    command they do not.
     """
 
     name = "iiwa"
@@ -208,7 +208,7 @@ class IiwaDialect(Dialect):
         return encoded
 
     def decode_status(self, data: bytes) -> RobotStatus:
-        """Return the status in a message; it tells no modes."""
+        """Return the status in a message, which contains no modes."""
         message = lcmt_iiwa_status.decode(data)
         return RobotStatus(
             message.utime,
@@ -218,7 +218,7 @@ class IiwaDialect(Dialect):
         )
 
     def encode_command(self, command: RobotCommand) -> bytes:
-        """Return a command as a message; positions are not looked at."""
+        """Return a command as a message; the driver ignores the positions."""
         message, n = lcmt_iiwa_command(), len(command.values)
         message.utime, message.num_joints, message.num_torques = command.utime, n, n
         message.joint_position = [0.0] * n
@@ -243,7 +243,7 @@ def dialect(name: str) -> Dialect:
         name: Name of the kind, ``panda`` or ``iiwa``.
 
     Raises:
-        InputError: If there is none of that name.
+        InputError: If there is no such kind.
     """
     if name not in _DIALECTS:
         allowed = f"{', '.join(_DIALECTS)}{suggestion(name, _DIALECTS)}"
@@ -252,7 +252,7 @@ def dialect(name: str) -> Dialect:
 
 
 def encode_wrench(utime: int, wrench: np.ndarray) -> bytes:
-    """Return what a force sensor measures as a message.
+    """Return a measurement of a force sensor as a message.
 
     Args:
         utime: Clock of the robot [us].
@@ -266,13 +266,13 @@ def encode_wrench(utime: int, wrench: np.ndarray) -> bytes:
 
 
 def decode_wrench(data: bytes) -> np.ndarray:
-    """Return what a force sensor measures, shape (6,) [N, Nm].
+    """Return the measurement of a force sensor, shape (6,) [N, Nm].
 
     Args:
         data: The message.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If it is not such a message.
     """
     m = lcmt_force_torque.decode(data)
     return np.array([m.fx, m.fy, m.fz, m.tx, m.ty, m.tz])

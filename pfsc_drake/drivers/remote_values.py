@@ -1,4 +1,4 @@
-"""What people and pages tell a controller that drives a robot, and what it tells them."""
+"""Requests of operators and pages to a controller that drives a robot, and its progress."""
 
 import math
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ def decode_values(data: bytes) -> dict[str, float]:
         data: The message.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If it is not such a message.
     """
     message = lcmt_drake_signal.decode(data)
     if not 0 <= message.dim <= _MOST:
@@ -45,16 +45,16 @@ def decode_values(data: bytes) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Request:
-    """What somebody asks a controller for.
+    """A request to a controller.
 
     Attributes:
-        override: Share of its planned pace at which the reference is to move, 0 to 1.5; 0 is a
-            pause; None leaves it as it is.
-        stop: Whether the robot is to be brought to rest, and the run to end.
-        obstacles: Position and velocity of each obstacle, 6K numbers [m, m/s]; none if nothing is
-            told of them. Their names are ``obstacle_1_x``, .., ``obstacle_1_v_z``, ``obstacle_2_x``
-            and so on.
-        age: How old that is when it is sent [s], ``obstacles_age``.
+        override: Speed of the reference as a share of the planned one, 0 to 1.5; 0 is a pause; None
+            to keep the present one.
+        stop: Whether the robot is to stop, and the run to end.
+        obstacles: Position and velocity of each obstacle, 6K numbers [m, m/s]; empty without
+            measured obstacles. Their names are ``obstacle_1_x``, .., ``obstacle_1_v_z``,
+            ``obstacle_2_x`` and so on.
+        age: Age of the obstacles when they are sent [s], ``obstacles_age``.
     """
 
     override: float | None = None
@@ -63,19 +63,19 @@ class Request:
     age: float = 0.0
 
     def values(self) -> dict[str, float]:
-        """Return it as named numbers."""
-        given = {} if self.override is None else {_OVERRIDE: self.override}
+        """Return the request as named numbers."""
+        values = {} if self.override is None else {_OVERRIDE: self.override}
         for k in range(len(self.obstacles) // len(_AXES)):
-            told = self.obstacles[len(_AXES) * k : len(_AXES) * (k + 1)]
-            given |= dict(zip(_names(k), told, strict=True))
-        given |= {_AGE: self.age} if self.obstacles else {}
-        return given | ({_STOP: 1.0} if self.stop else {})
+            numbers = self.obstacles[len(_AXES) * k : len(_AXES) * (k + 1)]
+            values |= dict(zip(_names(k), numbers, strict=True))
+        values |= {_AGE: self.age} if self.obstacles else {}
+        return values | ({_STOP: 1.0} if self.stop else {})
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> "Request":
-        """Return what named numbers ask for; an override that is no number is a pause.
+        """Return the request of named numbers; a NaN or infinite override is a pause.
 
-        Of an obstacle that is told of in part, the rest is no number, and so is an age below zero.
+        Missing numbers of an obstacle are NaN, and an age below zero is infinite.
 
         Args:
             values: The numbers by name.
@@ -93,21 +93,21 @@ class Request:
 
 
 def _names(k: int) -> list[str]:
-    """Return what the numbers of an obstacle are called."""
+    """Return the names of an obstacle's numbers."""
     return [f"obstacle_{k + 1}_{axis}" for axis in _AXES]
 
 
 class Pause:
-    """Pauses, and goes on at the pace before."""
+    """Pauses, and continues with the speed before."""
 
     def __init__(self) -> None:
         self._before = 1.0
 
-    def toggled(self, override: float) -> float:
-        """Return the share of the planned pace that is asked for next.
+    def toggle(self, override: float) -> float:
+        """Return the next speed override, as a share of the planned speed.
 
         Args:
-            override: The share that is asked for so far.
+            override: The present override.
         """
         if override > 0.0:
             self._before = override

@@ -1,4 +1,4 @@
-"""One end of a link between a leader and a follower in two processes, over LCM."""
+"""Endpoint of a link between a leader and a follower in two processes, over LCM."""
 
 import math
 import struct
@@ -13,7 +13,7 @@ from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
 from pfsc_drake.drivers.remote_values import decode_values, encode_values
 
 SIDES = ("leader", "follower")
-# what decoding something else raises; it is as good as lost
+# errors of decoding other messages, which count as lost
 _UNREADABLE = (ValueError, AttributeError, IndexError, KeyError, struct.error)
 _MOST_ROUNDS = 100
 _SESSION = "session"
@@ -22,12 +22,12 @@ _NAMES = [
     for name, part in FIELDS.items()
     for k in range(part.stop - part.start)
 ]
-# sums since the other side began
+# fields that are sums since the other side began
 _SUMS = [*range(*FIELDS["signal"].indices(MESSAGE)), FIELDS["energy"].start]
 
 
 def channel_of(side: str) -> str:
-    """Return the LCM channel on which a side tells.
+    """Return the LCM channel of a side's messages.
 
     Args:
         side: ``leader`` or ``follower``.
@@ -35,23 +35,23 @@ def channel_of(side: str) -> str:
     return f"PFSC_TELEOPERATION_{side.upper()}"
 
 
-class TeleoperationEnd:
-    """Sends a side's messages, and keeps the newest of the other side.
+class TeleoperationEndpoint:
+    """Sends a side's messages, and stores the newest of the other side.
 
-    Whichever side begins first: what the other one had summed up when it was first heard, or when
-    it began anew, counts as nothing, so that nobody jumps to where the other one is. What is
-    older than the last message, no number, or takes energy back, is as good as lost.
+    Either side may begin first: the sums of the other side count from its first message, or from
+    its restart, so that no device jumps to the other's position. A message counts as lost if it is
+    older than the last one, contains NaN or infinity, or reduces the energy.
 
     Args:
         lcm: The bus.
-        side: Whose end it is.
-        patience: How long the other side may be silent until it is lost [s].
-        clock: Tells the time [s].
+        side: Side of this endpoint.
+        patience: Longest silence of the other side before it is lost [s].
+        clock: Clock [s].
 
     Attributes:
         lcm: The bus.
         patience: See above.
-        received: Messages that were believed.
+        received: Number of accepted messages.
     """
 
     def __init__(
@@ -65,20 +65,20 @@ class TeleoperationEnd:
         self.patience, self._clock = patience, clock
         (other,) = set(SIDES) - {side}
         self._queue: list[bytes] = []
-        self._heard, self._base = np.zeros(MESSAGE), np.zeros(MESSAGE)
+        self._newest, self._base = np.zeros(MESSAGE), np.zeros(MESSAGE)
         self._session: float | None = None
         self.received, self._last = 0, 0.0
         self.begin()
         lcm.Subscribe(channel_of(other), self._queue.append)
 
     def begin(self) -> None:
-        """Begin anew: what is told from now on sums up from zero."""
+        """Restart: sums of later messages count from zero."""
         self._own_session = float(time.time_ns() // 1000)
-        self._heard[:], self._session = 0.0, None
+        self._newest[:], self._session = 0.0, None
 
     @property
     def is_lost(self) -> bool:
-        """Whether the other side was there, and has been silent for too long."""
+        """Whether the other side has been silent for too long after its first message."""
         return self.received > 0 and self._clock() - self._last > self.patience
 
     def send(self, message: np.ndarray) -> None:
@@ -91,33 +91,33 @@ class TeleoperationEnd:
         self.lcm.Publish(self._channel, encode_values(int(message[0]), values))
 
     def newest(self) -> np.ndarray:
-        """Return the newest message that has come, shape (8,); zero if none has."""
+        """Return the newest accepted message, shape (8,); zero if there is none."""
         for _ in range(_MOST_ROUNDS):
             if not self.lcm.HandleSubscriptions(0):
                 break
         waiting, self._queue[:] = list(self._queue), []
         for data in waiting:
             with suppress(*_UNREADABLE):
-                self._hear(decode_values(data))
-        return self._heard.copy()
+                self._accept(decode_values(data))
+        return self._newest.copy()
 
-    def _hear(self, values: dict[str, float]) -> None:
+    def _accept(self, values: dict[str, float]) -> None:
         session = values[_SESSION]
-        told = np.array([values[name] for name in _NAMES])
-        if not math.isfinite(session) or not np.isfinite(told).all():
+        message = np.array([values[name] for name in _NAMES])
+        if not math.isfinite(session) or not np.isfinite(message).all():
             return
         if session != self._session:
             if self._session is not None and session < self._session:
                 return
             self._session = session
             self._base[:] = 0.0
-            self._base[_SUMS] = told[_SUMS] - self._heard[_SUMS]
-        elif told[0] <= self._heard[0]:
+            self._base[_SUMS] = message[_SUMS] - self._newest[_SUMS]
+        elif message[0] <= self._newest[0]:
             return
-        told -= self._base
+        message -= self._base
         energy = FIELDS["energy"]
-        if told[energy] < self._heard[energy]:
+        if message[energy] < self._newest[energy]:
             return
-        self._heard[:] = told
+        self._newest[:] = message
         self.received += 1
         self._last = self._clock()

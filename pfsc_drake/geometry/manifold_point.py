@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.foot import Ends, Foot, first_and_bend, largest_eigenvalue
+from pfsc_drake.geometry.closest_point import ClosestPoint, Ends, first_and_bend, largest_eigenvalue
 from pfsc_drake.geometry.nearest_samples import ProjectionStatus
 from pfsc_drake.geometry.surfaces.parametric_surface import partial_count
 
@@ -23,7 +23,7 @@ _MAX_ORDER = 5
 
 @dataclass(frozen=True)
 class PointLayout(ABC):
-    """Where the quantities of a point of one or two parameters lie in a flat array of floats.
+    """Layout of a point of one or two parameters in a flat array of floats.
 
     Fields stand in the order of the tables below. Derivatives are with respect to theta, the index
     of the derivative is the slow one.
@@ -67,11 +67,11 @@ class PointLayout(ABC):
     @property
     @abstractmethod
     def memory(self) -> slice:
-        """Slice of what the next projection begins with."""
+        """Slice of the initial values of the next projection."""
 
     @abstractmethod
     def _lengths(self) -> dict[str, int]:
-        """Lengths of all fields, in their order."""
+        """Return lengths of all fields, in their order."""
 
 
 @dataclass(frozen=True)
@@ -89,18 +89,18 @@ class PathPointLayout(PointLayout):
     | `quaternion` | 4 (order + 1)   | derivatives 0..order of q; empty if not oriented       |
     | `turn`       | order           | derivatives 1..order of psi, rad; empty if not turning |
 
-    Beyond an end of an open path it goes on smoothly to a straight line and a constant
+    Beyond an end of an open path it is continued smoothly to a straight line and a constant
     orientation, see `paths.table`. Beyond that theta is clamped: derivatives of sigma_t from
-    the second, of q from the first and of psi, and alpha, are zero, e_perp is kept, and
+    the second, of q from the first and of psi, and alpha, are zero, e_perp is constant, and
     eta = s(theta) + e_par . (y - sigma_t(theta)).
 
-    psi is the angle about e_par by which a given e_perp turns against one that is transported in
+    psi is the angle about e_par by which a prescribed e_perp turns against one transported in
     parallel: psi' = (e_par x e_perp) . e_perp'.
 
     Args:
         order: Relative degree r of the law that reads it, 1..5.
         oriented: True if the path has an orientation.
-        turning: True if e_perp is given, such as by a surface, rather than transported.
+        turning: True if e_perp is prescribed, such as by a surface, rather than transported.
 
     Raises:
         InputError: order out of range.
@@ -115,7 +115,7 @@ class PathPointLayout(PointLayout):
 
     @property
     def memory(self) -> slice:
-        """Slice of what the next projection begins with, theta*, [1]."""
+        """Slice of the initial value of the next projection, theta*, [1]."""
         return self.theta
 
     def _lengths(self) -> dict[str, int]:
@@ -142,7 +142,7 @@ class SurfacePointLayout(PointLayout):
     alpha is the largest of (d . sigma_uu) / (sigma_u . sigma_u) over all directions u of the
     parameters, d = y_t - sigma_t: the distance over the smallest radius of curvature towards
     the tool, so that H > 0 if and only if alpha < 1.
-    Beyond a border of an open direction the surface goes on, see `surfaces.extended`.
+    Beyond a border of an open direction the surface is extended, see `surfaces.extended`.
 
     Args:
         order: Relative degree r of the law that reads it, 1..5.
@@ -156,7 +156,7 @@ class SurfacePointLayout(PointLayout):
 
     @property
     def memory(self) -> slice:
-        """Slice of what the next projection begins with, theta and eta, [4]."""
+        """Slice of the initial values of the next projection, theta and eta, [4]."""
         return slice(0, self.eta.stop)
 
     def _lengths(self) -> dict[str, int]:
@@ -169,36 +169,36 @@ Layout = TypeVar("Layout", bound=PointLayout)
 
 
 class ManifoldEvaluator(ABC, Generic[Layout]):
-    """Projects a point and evaluates everything a law of one order needs there.
+    """Projection of a point, and all quantities there that a law of one order needs.
 
     There is no memory: the same input gives the same output. Calling the object evaluates
     ``evaluate``.
 
     Args:
-        layout: Where the quantities lie in the manifold's point.
+        layout: Layout of the manifold's point.
         domain: First and last value of each parameter.
-        closed: For each parameter whether it is periodic.
-        *made_of: What decides over it.
+        closed: Whether each parameter is periodic.
+        *sources: All objects that the functions depend on.
 
     Attributes:
-        layout: Where the quantities lie in the manifold's point.
+        layout: Layout of the manifold's point.
     """
 
     def __init__(
-        self, layout: Layout, domain: Sequence[Ends], closed: Sequence[bool], *made_of: object
+        self, layout: Layout, domain: Sequence[Ends], closed: Sequence[bool], *sources: object
     ) -> None:
-        self.layout, self._made_of = layout, made_of
+        self.layout, self._sources = layout, sources
         self._domain, self._closed = domain, closed
 
     def __content__(self) -> object:
-        """Return what decides over it."""
-        return self._made_of
+        """Return all objects that the functions depend on."""
+        return self._sources
 
     @cached_property
     def evaluate(self) -> ca.Function:
         """``(y_t, memory) -> manifold_point``, the manifold next to a point [m], shape (3,).
 
-        Memory is what of the last tick's point `PointLayout.memory` says. All values but
+        Memory is the part `PointLayout.memory` of the last tick's point. All values but
         ``status`` are NaN if either is not finite.
         """
         return self._function("point")
@@ -210,7 +210,7 @@ class ManifoldEvaluator(ABC, Generic[Layout]):
 
     @cached_property
     def find(self) -> ca.Function:
-        """``y_t -> memory``, the nearest place of the whole manifold, on the first lap."""
+        """``y_t -> memory``, the closest point of the whole manifold, in the first period."""
         return self._function("place")
 
     def __call__(self, point: ArrayLike, *memory: ArrayLike) -> np.ndarray:
@@ -228,53 +228,53 @@ class ManifoldEvaluator(ABC, Generic[Layout]):
         return function.results["manifold_point"].copy()
 
     @abstractmethod
-    def _at_foot(self, y: ca.MX, memory: ca.MX) -> ca.MX:
-        """Manifold's point at the foot of a point."""
+    def _at_closest(self, y: ca.MX, memory: ca.MX) -> ca.MX:
+        """Return the manifold's point at the closest point to y."""
 
     @abstractmethod
     def _on(self, memory: ca.MX) -> ca.MX:
-        """Manifold's point at a place on the manifold, with alpha zero and status OK."""
+        """Return the manifold's point at its parameters, with alpha zero and status OK."""
 
     @abstractmethod
     def _nearest(self, y: ca.MX) -> ca.MX:
-        """Memory of the nearest place of all."""
+        """Return the memory of the closest point of the whole manifold."""
 
     @once_per_content()
     def _function(self, what: Literal["point", "at", "place"]) -> ca.Function:
         memory = self.layout.memory
-        y, place = ca.MX.sym("y_t", 3), ca.MX.sym("memory", memory.stop - memory.start)
+        y, last = ca.MX.sym("y_t", 3), ca.MX.sym("memory", memory.stop - memory.start)
         name, result = f"{self.layout.kind}_{what}", ["manifold_point"]
         if what == "point":
-            told = [self._at_foot(y, place)]
-            return ca.Function(name, [y, place], told, ["y_t", "memory"], result)
+            results = [self._at_closest(y, last)]
+            return ca.Function(name, [y, last], results, ["y_t", "memory"], result)
         if what == "at":
-            return ca.Function(name, [place], [self._on(place)], ["memory"], result)
+            return ca.Function(name, [last], [self._on(last)], ["memory"], result)
         return ca.Function(name, [y], [self._nearest(y)], ["y_t"], ["memory"])
 
     @cached_property
     def _bound_evaluate(self) -> BoundFunction:
         return BoundFunction(self.evaluate)
 
-    def _told(self, values: ca.MX, foot: Foot, known: ca.MX) -> ca.MX:
-        """Manifold's point of all values but the status."""
-        beyond = foot.beyond_end
+    def _with_status(self, values: ca.MX, closest_point: ClosestPoint, known: ca.MX) -> ca.MX:
+        """Return the manifold's point from all its values but the status."""
+        beyond = closest_point.beyond_end
         for k, (begin, end) in enumerate(self._domain):
             if not self._closed[k]:
-                outside = ca.logic_or(foot.theta[k] < begin, foot.theta[k] > end)
+                outside = ca.logic_or(closest_point.theta[k] < begin, closest_point.theta[k] > end)
                 beyond = ca.logic_or(beyond, outside)
         status = ca.if_else(
-            ca.logic_and(known, foot.converged),
+            ca.logic_and(known, closest_point.converged),
             ca.if_else(beyond, float(ProjectionStatus.BEYOND_END), float(ProjectionStatus.OK)),
             float(ProjectionStatus.NOT_CONVERGED),
         )
-        # what is not finite has no foot
+        # NaN or infinite inputs have no closest point
         values = ca.if_else(known, values, math.nan)
-        place = self.layout.status.start
-        return ca.vertcat(values[:place], status, values[place:])
+        index = self.layout.status.start
+        return ca.vertcat(values[:index], status, values[index:])
 
 
 def alpha_function(p: int) -> ca.Function:
-    """Return ``(y, terms) -> alpha`` (3.9), (4.13), see `Foot.alpha`.
+    """Return ``(y, terms) -> alpha`` (3.9), (4.13), see `ClosestPoint.alpha`.
 
     Args:
         p: Number of parameters.

@@ -1,4 +1,4 @@
-"""Where the search of the nearest point begins, as expressions, and how it ended."""
+"""Initial guesses of the search for the closest point as expressions, and its status."""
 
 import math
 from enum import IntEnum
@@ -16,7 +16,7 @@ def nearest_samples(
 ) -> list[ca.MX]:
     """Return the parameters of the nearest sample, and of the nearest ones farther away from it.
 
-    If the point is not finite, they are those of any.
+    If the point is not finite, they are the parameters of any sample.
 
     Args:
         y: The point, shape (dimension,).
@@ -42,10 +42,10 @@ def nearest_samples(
 
 
 def _nearer(dimension: int, p: int, apart: np.ndarray) -> ca.Function:
-    """Return ``(state, sample) -> state``, which keeps the nearest sample that may be one.
+    """Return ``(state, sample) -> state``, which stores the nearest admissible sample.
 
-    The state is ``[y, starts that are known, cost, parameters]``, a sample
-    ``[|x|^2, 2 x, parameters]``; costs are squared distances but for ``|y|^2``.
+    The state is ``[y, starts found so far, cost, parameters]``, a sample
+    ``[|x|^2, 2 x, parameters]``; costs are squared distances without ``|y|^2``.
     """
     y, known = ca.SX.sym("y", dimension), [ca.SX.sym(f"start_{k}", p) for k in range(_STARTS)]
     best, parameters = ca.SX.sym("cost"), ca.SX.sym("parameters", p)
@@ -55,30 +55,30 @@ def _nearer(dimension: int, p: int, apart: np.ndarray) -> ca.Function:
         near = [ca.fabs(own[k] - start[k]) < apart[k] for k in range(p)]
         cost = ca.if_else(ca.logic_all(ca.vertcat(*near)), math.inf, cost)
     nearer = cost < best
-    kept = [ca.if_else(nearer, new, old) for new, old in ((cost, best), (own, parameters))]
+    nearest = [ca.if_else(nearer, new, old) for new, old in ((cost, best), (own, parameters))]
     return ca.Function(
         "nearer",
         [ca.vertcat(y, *known, best, parameters), ca.vertcat(square, double, own)],
-        [ca.vertcat(y, *known, *kept)],
+        [ca.vertcat(y, *known, *nearest)],
     )
 
 
 def _over_all(step: ca.Function, state: ca.MX, samples: np.ndarray) -> ca.MX:
-    """Return what a state has become after a step with each sample, [n, size]."""
+    """Return the state after one step with each sample, [n, size]."""
     levels = max(1, math.ceil(math.log(len(samples), _CALLS)))
     calls = math.ceil(round(len(samples) ** (1.0 / levels), 9))
-    # the last one again, which is no nearer then
+    # padded by the last one, which changes nothing
     rows = np.minimum(np.arange(calls**levels), len(samples) - 1)
     columns = samples[rows].T
     for _ in range(levels - 1):
-        step = _repeated(step, calls)
+        step = _repeat(step, calls)
     for part in np.hsplit(columns, calls):
         state = step(state, ca.DM(part))
     return state
 
 
-def _repeated(step: ca.Function, calls: int) -> ca.Function:
-    """Return a function that does some steps."""
+def _repeat(step: ca.Function, calls: int) -> ca.Function:
+    """Return a function that performs several steps."""
     begin = state = ca.MX.sym("state", step.size1_in(0))
     samples = ca.MX.sym("samples", step.size1_in(1), calls * step.size2_in(1))
     for part in ca.horzsplit(samples, step.size2_in(1)):

@@ -1,4 +1,4 @@
-"""Paths on a surface, whose frame holds the surface's normal."""
+"""Paths on a surface, whose frame contains the surface's normal."""
 
 import math
 
@@ -31,8 +31,8 @@ class CurveOnSurface(Curve):
 
     Args:
         surface: The surface sigma_t.
-        parameters: Curve c in the surface's parameters, of dimension 2; in closed directions of
-            the surface it may lead on and on.
+        parameters: Curve c in the surface's parameters, of dimension 2, unwrapped in closed
+            directions of the surface.
 
     Attributes:
         surface: The surface.
@@ -50,35 +50,35 @@ class CurveOnSurface(Curve):
         smoothness = min(surface.smoothness, parameters.smoothness)
         super().__init__(3, breakpoints, closed=parameters.closed, smoothness=smoothness)
         self.surface, self._parameters = surface, parameters
-        surface.checked(parameters.derivatives(np.linspace(*parameters.domain, 257), 0)[:, 0])
+        surface.to_domain(parameters.derivatives(np.linspace(*parameters.domain, 257), 0)[:, 0])
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 0..order with respect to theta, for set-up and figures."""
-        jet = self._composed(theta, check_order(order), [(0, 0)])[0]
+        """Return derivatives 0..order with respect to theta, for set-up and figures."""
+        jet = self._compose(theta, check_order(order), [(0, 0)])[0]
         return np.stack(jet.derivatives(), axis=-2)
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """The surface's normal e_perp (4.3), and e_cross = e_par x e_perp, each [..., 3]."""
+        """Return the surface's normal e_perp (4.3), and e_cross = e_par x e_perp, each [..., 3]."""
         e_par, normal = self._axes(theta, 0)
         return normal.coefficients[0], np.cross(e_par.coefficients[0], normal.coefficients[0])
 
     def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 1..order of psi, whose first is speed times geodesic torsion, [..., order].
+        """Return derivatives 1..order of psi, [..., order].
 
-        ``psi' = (e_par x e_perp) . e_perp'``.
+        ``psi' = (e_par x e_perp) . e_perp'``, speed times geodesic torsion.
         """
         e_par, normal = self._axes(theta, order)
         rate = _dot(jets.cross(e_par, normal), normal.differentiate())
         return np.stack(rate.derivatives(), axis=-2)[..., 0]
 
     def _axes(self, theta: ArrayLike, order: int) -> tuple[Jet, Jet]:
-        """Tangent and normal as jets by theta, coefficients [..., 3]."""
-        position = self._composed(theta, order + 1, [(0, 0)])[0].differentiate()
-        first, second = self._composed(theta, order, [(1, 0), (0, 1)])
+        """Return the tangent and normal as jets by theta, coefficients [..., 3]."""
+        position = self._compose(theta, order + 1, [(0, 0)])[0].differentiate()
+        first, second = self._compose(theta, order, [(1, 0), (0, 1)])
         return _unit(position), _unit(jets.cross(first, second))
 
-    def _composed(self, theta: ArrayLike, order: int, which: list[tuple[int, int]]) -> list[Jet]:
-        """Partial derivatives of the surface along the curve as jets by theta, [..., 3]."""
+    def _compose(self, theta: ArrayLike, order: int, which: list[tuple[int, int]]) -> list[Jet]:
+        """Return partial derivatives of the surface along the curve as jets by theta, [..., 3]."""
         c = self._parameters.derivatives(theta, order)
         pair = [
             Jet.from_derivatives([c[..., k, i, None] for k in range(order + 1)]) for i in (0, 1)
@@ -128,7 +128,7 @@ def path_on_surface(
         surface: Surface of class C^2 or better.
         parameters: Curve in its parameters, of dimension 2.
         orientation: Quaternions over the same parameter, or None.
-        notes: Sentences on what of a file was left out.
+        notes: Sentences on ignored parts of a file.
 
     Raises:
         InputError: The curve leaves the surface, is no curve in its parameters, or not regular.
@@ -138,7 +138,7 @@ def path_on_surface(
 
 
 def _with_seams(surface: Surface, parameters: Curve) -> np.ndarray:
-    """Breakpoints of a curve, with the places where it enters another cell of the surface."""
+    """Return a curve's breakpoints and the parameters where it enters another cell."""
     grid = np.unique(np.linspace(parameters.breakpoints[:-1], parameters.breakpoints[1:], _SAMPLES))
     values = parameters.derivatives(grid, 0)[:, 0]
     seams = [parameters.breakpoints]
@@ -146,11 +146,11 @@ def _with_seams(surface: Surface, parameters: Curve) -> np.ndarray:
         if len(breaks) == 2 and (not closed or surface.smoothness == math.inf):
             continue
         own, period = values[:, k], breaks[-1] - breaks[0]
-        laps = np.arange(
+        revolutions = np.arange(
             math.floor((own.min() - breaks[0]) / period),
             math.ceil((own.max() - breaks[0]) / period),
         )
-        levels = np.unique(breaks + period * laps[:, None]) if closed else breaks[1:-1]
+        levels = np.unique(breaks + period * revolutions[:, None]) if closed else breaks[1:-1]
         for level in levels:
             for i in np.flatnonzero((own[:-1] - level) * (own[1:] - level) < 0.0):
                 seams.append(_crossing(parameters, k, level, (grid[i], grid[i + 1])))
@@ -158,7 +158,7 @@ def _with_seams(surface: Surface, parameters: Curve) -> np.ndarray:
 
 
 def _crossing(parameters: Curve, k: int, level: float, between: tuple[float, float]) -> np.ndarray:
-    """Where a component of a curve has a value, [1]."""
+    """Return the parameter at which a component of a curve has a value, [1]."""
 
     def excess(theta: float) -> float:
         return float(parameters.derivatives(theta, 0)[0, k]) - level
@@ -182,7 +182,7 @@ _KEYFRAMES_PER_SEGMENT = (4, 8, 16, 32, 64)
 def project_waypoints(
     surface: Surface, positions: np.ndarray, farthest: float, *, closed: bool
 ) -> np.ndarray:
-    """Parameters of the places of a surface that are nearest to waypoints.
+    """Return the parameters of the closest points of a surface to waypoints.
 
     In closed directions neighbours are less than half a period apart.
 
@@ -197,31 +197,32 @@ def project_waypoints(
 
     Raises:
         InputError: A waypoint is farther away, beside the patch, or nearly as near to another
-            sheet; or a closed curve leads round a closed direction of the surface.
+            sheet; or a closed curve goes around a closed direction of the surface.
     """
     projector = GlobalProjector(surface)
     thetas = np.empty((len(positions), 2))
     for row, position in enumerate(positions):
         try:
-            foot = projector.project(position)
+            closest_point = projector.project(position)
         except InputError as error:
             raise InputError(f"waypoint {row + 1}: {error}") from None
-        if foot.distance > farthest:
-            beside = ", beside its border" if foot.at_border else ""
+        if closest_point.distance > farthest:
+            beside = ", beside its border" if closest_point.at_border else ""
             raise InputError(
-                f"waypoint {row + 1}: {position.tolist()} m is {1e3 * foot.distance:.3g} mm"
+                f"waypoint {row + 1}: {position.tolist()} m is"
+                f" {1e3 * closest_point.distance:.3g} mm"
                 f" from the surface{beside}; at most {1e3 * farthest:.3g} mm is allowed"
             )
-        thetas[row] = foot.theta
+        thetas[row] = closest_point.theta
     for k, ends in enumerate(surface.domain):
         if not surface.closed[k]:
             continue
         thetas[:, k] = np.unwrap(thetas[:, k], period=ends.length)
         if closed and abs(thetas[-1, k] - thetas[0, k]) > 0.5 * ends.length:
             raise InputError(
-                f"waypoints lead round the surface in theta_{k + 1}, from {thetas[0, k]:.6g} to"
+                f"waypoints go around the surface in theta_{k + 1}, from {thetas[0, k]:.6g} to"
                 f" {thetas[-1, k]:.6g}; a closed curve must come back to the same theta: leave it"
-                " open, with as many laps as are needed"
+                " open, with as many revolutions as are needed"
             )
     return thetas
 
@@ -229,11 +230,11 @@ def project_waypoints(
 def curve_through(
     surface: Surface, thetas: ArrayLike, *, smoothness: int, closed: bool = False
 ) -> Curve:
-    """Spline through waypoints in a surface's parameters, over the length of their polygon.
+    """Return a spline through waypoints in a surface's parameters, over their polygon's length.
 
     Args:
         surface: The surface.
-        thetas: Parameters [n, 2] of the waypoints; in closed directions they may lead on and on.
+        thetas: Parameters [n, 2] of the waypoints, unwrapped in closed directions.
         smoothness: k of the class C^k, 2..6. Few waypoints of an open curve are joined by one
             polynomial, which has all derivatives; two by a straight line in the parameters.
         closed: Whether it leads back to the first, which may be repeated.
@@ -254,7 +255,7 @@ def curve_through(
     polygon, _ = close_polygon(points, closed)
     if closed and len(polygon) <= fewest:
         raise InputError(f"waypoints: {len(polygon) - 1} distinct for a closed curve; at least 3")
-    surface.checked(polygon)
+    surface.to_domain(polygon)
     _, chords = close_polygon(surface.partials(polygon, 0)[:, 0], closed=False)
     degree = smoothness + 1 if closed else min(smoothness + 1, len(polygon) - 1)
     return interpolate_at(accumulate(chords, "chord"), polygon, degree, closed=closed)
@@ -263,10 +264,10 @@ def curve_through(
 def normal_orientation(
     surface: Surface, parameters: Curve, offset: np.ndarray, *, smoothness: int
 ) -> OrientationCurve:
-    """Orientation along a curve that turns with the surface's frame.
+    """Return the orientation along a curve that turns with the surface's frame.
 
-    ``R_d = [t_1, e_perp x t_1, e_perp] offset`` (4.2), (4.3), through as many keyframes as keep
-    within 1e-6 rad of it.
+    ``R_d = [t_1, e_perp x t_1, e_perp] offset`` (4.2), (4.3), interpolated through enough keyframes
+    to be within 1e-6 rad of it.
 
     Args:
         surface: The surface.
@@ -292,9 +293,9 @@ def normal_orientation(
         curve = interpolate_orientation(
             quaternions, theta, smoothness=smoothness, closed=parameters.closed
         )
-        made = quaternion_to_matrix(curve.derivatives(between, 0)[:, 0])
+        interpolated = quaternion_to_matrix(curve.derivatives(between, 0)[:, 0])
         # the angle is the length of the difference of rotation matrices over sqrt(2)
-        off = np.linalg.norm(made - frames(between), axis=(1, 2)).max() / np.sqrt(2.0)
+        off = np.linalg.norm(interpolated - frames(between), axis=(1, 2)).max() / np.sqrt(2.0)
         if off <= _FAITHFUL:
             return curve
     raise InputError(

@@ -1,6 +1,6 @@
-"""How what takes long says how far it is."""
+"""Progress callback of long computations."""
 
 from collections.abc import Callable
 
-# told the fraction done and what is done
+# called with the fraction done and the name of the step
 Progress = Callable[[float, str], None]

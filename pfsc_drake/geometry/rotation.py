@@ -14,7 +14,7 @@ _ORTHONORMAL = 1e-6
 
 
 def zyx_to_matrix(angles: ArrayLike) -> np.ndarray:
-    """R = R_z(angle_1) R_y(angle_2) R_x(angle_3), equation (2.7).
+    """Return R = R_z(angle_1) R_y(angle_2) R_x(angle_3), equation (2.7).
 
     Args:
         angles: [..., 3], rad.
@@ -26,7 +26,7 @@ def zyx_to_matrix(angles: ArrayLike) -> np.ndarray:
 
 
 def zyz_to_matrix(angles: ArrayLike) -> np.ndarray:
-    """R = R_z(angle_1) R_y(angle_2) R_z(angle_3), equation (2.6).
+    """Return R = R_z(angle_1) R_y(angle_2) R_z(angle_3), equation (2.6).
 
     Args:
         angles: [..., 3], rad.
@@ -38,7 +38,7 @@ def zyz_to_matrix(angles: ArrayLike) -> np.ndarray:
 
 
 def matrix_to_zyx(matrix: ArrayLike) -> np.ndarray:
-    """ZYX angles of rotation matrices, inverse of (2.7).
+    """Return the ZYX angles of rotation matrices, inverse of (2.7).
 
     Args:
         matrix: [..., 3, 3].
@@ -60,7 +60,7 @@ def matrix_to_zyx(matrix: ArrayLike) -> np.ndarray:
 
 
 def matrix_to_zyz(matrix: ArrayLike) -> np.ndarray:
-    """ZYZ angles of rotation matrices, inverse of (2.6).
+    """Return the ZYZ angles of rotation matrices, inverse of (2.6).
 
     Args:
         matrix: [..., 3, 3].
@@ -83,7 +83,7 @@ def matrix_to_zyz(matrix: ArrayLike) -> np.ndarray:
 
 
 def euler_margin(matrix: ArrayLike, convention: str) -> np.ndarray:
-    """How far the second Euler angle is from where the other two are not defined.
+    """Return the distance of the second Euler angle from the singularity of the other two.
 
     Args:
         matrix: Rotation matrices, [..., 3, 3].
@@ -98,7 +98,7 @@ def euler_margin(matrix: ArrayLike, convention: str) -> np.ndarray:
 
 
 def rotation_vector_to_quaternion(vector: ArrayLike) -> np.ndarray:
-    """Quaternion (w, x, y, z) of a rotation vector, the axis times the angle.
+    """Return the quaternion (w, x, y, z) of a rotation vector, the axis times the angle.
 
     Args:
         vector: [..., 3], rad.
@@ -112,7 +112,7 @@ def rotation_vector_to_quaternion(vector: ArrayLike) -> np.ndarray:
 
 
 def matrix_to_quaternion(matrix: ArrayLike) -> np.ndarray:
-    """Unit quaternions of rotation matrices.
+    """Return the unit quaternions of rotation matrices.
 
     Args:
         matrix: [..., 3, 3].
@@ -130,7 +130,7 @@ def matrix_to_quaternion(matrix: ArrayLike) -> np.ndarray:
 
 
 def quaternion_to_matrix(quaternion: ArrayLike) -> np.ndarray:
-    """Rotation matrices H(q) / |q|^2 of quaternions of any length but zero.
+    """Return the rotation matrices H(q) / |q|^2 of quaternions of any length but zero.
 
     Args:
         quaternion: (w, x, y, z), [..., 4].
@@ -160,12 +160,12 @@ def quaternion_to_matrix(quaternion: ArrayLike) -> np.ndarray:
 
 
 def zyx_to_quaternion(angles: ArrayLike) -> np.ndarray:
-    """Unit quaternions [..., 4] of ZYX angles [..., 3], rad, see `zyx_to_matrix`."""
+    """Return the unit quaternions [..., 4] of ZYX angles [..., 3], rad, see `zyx_to_matrix`."""
     return matrix_to_quaternion(zyx_to_matrix(angles))
 
 
 def zyz_to_quaternion(angles: ArrayLike) -> np.ndarray:
-    """Unit quaternions [..., 4] of ZYZ angles [..., 3], rad, see `zyz_to_matrix`."""
+    """Return the unit quaternions [..., 4] of ZYZ angles [..., 3], rad, see `zyz_to_matrix`."""
     return matrix_to_quaternion(zyz_to_matrix(angles))
 
 
@@ -174,7 +174,7 @@ EULER_TO_QUATERNION = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Angles between directions, accurate for small ones too.
+    """Return angles between directions, accurate for small ones too.
 
     Args:
         a: Vectors of any length but zero, [..., 3].
@@ -188,10 +188,10 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def turn_about(axis: ArrayLike, rotation: ArrayLike, reference: ArrayLike) -> np.ndarray:
-    """Angle by which rotations are turned about a fixed axis against others.
+    """Return the angle by which rotations are turned about a fixed axis against others.
 
-    Of ``M = R R_0'``, a turn by this angle about the axis follows on one by the shortest way that
-    leaves the axis's angle out (swing and twist).
+    ``M = R R_0'`` is split into a rotation without a part about the axis, then a turn by this
+    angle about it (swing and twist).
 
     Args:
         axis: The axis, in the frame that the rotations lead to, of any length but zero, [3].
@@ -199,7 +199,7 @@ def turn_about(axis: ArrayLike, rotation: ArrayLike, reference: ArrayLike) -> np
         reference: ``R_0``, [..., 3, 3].
 
     Returns:
-        rad, [...], from -pi to pi; of no meaning where the rest of M is half a turn.
+        rad, [...], from -pi to pi; undefined where the rest of M is half a turn.
     """
     _, b, c = rotation_to_axis(axis).T
     M = np.asarray(rotation, dtype=float) @ np.swapaxes(np.asarray(reference, dtype=float), -1, -2)
@@ -208,10 +208,10 @@ def turn_about(axis: ArrayLike, rotation: ArrayLike, reference: ArrayLike) -> np
 
 
 def rotation_to_axis(axis: ArrayLike) -> np.ndarray:
-    """Rotation of least angle that turns the x-axis to a direction.
+    """Return the rotation of least angle that turns the x-axis to a direction.
 
     Of two half turns, about the x-axis and about the middle between it and the direction. To the
-    opposite of the x-axis all ways are as long; that about the z-axis is taken.
+    opposite of the x-axis all such rotations are equal; the one about the z-axis is taken.
 
     Args:
         axis: The direction, of any length but zero, [3].
@@ -225,7 +225,7 @@ def rotation_to_axis(axis: ArrayLike) -> np.ndarray:
     a = np.asarray(axis, dtype=float)
     if a.shape != (3,) or not np.all(np.isfinite(a)) or not np.any(a):
         raise InputError(f"axis: {a.tolist()}; 3 finite numbers, not all zero, are required")
-    a = a / np.abs(a).max()  # squares of huge or tiny numbers are none
+    a = a / np.abs(a).max()  # squares of huge or tiny numbers overflow or vanish
     a = a / np.linalg.norm(a)
     across = a[1] ** 2 + a[2] ** 2
     # 1 + cos(angle), without cancellation where the angle is obtuse
@@ -238,11 +238,11 @@ def rotation_to_axis(axis: ArrayLike) -> np.ndarray:
 
 
 def check_rotation_matrix(matrix: ArrayLike, name: str = "rotation matrix") -> np.ndarray:
-    """Rotation matrices as an array, if they are orthonormal with determinant +1.
+    """Return the rotation matrices as an array, if they are orthonormal with determinant +1.
 
     Args:
         matrix: [..., 3, 3].
-        name: What the error message calls them.
+        name: Name in error messages.
 
     Returns:
         The same values, [..., 3, 3].
@@ -281,7 +281,7 @@ def placed_points(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Return points of a frame C that moves in the world [m], shape (samples, 3).
 
     Args:
-        points: In the frame [m], shape (samples, 3).
+        points: Points in the frame [m], shape (samples, 3).
         frames: ``[p_WC, R_WC by rows, ..]``, shape (samples, 12 or more).
     """
     R_WC = frames[:, 3:12].reshape(-1, 3, 3)

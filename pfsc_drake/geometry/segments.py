@@ -1,10 +1,10 @@
-"""Distances between points, lines of finite length and what they sweep, as expressions."""
+"""Distances between points, line segments and the areas they sweep, as expressions."""
 
 from typing import Any
 
 import casadi as ca
 
-# m^2, below which a segment is a point; m^4, below which what is swept has no inside
+# m^2, below which a segment is a point; m^4, below which a swept area has no inside
 _POINT, _FLAT = 1e-12, 1e-18
 
 
@@ -20,7 +20,7 @@ def to_point(a: Any, b: Any, p: Any) -> Any:
 
 
 def from_nearest(a: Any, b: Any, p: Any) -> Any:
-    """Return the vector from the nearest place of a segment to a point, shape (k,).
+    """Return the vector from the closest point of a segment to a point, shape (k,).
 
     Args:
         a: One end of the segment, shape (k,).
@@ -61,43 +61,43 @@ def between_nearest(a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
     uu, vv, uv = ca.dot(u, u), ca.dot(v, v), ca.dot(u, v)
     uw, vw = ca.dot(u, w), ca.dot(v, w)
     across = uu * vv - uv * uv
-    # of parallel ones any place does
+    # of parallel segments any point does
     first = _within((uv * vw - uw * vv) / ca.fmax(across, _POINT * ca.fmax(uu * vv, _POINT)))
     second = _within((uv * first + vw) / ca.fmax(vv, _POINT))
     first = _within((uv * second - uw) / ca.fmax(uu, _POINT))
     return w + first * u - second * v, second
 
 
-def to_swept(a: Any, b: Any, c: Any, d: Any, way: Any) -> tuple[Any, Any]:
-    """Return the distance between a segment and what another one sweeps, and when it is.
+def to_swept(a: Any, b: Any, c: Any, d: Any, motion: Any) -> tuple[Any, Any]:
+    """Return the distance between a segment and the area another one sweeps, and its time.
 
-    What is swept is a parallelogram: the nearest place is on one of its edges, over its inside
-    where an end of the segment is, or where the segment passes through it.
+    The swept area is a parallelogram: its closest point is on an edge, or inside, opposite an end
+    of the segment or where the segment passes through.
 
     Args:
         a: One end of the segment, shape (3,).
         b: The other end, shape (3,).
-        c: One end of the one that moves, where it begins, shape (3,).
+        c: One end of the moving segment at its start, shape (3,).
         d: Its other end there, shape (3,).
-        way: By how much it moves, shape (3,).
+        motion: Displacement of the moving segment, shape (3,).
 
     Returns:
-        Distance, and share of the way at which it is, from 0 to 1.
+        Distance, and the share of the motion at which it occurs, from 0 to 1.
     """
     found = [
-        to_segment(a, b, c, c + way),
-        to_segment(a, b, d, d + way),
+        to_segment(a, b, c, c + motion),
+        to_segment(a, b, d, d + motion),
         (to_segment(a, b, c, d)[0], 0.0),
-        (to_segment(a, b, c + way, d + way)[0], 1.0),
+        (to_segment(a, b, c + motion, d + motion)[0], 1.0),
     ]
     along = d - c
-    normal = ca.cross(along, way)
+    normal = ca.cross(along, motion)
     size = ca.dot(normal, normal)
     area = ca.fmax(size, _FLAT)
 
     def over(p: Any) -> tuple[Any, Any, Any]:
-        """Return whether a point is over the inside, its height, and the share of the way."""
-        by, share = ca.dot(ca.cross(p - c, way), normal), ca.dot(ca.cross(along, p - c), normal)
+        """Return whether a point is over the inside, its height, and the share of the motion."""
+        by, share = ca.dot(ca.cross(p - c, motion), normal), ca.dot(ca.cross(along, p - c), normal)
         inside = ca.fmin(ca.fmin(by, area - by), ca.fmin(share, area - share)) >= 0.0
         inside = ca.logic_and(inside, size > _FLAT)
         return inside, ca.dot(p - c, normal) / ca.sqrt(area), share / area

@@ -14,14 +14,14 @@ def swept_surface(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangles of a cross-section swept along a curve.
 
-    At each parameter the cross-section stands normal to the curve, its second axis as near to
-    ``up`` as that allows, its first one to the left of the motion, ``up x tangent``.
+    At each parameter the cross-section is normal to the curve, its second axis as near to
+    ``up`` as possible, its first one to the left of the motion, ``up x tangent``.
 
     Args:
         curve: The curve.
         theta: Increasing parameters of the cross-sections, shape (k,), k >= 2.
         profile: Polygon of the cross-section [m], shape (n, 2), n >= 2: left of the curve, and
-            above it. Seen along the motion, material is on the right of the way along the polygon.
+            above it. Seen along the motion, material is on the right of the directed polygon.
         up: Direction, shape (3,).
 
     Returns:
@@ -70,7 +70,7 @@ def strip(rows: int, columns: int) -> np.ndarray:
     )
 
 
-# of the grid on which lengths are looked for
+# samples per direction of the grid by which lengths are measured
 _FIRST = 33
 
 
@@ -107,12 +107,12 @@ FEWEST_WEDGES = 8
 
 
 def bore_wedges(radius: float, outer_radius: float, depth: float, count: int) -> np.ndarray:
-    """Corners of the convex wedges that surround a bore.
+    """Return corners of the convex wedges that surround a bore.
 
     The bore's axis is z, its mouth is at z = 0, the material is below, z from 0 to ``depth``. The
     inner faces touch the circle of the bore from outside in their middles: the bore is never
     narrower than it, and wider by ``radius (1 / cos(pi / count) - 1)`` at the corners, 0.9 % for
-    24 wedges. In a ring a pin is held by what is convex, which a plate with holes is not.
+    24 wedges. Contact needs convex bodies, and a plate with holes is not convex.
 
     Args:
         radius: Radius of the bore [m], positive.

@@ -1,4 +1,4 @@
-"""A channel between two places: what is told arrives later, unevenly, or not at all."""
+"""Communication channel with delay, jitter and loss of messages."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -9,21 +9,21 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.yaml.rules import Parameters, Range, Seed
 
-# ticks after which the draws of delays and losses begin again
+# ticks after which random delays and losses repeat
 _DRAWN = 8192
 _LONGEST, _MOST_LOST = 2.0, 0.9
 
 
 @dataclass
 class ChannelParameters(Parameters):
-    """What a channel does to messages, one way; in whole ticks, one at least.
+    """Parameters of a channel in one direction; delays are rounded to whole ticks, at least one.
 
     Attributes:
         delay: Least delay [s].
-        jitter: How much longer a message may take [s]; each its own, evenly spread, so that some
-            overtake others.
+        jitter: Largest additional delay of a message [s], uniformly distributed and independent, so
+            that messages may overtake others.
         loss: Share of the messages that never arrive.
-        seed: Another one draws others.
+        seed: Seed of the random delays and losses.
     """
 
     delay: Annotated[float, Range(0.0, _LONGEST, "s")] = 0.1
@@ -33,9 +33,9 @@ class ChannelParameters(Parameters):
 
 
 def message_ages(parameters: ChannelParameters, period: float) -> np.ndarray:
-    """Return how old the newest message is that has arrived, at each tick, shape (ticks,).
+    """Return the age of the newest arrived message at each tick, shape (ticks,).
 
-    In ticks, 1 at least; it repeats, as what is drawn does.
+    The age is in ticks, at least 1; the sequence is periodic, as the random numbers are.
 
     Args:
         parameters: The channel.
@@ -45,7 +45,7 @@ def message_ages(parameters: ChannelParameters, period: float) -> np.ndarray:
     least, spread = round(parameters.delay / period), round(parameters.jitter / period)
     delays = np.maximum(1, least + random.integers(0, spread, _DRAWN, endpoint=True))
     arrives = random.uniform(size=_DRAWN) >= parameters.loss
-    # the second round, in which there is a past
+    # the second period, which has a past
     newest = np.full(2 * _DRAWN, -1)
     for sent in np.flatnonzero(np.tile(arrives, 2)):
         at = sent + delays[sent % _DRAWN]
@@ -58,7 +58,7 @@ def message_ages(parameters: ChannelParameters, period: float) -> np.ndarray:
 class Channel(Block):
     """Delivers the newest message that has arrived.
 
-    Messages say what they are by themselves, so that one that was overtaken is of no use.
+    Messages are self-contained, so that overtaken ones are discarded.
 
     Ports:
         sent (input): The message of this tick, shape (size,).
@@ -88,5 +88,5 @@ class Channel(Block):
         return {"arrived": messages[:, age - 1]}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"under_way": ca.vertcat(u.sent, x.under_way)[: self._size * self._oldest]}

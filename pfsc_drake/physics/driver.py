@@ -1,4 +1,4 @@
-"""Driver model: low pass and rates of commanded torques."""
+"""Driver model: low-pass filter and rate limits of commanded torques."""
 
 import math
 from typing import Any
@@ -11,7 +11,7 @@ _OF_EFFORT = 10.0  # 1/s
 
 
 def low_pass_share(cutoff: float, period: float) -> float:
-    """Return by which share of what is left a low pass of first order goes on at a tick.
+    """Return the share of the remaining error that a first-order low-pass removes at a tick.
 
     Args:
         cutoff: Cut-off frequency [Hz]; 0 for none.
@@ -22,24 +22,24 @@ def low_pass_share(cutoff: float, period: float) -> float:
 
 
 def torque_rates(rate: float, effort: np.ndarray) -> np.ndarray:
-    """Return how fast torques may change [Nm/s], shape (N,).
+    """Return the largest rates of torques [Nm/s], shape (N,).
 
     Args:
-        rate: Of joints like a Panda's [Nm/s].
+        rate: Rate limit of joints like a Panda's [Nm/s].
         effort: Largest torques [Nm], shape (N,).
     """
     return np.maximum(rate, _OF_EFFORT * np.where(np.isfinite(effort), effort, 0.0))
 
 
 class DriveLowPass(Block):
-    """A low pass of first order, as drivers have it against steps of torque.
+    """First-order low-pass filter of a driver, which smooths steps of torque.
 
     Ports:
-        told (input): Torques [Nm or N], shape (N,).
-        passed (output): The same through the low pass, shape (N,).
+        command (input): Commanded torques [Nm or N], shape (N,).
+        passed (output): Filtered torques, shape (N,).
 
     State:
-        What was ``passed`` last; at the start what is told.
+        The last output (``passed``); initially the command.
 
     Args:
         size: N.
@@ -49,17 +49,17 @@ class DriveLowPass(Block):
 
     def __init__(self, size: int, cutoff: float, period: float) -> None:
         self._share = low_pass_share(cutoff, period)
-        self.inputs, self.outputs = {"told": Port(size)}, {"passed": Port(size)}
+        self.inputs, self.outputs = {"command": Port(size)}, {"passed": Port(size)}
         self.states = {"passed": size}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
-        return {"passed": u.told}
+        """Return the initial states; omitted ones are zero."""
+        return {"passed": u.command}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        return {"passed": x.passed + self._share * (u.told - x.passed)}
+        return {"passed": x.passed + self._share * (u.command - x.passed)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"passed": y.passed}

@@ -1,4 +1,4 @@
-"""A six-axis force/torque sensor in a fixed joint between flange and tool, and how it fails."""
+"""Six-axis force/torque sensor in a fixed joint between flange and tool, and its failures."""
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
@@ -16,7 +16,7 @@ from pfsc_drake.robot.tool_load import ToolLoad, predicted_load
 from pfsc_drake.yaml.fields import equal
 from pfsc_drake.yaml.rules import Numbers, Parameters, Range, Seed
 
-# ticks whose noise is known at once
+# ticks in a block of noise
 NOISE_TICKS = 128
 
 
@@ -24,8 +24,8 @@ NOISE_TICKS = 128
 class ForceTorqueParameters(Parameters):
     """Properties of a sensor; the first three entries are forces [N], the others torques [Nm].
 
-    In YAML two numbers stand for equal forces and equal torques, one for six equal entries. The
-    defaults stand for a K6-D40 with 500 N and 20 Nm; noise and bandwidth of the
+    In YAML two numbers denote equal forces and equal torques, one number six equal entries. The
+    defaults describe a K6-D40 with 500 N and 20 Nm; noise and bandwidth of the
     amplifier are assumed.
 
     Attributes:
@@ -50,33 +50,32 @@ class ForceTorqueParameters(Parameters):
 
 
 class ForceTorqueSensor(Block):
-    """Measures the load that the tool puts on a fixed joint.
+    """Measures the load of the tool on a fixed joint.
 
     With the joint's reaction force F on its child, from the plant, the reading is
-    ``y_k = clip(lowpass(-F)_k + b + n_k)``. The sign is such that whoever pushes on the
-    tool along x reads a positive ``f_x``, and that at rest the tool's weight is read;
-    the tool's inertia is in it too. The sensor frame S is the joint's frame on its
-    child, torques are about its origin.
+    ``y_k = clip(lowpass(-F)_k + b + n_k)``. A force on the tool along x has a positive reading
+    ``f_x``; at rest the reading is the tool's weight; in motion it contains the tool's inertial
+    load. The sensor frame S is the joint's frame on its child, torques are about its origin.
 
     The filter (see :class:`LowPass`) and the noise advance once per period; in between
-    the reading follows the load, so that nothing is delayed by the sampling. A NaN in
-    the reaction comes out as NaN.
+    the reading follows the load, so that sampling causes no delay. A NaN in the reaction causes a
+    NaN reading.
 
-    The plant's reaction forces depend on the drive torques: between this block's
-    output and the plant's inputs there must be a hold. In a discrete plant they are
-    sampled and one of its steps old, unless it was told otherwise.
+    The plant's reaction forces depend on the drive torques: between this block's output and the
+    plant's inputs there must be a hold. In a discrete plant they are sampled and one step old by
+    default.
 
     Ports:
         reaction (input): F as ``[torque, force]`` in S, shape (6,), see :class:`JointReaction` and
             :class:`ToolReaction`.
-        noise (input, optional): n of NOISE_TICKS ticks, one tick after the other, that of tick k
-            at ``k mod NOISE_TICKS``, shape (6 NOISE_TICKS,), see :class:`SensorNoise`; zero if
+        noise (input, optional): n of NOISE_TICKS consecutive ticks, tick k at index
+            ``k mod NOISE_TICKS``, shape (6 NOISE_TICKS,), see :class:`SensorNoise`; zero if
             not connected.
         measured_wrench (output): ``[force, torque]`` in S, shape (6,) [N, Nm].
-        load (output): ``-F``, what an ideal sensor would read, shape (6,) [N, Nm].
+        load (output): ``-F``, the reading of an ideal sensor, shape (6,) [N, Nm].
 
     State:
-        The ``filter``; it rests on the load where it is not finite, as before the first tick.
+        The ``filter``; it rests on the load if NaN or infinite, as before the first tick.
 
     Args:
         parameters: The sensor's properties.
@@ -86,7 +85,7 @@ class ForceTorqueSensor(Block):
         InputError: If the bandwidth is too large for the period.
     """
 
-    expands = False  # noise is looked up
+    expands = False  # noise is a table
 
     def __init__(self, parameters: ForceTorqueParameters, period: float) -> None:
         self._parameters, self._low_pass = parameters, LowPass(parameters.bandwidth, period)
@@ -98,7 +97,7 @@ class ForceTorqueSensor(Block):
         self.states = {"filter": 6}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"filter": ca.DM.nan(6)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -112,7 +111,7 @@ class ForceTorqueSensor(Block):
         return {"measured_wrench": where(reading < -limit, -limit, reading), "load": load}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"filter": self._low_pass.update(self._at_rest(x, y.load), y.load)}
 
     def _at_rest(self, x: Values, load: Any) -> Any:
@@ -123,7 +122,7 @@ def noise_at(noise: Any | None, size: int, t: Any) -> Any:
     """Return the noise of a tick, shape (size,); 0 without any.
 
     Args:
-        noise: That of NOISE_TICKS ticks, one after the other, shape (size NOISE_TICKS,), or None.
+        noise: Noise of NOISE_TICKS consecutive ticks, shape (size NOISE_TICKS,), or None.
         size: Number of components.
         t: Number of the tick.
     """
@@ -137,26 +136,26 @@ KINDS = ("nan", "frozen", "jump")
 
 
 class SensorFailure(Block):
-    """Passes a measurement through until some of its components fail.
+    """Passes a measurement through until components fail.
 
     Ports:
         measured (input): Any vector, shape (size,).
-        delivered (output): The same; from ``time`` on, the failing components are NaN, rest
-            at what they were at the last tick before, or are off by ``jump``.
+        delivered (output): The measurement; from ``time`` on, the failing components are NaN,
+            constant at their last values, or in error by ``jump``.
 
     State:
-        Where it freezes: the measurement of the ``last`` tick before the failure.
+        Of kind ``frozen``: measurement at the ``last`` tick before the failure.
 
     Args:
         size: Size of the measurement.
-        indices: Components that fail.
-        time: When they fail [s].
-        period: Period of the ticks [s].
-        kind: How: ``nan``, ``frozen`` or ``jump``.
-        jump: By how much a jumping one is off.
+        indices: Indices of the failing components.
+        time: Time of the failure [s].
+        period: Sampling time [s].
+        kind: Kind of failure: ``nan``, ``frozen`` or ``jump``.
+        jump: Error of components that jump.
 
     Raises:
-        InputError: If the kind is not known.
+        InputError: If the kind is unknown.
     """
 
     def __init__(
@@ -177,7 +176,7 @@ class SensorFailure(Block):
         self.states = {"last": size} if kind == "frozen" else {}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"last": u.measured} if self.states else {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -190,7 +189,7 @@ class SensorFailure(Block):
         return {"delivered": where(ca.DM(self._fails) * self._has_failed(t), wrong, u.measured)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"last": where(self._has_failed(t), x.last, u.measured)} if self.states else {}
 
     def _has_failed(self, t: Any) -> Any:
@@ -198,10 +197,10 @@ class SensorFailure(Block):
 
 
 def tool_reaction_function(robot: RobotModel, load: ToolLoad) -> ca.Function:
-    """Return what the joint between flange and tool exerts on the tool.
+    """Return the reaction function of the joint between flange and tool.
 
-    By Newton and Euler on the tool alone: the opposite of :func:`predicted_load` and of the
-    wrench that acts on the tool, moved to the sensor's origin.
+    By Newton-Euler equations of the tool alone: the opposite of :func:`predicted_load` and of the
+    wrench that acts on the tool, shifted to the sensor's origin.
 
     Args:
         robot: The robot.

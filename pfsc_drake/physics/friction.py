@@ -1,4 +1,4 @@
-"""Dry and viscous joint friction with true sticking: pure formulas."""
+"""Dry and viscous joint friction with true sticking."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,23 +27,23 @@ class BristleFriction:
 
         f_d = f_c sat(s + tau v / delta),   s' = (sat(s + tau v / delta) - s) / tau
 
-    where ``sat`` limits to [-1, 1]. What follows from it:
+    where ``sat`` limits to [-1, 1]. Properties:
 
     - **Stick**: as long as ``|f_d| < f_c`` holds, ``s' = v / delta``: the bristles are a
       spring of stiffness ``f_c / delta`` and a damper, the tips do not move at all. Under
       any constant load below ``f_c`` the joint comes to rest, velocity 0 and not merely
-      small; oscillating loads cause no drift. While a load changes slowly, the joint gives
-      by ``delta / f_c`` per Nm; a load of 0.95 ``f_c`` applied at once shoots over and slips
-      once, to rest after about 2.4 ``delta`` (with the defaults below).
+      small; oscillating loads cause no drift. Under a slowly changing load the deflection is
+      ``delta / f_c`` per Nm; a step load of 0.95 ``f_c`` overshoots and slips once, to rest after
+      about 2.4 ``delta`` (with the defaults below).
     - **Break-away** at ``f_c``; the dry part never exceeds it.
     - **Slip**: ``f_d = f_c sign(v)`` exactly, at every velocity, once the bristles are
       bent (``|s| = 1``), hence (2.34).
     - **Passive**: ``tau_f v - d/dt(f_c delta s^2 / 2) >= 0`` always.
-    - **Not stiff**: the fastest rate of ``s`` is 1/tau at any sliding velocity, unlike
-      that of the models of Dahl or LuGre, which grows with ``|v| / delta``.
+    - **Not stiff**: the fastest rate of ``s`` is 1/tau at any sliding velocity, unlike in the
+      models of Dahl or LuGre, where it grows with ``|v| / delta``.
 
-    All arrays have shape (N,); the units are those of a revolute joint, for a slide read
-    m for rad and N for Nm.
+    All arrays have shape (N,); the units are those of a revolute joint, for a slide m instead of
+    rad and N instead of Nm.
 
     Attributes:
         coulomb: ``f_c`` [Nm], not negative; 0 for a joint without dry friction.
@@ -117,7 +117,7 @@ class BristleFriction:
         return self._evaluate(s, v)["rate"].copy()
 
     def energy(self, s: np.ndarray) -> np.ndarray:
-        """Return what the bent bristles store, ``f_c delta s^2 / 2`` [J], shape (N,).
+        """Return the energy of the bristles, ``f_c delta s^2 / 2`` [J], shape (N,).
 
         Args:
             s: Deflection of the bristles, shape (N,).
@@ -128,7 +128,7 @@ class BristleFriction:
         """Return the deflection that holds a load at rest, limited to [-1, 1], shape (N,).
 
         Args:
-            torque: Load that friction carries [Nm], shape (N,).
+            torque: Load that friction balances [Nm], shape (N,).
         """
         load = np.asarray(torque, dtype=float)
         limit = np.where(self.coulomb > 0.0, self.coulomb, np.inf)
@@ -137,12 +137,12 @@ class BristleFriction:
 
 @dataclass
 class FrictionDrift(Parameters):
-    """Friction that changes during a run, as that of a gear that becomes warm, evenly.
+    """Linear change of friction during a run, e.g. of a gear that warms up.
 
     Attributes:
-        factor: What it is in the end, in units of what it was, positive.
-        begin: Until when it is as it was [s].
-        end: From when on it is ``factor`` times that [s], after ``begin``.
+        factor: Final friction relative to the initial one, positive.
+        begin: Begin of the change [s].
+        end: End of the change [s], after ``begin``.
 
     Raises:
         InputError: If a number is out of range.
@@ -160,7 +160,7 @@ class FrictionDrift(Parameters):
             )
 
     def scale(self, t: float | np.ndarray) -> np.ndarray:
-        """Return the friction in units of that at the start.
+        """Return the friction relative to the initial one.
 
         Args:
             t: Time or times [s].
@@ -194,7 +194,7 @@ def bristles_for_step(
     Args:
         coulomb: ``f_c`` [Nm], shape (N,).
         viscous: ``f_v`` [Nm s/rad], shape (N,).
-        inertia: Smallest inertia that friction may see [kg m^2], shape (N,): ``D_M``,
+        inertia: Smallest inertia at the drive [kg m^2], shape (N,): ``D_M``,
             for elastic as for rigid joints (it bounds the rigid robot's from below); the
             mass of a slide.
         step: Integration step or sampling time h [s].

@@ -1,4 +1,4 @@
-"""A human hand on the tool: a spring-damper towards a moving target that wanders."""
+"""Operator model: a hand on the tool as a spring-damper towards a moving target."""
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any
@@ -9,7 +9,7 @@ import numpy as np
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.blocks.rotations import rotation_vector
 from pfsc_drake.errors import require
-from pfsc_drake.physics.hand_way import HandWay, OrientationTarget, Place
+from pfsc_drake.physics.hand_path import CoordinateMap, HandPath, OrientationTarget
 from pfsc_drake.physics.scripted_force import FRAMES, smooth_step
 from pfsc_drake.yaml.fields import equal
 from pfsc_drake.yaml.rules import Numbers, OneOf, Parameters, Range, Seed
@@ -17,15 +17,15 @@ from pfsc_drake.yaml.rules import Numbers, OneOf, Parameters, Range, Seed
 
 @dataclass
 class Wander:
-    """A hand that goes here and there within a box, as an operator may who tries everything.
+    """Random targets of an operator within a box.
 
     Attributes:
-        low: Lower corner of the box, in the hand's frame, shape (3,) [m].
+        low: Lower corner of the box, in the operator's frame, shape (3,) [m].
         high: Upper corner, shape (3,) [m].
-        begin: When it takes hold [s].
-        end: Until when it goes on [s].
-        shortest: Shortest time between places [s].
-        longest: Longest time between them [s].
+        begin: Time at which the operator grasps the tool [s].
+        end: End of the motion [s].
+        shortest: Shortest time between targets [s].
+        longest: Longest time between targets [s].
     """
 
     low: np.ndarray = field(default_factory=lambda: np.zeros(3), metadata=equal(3))
@@ -39,7 +39,7 @@ class Wander:
         self.low, self.high = (np.asarray(x, dtype=float) for x in (self.low, self.high))
         corners = [self.low.tolist(), self.high.tolist()]
         box = self.low.shape == self.high.shape == (3,) and bool(np.all(self.low <= self.high))
-        require(box, "low, high", corners, "3 numbers each, none of low above that of high")
+        require(box, "low, high", corners, "3 numbers each, low not above high")
         times = [self.begin, self.end]
         later = bool(np.isfinite(times).all()) and self.begin < self.end
         require(later, "begin, end", times, "finite numbers, the end after the begin")
@@ -47,8 +47,8 @@ class Wander:
         positive = 0.01 <= self.shortest <= self.longest < np.inf
         require(positive, "shortest, longest", between, "0.01 s or more, the longest the longer")
 
-    def places(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return times [s], shape (k,), ascending, and places [m], shape (k, 3).
+    def target_points(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return ascending times [s], shape (k,), and target positions [m], shape (k, 3).
 
         Args:
             seed: Seed of the random numbers.
@@ -61,7 +61,7 @@ class Wander:
 
 
 _FARTHEST = 1e4  # m
-_LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
+_LARGEST = 1e9  # of stiffness, damping and force; products do not overflow
 _LARGEST_ANGLE = 3600.0  # deg
 # sinusoids per axis, enough for an irregular tremor
 _TREMOR_LINES = 16
@@ -69,13 +69,13 @@ _TREMOR_LINES = 16
 
 @dataclass
 class HandWaypoint(Parameters):
-    """Where the hand wants the tool point to be, and how turned.
+    """Target of the operator: position of the tool point and orientation of the tool.
 
     Attributes:
-        time: [s].
-        position: In the hand's frame, shape (3,) [m].
-        zyx_deg: ZYX angles (2.7) of the tool in the world, shape (3,) [deg]; empty for those of
-            the waypoint before.
+        time: Time of arrival [s].
+        position: Position in the operator's frame, shape (3,) [m].
+        zyx_deg: ZYX angles (2.7) of the tool in the world, shape (3,) [deg]; empty for the angles
+            of the previous waypoint.
     """
 
     time: float = 0.0
@@ -98,7 +98,7 @@ _Weak = Annotated[float, Range(0.0, _LARGEST)]
 
 @dataclass
 class HandParameters(Parameters):
-    """Properties of a hand; stiffness and damping are of the order of a relaxed human arm's.
+    """Parameters of an operator; stiffness and damping are in the range of a relaxed human arm.
 
     Attributes:
         waypoints: Waypoints of the target, in ascending time.
@@ -106,21 +106,20 @@ class HandParameters(Parameters):
             ``eta, xi_1, xi_2`` of the path.
         stiffness: K [N/m].
         damping: D [N s/m].
-        rotational_stiffness: K_r [Nm/rad], by which the hand turns the tool to the orientations
-            of its waypoints; zero for a hand that does not mind how the tool is turned.
-        rotational_damping: D_r [Nm s/rad], by which the grip resists turning.
+        rotational_stiffness: K_r [Nm/rad] of the orientations of the waypoints; zero for an
+            operator without orientation targets.
+        rotational_damping: D_r [Nm s/rad] of the grip.
         force_limit: Largest magnitude of the force [N].
         torque_limit: Largest magnitude of the torque [Nm].
-        reaction_delay: From seeing to pushing [s]; a multiple of the sampling time, at most
-            10,000 of it.
-        tremor: Standard deviation of the trembling force per axis [N].
+        reaction_delay: Delay between observation and force [s]; a multiple of the sampling time, at
+            most 10,000 of it.
+        tremor: Standard deviation of the tremor force per axis [N].
         tremor_band: Lowest and highest frequency of the tremor [Hz], shape (2,).
-        grip_ramp: Time in which the hand takes hold and lets go [s].
-        release: When the hand begins to let go [s]; infinite: never.
-        seed: Seed of the tremor.
-        source: Where the numbers are from.
-        wander: Instead of the waypoints, a box whose places the hand goes to at random, as the seed
-            says; null for the waypoints.
+        grip_ramp: Duration of grasping and of releasing the tool [s].
+        release: Begin of the release [s]; infinite: never.
+        seed: Seed of the random numbers.
+        source: Source of the values.
+        wander: Box of random targets instead of the waypoints; null for the waypoints.
     """
 
     waypoints: list[HandWaypoint] = field(default_factory=lambda: [HandWaypoint()])
@@ -145,7 +144,7 @@ class HandParameters(Parameters):
         band = np.asarray(self.tremor_band, dtype=float)
         fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)
         require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")
-        times = self.places()[0]
+        times = self.target_points()[0]
         ascending = times.size > 0 and bool(
             np.all(np.diff(times) > 0.0) and np.all(np.isfinite(times))
         )
@@ -154,61 +153,61 @@ class HandParameters(Parameters):
         self._check_turning()
 
     def _check_turning(self) -> None:
-        given = [self.wander is None and point.zyx_deg.size > 0 for point in self.waypoints]
+        oriented = [self.wander is None and point.zyx_deg.size > 0 for point in self.waypoints]
         turns, allowed = self.rotational_stiffness > 0.0, "0, or zyx_deg in the first waypoint"
-        if turns or any(given):
-            first = bool(given) and given[0]
+        if turns or any(oriented):
+            first = bool(oriented) and oriented[0]
             require(first, "rotational_stiffness", self.rotational_stiffness, allowed)
             allowed = "positive where waypoints have zyx_deg"
             require(turns, "rotational_stiffness", self.rotational_stiffness, allowed)
 
-    def places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return when the target is where, shapes (k,) [s] and (k, 3) [m]."""
+    def target_points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return times and positions of the target, shapes (k,) [s] and (k, 3) [m]."""
         if self.wander is not None:
-            return self.wander.places(self.seed)
+            return self.wander.target_points(self.seed)
         times = np.array([waypoint.time for waypoint in self.waypoints], dtype=float)
         return times, np.array([waypoint.position for waypoint in self.waypoints])
 
     def orientation(self) -> OrientationTarget | None:
-        """Return how the tool is to be turned, or None."""
+        """Return the orientation target, or None."""
         if self.rotational_stiffness == 0.0:
             return None
         angles: list[np.ndarray] = []
         for waypoint in self.waypoints:
             angles.append(waypoint.zyx_deg if waypoint.zyx_deg.size else angles[-1])
-        return OrientationTarget(self.places()[0], np.array(angles))
+        return OrientationTarget(self.target_points()[0], np.array(angles))
 
 
 class HandModel:
-    """Force of a hand on the tool, as expressions of time and of what it sees.
+    """Operator model: force of a hand on the tool as expressions of time and observations.
 
-    The hand wants ``f_c = K (p_d - y_t) + D (p_d' - y_t')`` and
-    ``tau_c = K_r r + D_r (w_d - w)``, and
-    delivers, a reaction delay later, ``s (limit(f_c + tremor))`` and ``s limit(tau_c)``: s goes
-    from 0 to 1 while it takes hold and back when it lets go; limits are of the magnitude.
+    The desired force and torque are ``f_c = K (p_d - y_t) + D (p_d' - y_t')`` and
+    ``tau_c = K_r r + D_r (w_d - w)``. After the reaction delay the operator exerts
+    ``s (limit(f_c + tremor))`` and ``s limit(tau_c)``: s rises from 0 to 1 while the tool is
+    grasped and returns to 0 at its release; limits refer to the magnitude.
 
     The target ``p_d`` moves from waypoint to waypoint with minimum jerk, at rest in each, and so
-    does ``R_d``, w_d being its angular velocity; ``r`` is axis times angle of ``R_d R_e'``. A hand
-    without orientation wants ``-D_r w`` alone.
-    The tremor is a sum of sinusoids, whose frequencies and phases the seed determines.
-    Without delay, and up to its limits, a hand with a resting target is passive.
+    does ``R_d`` with its angular velocity w_d; ``r`` is axis times angle of ``R_d R_e'``. Without
+    an orientation target the torque is ``-D_r w``. The tremor is a sum of sinusoids, whose
+    frequencies and phases depend on the seed. Without delay and within its limits, an operator with
+    a constant target is passive.
 
     Args:
-        parameters: Its properties.
-        place: Where coordinates of the frame ``manifold`` are in the world.
+        parameters: Parameters of the operator.
+        to_world: Map of coordinates of the frame ``manifold`` to the world.
 
     Raises:
         InputError: If the waypoints are in the frame ``manifold`` and there is no path.
     """
 
-    def __init__(self, parameters: HandParameters, place: Place | None = None) -> None:
+    def __init__(self, parameters: HandParameters, to_world: CoordinateMap | None = None) -> None:
         self._parameters = parameters
         if parameters.frame == "manifold":
-            require(place is not None, "frame", parameters.frame, "world without a path")
+            require(to_world is not None, "frame", parameters.frame, "world without a path")
         else:
-            place = None
-        times, positions = parameters.places()
-        self._times, self._way = times, HandWay(times, positions, place)
+            to_world = None
+        times, positions = parameters.target_points()
+        self._times, self._path = times, HandPath(times, positions, to_world)
         self._orientation = parameters.orientation()
         random = np.random.default_rng(parameters.seed)
         low, high = parameters.tremor_band
@@ -218,20 +217,20 @@ class HandModel:
 
     @property
     def begin(self) -> float:
-        """When the hand takes hold [s]."""
+        """Time at which the tool is grasped [s]."""
         return float(self._times[0])
 
     @property
     def end(self) -> float:
-        """When the target comes to rest for good [s]."""
+        """Time at which the target comes to rest finally [s]."""
         return float(self._times[-1])
 
     def target(self, time: Any) -> tuple[Any, Any]:
         """Return ``p_d`` [m] and ``p_d'`` [m/s], in the world, shape (3,) each."""
-        return self._way.at(time)
+        return self._path.at(time)
 
     def tremor(self, time: Any) -> Any:
-        """Return the trembling force, shape (3,) [N]."""
+        """Return the tremor force, shape (3,) [N]."""
         amplitude = self._parameters.tremor * np.sqrt(2.0 / _TREMOR_LINES)
         if amplitude == 0.0:
             return ca.DM.zeros(3)
@@ -239,14 +238,14 @@ class HandModel:
         return amplitude * ca.sum2(lines)
 
     def grip(self, time: Any) -> Any:
-        """Return how firmly the hand holds the tool, from 0 to 1."""
+        """Return the grip ``s``, from 0 to 1."""
         hand = self._parameters
         taking = smooth_step((time - self.begin) / hand.grip_ramp)
         if not np.isfinite(hand.release):
             return taking
         return taking * (1.0 - smooth_step((time - hand.release) / hand.grip_ramp))
 
-    def wanted(
+    def desired_wrench(
         self, time: Any, y_t: Any, twist: Any, R_e: Any = None, reach: float = np.inf
     ) -> Any:
         """Return ``[f_c, tau_c]``, world axes, shape (6,) [N, Nm].
@@ -255,8 +254,8 @@ class HandModel:
             time: [s].
             y_t: Tool point [m], shape (3,).
             twist: ``[y_t', w]``, world axes, shape (6,) [m/s, rad/s].
-            R_e: Orientation of the tool, shape (3, 3); None where there is nothing to turn.
-            reach: Distance from which on a target counts as one that waits [m].
+            R_e: Orientation of the tool, shape (3, 3); None without an orientation target.
+            reach: Distance beyond which the target is assumed to be at rest [m].
         """
         hand, (p_d, v_d) = self._parameters, self.target(time)
         if np.isfinite(reach):
@@ -269,15 +268,17 @@ class HandModel:
             torque += hand.rotational_stiffness * turn + hand.rotational_damping * w_d
         return ca.vertcat(force, torque)
 
-    def delivered(self, time: Any, wanted: Any) -> Any:
+    def output_wrench(self, time: Any, desired_wrench: Any) -> Any:
         """Return the wrench on the tool, world axes, shape (6,) [N, Nm].
 
         Args:
             time: [s].
-            wanted: What the hand wanted one reaction delay ago, shape (6,).
+            desired_wrench: Desired wrench one reaction delay ago, shape (6,).
         """
-        force = limited(wanted[:3] + self.tremor(time), self._parameters.force_limit)
-        torque = limited(wanted[3:], self._parameters.torque_limit)
+        force = limit_magnitude(
+            desired_wrench[:3] + self.tremor(time), self._parameters.force_limit
+        )
+        torque = limit_magnitude(desired_wrench[3:], self._parameters.torque_limit)
         return self.grip(time) * ca.vertcat(force, torque)
 
 
@@ -288,7 +289,7 @@ def observed_twist(before: Any, now: Any, period: float) -> Any:
 
     Args:
         before: ``[y_t, R_e by rows]``, shape (12,).
-        now: The same, later.
+        now: The later pose.
         period: Time between them [s].
     """
     turn = orientation(now) @ orientation(before).T
@@ -300,7 +301,7 @@ def orientation(pose: Any) -> Any:
     return ca.reshape(pose[3:], 3, 3).T
 
 
-def limited(vector: Any, limit: float) -> Any:
-    """Return a vector, or one of the same direction and the length of a limit."""
+def limit_magnitude(vector: Any, limit: float) -> Any:
+    """Return a vector whose magnitude is limited, with the same direction."""
     size = ca.norm_2(vector)
     return where(size > limit, vector * (limit / size), vector)

@@ -1,4 +1,4 @@
-"""Brakes that hold the motors from a stop category 0 on: when they close, and where."""
+"""Holding brakes of the motors, which close at a stop of category 0."""
 
 import functools
 from typing import Any
@@ -13,17 +13,17 @@ _RISE = 0.02
 
 
 class HoldingBrakes(Block):
-    """Moment of closing, anchors of the brakes, and how far they give.
+    """Closing time, anchors and compliance of holding brakes.
 
-    A brake is a spring between its motor and an anchor that slides where the spring would exceed
-    ``c(t) f_c``, with c from 0 to 1 in 20 ms from ``delay`` after the tick that sees a request. Its
-    torque is that of :class:`~pfsc_drake.systems.physics.brake_torque.BrakeTorque`.
+    A brake is a spring between its motor and an anchor, which slides where the spring would exceed
+    ``c(t) f_c``, with c from 0 to 1 in 20 ms from ``delay`` after the tick of a request. Its torque
+    is computed by :class:`~pfsc_drake.systems.physics.brake_torque.BrakeTorque`.
 
     Ports:
         request_0, request_1, .. (input): Stop categories, each (1,): 0 closes the brakes.
-        joint_state (input): True ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        anchor (output): Motor position at which each brake pulls with nothing [rad or m], shape
-            (N,); that of the motor while they are open.
+        joint_state (input): Actual ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        anchor (output): Motor position without brake torque [rad or m], shape (N,); equal to the
+            motor position while the brakes are open.
         give (output): Largest displacement from the anchor, ``c delta`` [rad or m], shape (N,).
 
     State:
@@ -32,7 +32,7 @@ class HoldingBrakes(Block):
     Args:
         presliding: ``delta``, displacement at the full holding torque [rad or m], shape (N,).
         requests: Number of requests, one or more.
-        delay: From the request until they close [s].
+        delay: Delay between request and closing [s].
         period: Sampling time [s].
     """
 
@@ -45,7 +45,7 @@ class HoldingBrakes(Block):
         self.states = {"age": 1, "anchor": n, "give": n}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"anchor": self._motors(u)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -53,11 +53,11 @@ class HoldingBrakes(Block):
         return {"anchor": x.anchor, "give": x.give}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         requests = [getattr(u, name) == 0.0 for name in self.inputs if name != "joint_state"]
         requested = functools.reduce(ca.logic_or, requests, x.age > 0.0)
         age = x.age + self._period * requested
-        # from the request on, as the first tick of it counts already
+        # relative to the request, whose first tick is included in the age
         share = ca.fmin(ca.fmax((age - self._period - self._delay) / _RISE, 0.0), 1.0)
         give, motors = share * self._presliding, self._motors(u)
         return {

@@ -17,10 +17,10 @@ from pfsc_drake.yaml.rules import NotNegative, OneOf, Parameters, Range
 
 @dataclass
 class TorqueSensorOptions(Parameters):
-    """What joint torque sensors do to the true torques.
+    """Error model of joint torque sensors.
 
     Attributes:
-        scale: Relative error of their scale.
+        scale: Relative error of the scale.
         noise: Standard deviation of the white noise of a sample, as a share of the joint's largest
             torque.
         seed: Seed of the noise.
@@ -35,16 +35,16 @@ class JointTorqueSensor(Block):
     """Measures the torques of springs and dampers of elastic joints, without delay.
 
     Ports:
-        joint_state (input): True ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        noise (input, optional): n of NOISE_TICKS ticks, one tick after the other.
+        joint_state (input): Actual ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        noise (input, optional): n of NOISE_TICKS consecutive ticks.
         joint_torque (output): ``(1 + scale) tau_J + n``, zero of rigid joints, shape (N,).
 
     Args:
-        robot: The robot as it is, N joints.
-        options: What the sensors do.
+        robot: The simulated robot, N joints.
+        options: Error model of the sensors.
     """
 
-    expands = False  # noise is looked up
+    expands = False  # noise is a table
 
     def __init__(self, robot: RobotModel, options: TorqueSensorOptions) -> None:
         n = robot.dimension
@@ -70,21 +70,21 @@ SIDES = ("both", "motor", "motor_and_torque")
 
 @dataclass
 class EncoderOptions(Parameters):
-    """What the encoders do to the true joint state.
+    """Encoder model: quantization and differentiation of joint positions.
 
     Increments are counted on the joint side: per revolution of a revolute joint, per metre
     of a slide. An encoder on the motor shaft has its own number times the gear ratio.
 
     Attributes:
-        link_increments: Link increments of the encoders of ``q_J``: none (exact), one number for
+        link_increments: Increments of the encoders of ``q_J``: none (exact), one number for
             all joints, or one per joint; 0 is exact.
-        motor_increments: Motor increments of the encoders of ``q_M``, likewise.
+        motor_increments: Increments of the encoders of ``q_M``, likewise.
         difference_quotient: Whether velocities are difference quotients of the measured
-            positions, else the true ones.
-        filter_time: Time constant of a first-order filter behind the difference quotient
+            positions, otherwise the actual ones.
+        filter_time: Time constant of a first-order filter of the difference quotient
             [s]; 0 for none.
-        sides: Which sides of elastic joints are measured: ``both``, ``motor``, or
-            ``motor_and_torque``, the motors' and the torques of the springs.
+        sides: Measured sides of elastic joints: ``both``, ``motor``, or
+            ``motor_and_torque``, the motors' side and the torques of the springs.
         torque: The torque sensors, if there are any.
     """
 
@@ -104,22 +104,22 @@ class JointEncoders(Block):
 
         v_k = v_{k-1} + (1 - exp(-T / filter_time)) ((q_k - q_{k-1}) / T - v_{k-1})
 
-    (without a filter ``(q_k - q_{k-1}) / T``) and is held in between; at the start, it is the
-    true one. Whoever reads at a tick gets the value of this tick. Without any option
-    the output is the input, to the last bit.
+    (without a filter ``(q_k - q_{k-1}) / T``) and is constant in between; initially it is the
+    actual velocity. At a tick the output is the value of this tick. Without any option
+    the output equals the input to the last bit.
 
     Ports:
-        joint_state (input): True ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
-        joint_state (output): The same as measured, shape (4N,).
+        joint_state (input): Actual ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+        joint_state (output): Measured joint state, shape (4N,).
 
     State:
-        With difference quotients only: ``measured`` at the last ``tick``, and which that was;
-        before the first, which may come less than a period after the start, that at the start.
+        With difference quotients only: ``measured`` state at the last ``tick``, and its number;
+        initially the state at the start, which may be less than a period before the first tick.
 
     Args:
         robot: The robot, N joints.
-        options: What the encoders do.
-        period: Sampling time T of the difference quotient [s]; that of the fastest reader.
+        options: Encoder model.
+        period: Sampling time T of the difference quotient [s], the shortest one of all readers.
 
     Raises:
         InputError: If an option or the period is out of range.
@@ -142,14 +142,14 @@ class JointEncoders(Block):
         self.states = {"measured": 4 * n, "tick": 1} if self._differs else {}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         if not self._differs:
             return {}
-        return {"measured": ca.vertcat(*self._quantized(u)), "tick": np.inf}
+        return {"measured": ca.vertcat(*self._quantize(u)), "tick": np.inf}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        q_J, v_J, q_M, v_M = self._quantized(u)
+        q_J, v_J, q_M, v_M = self._quantize(u)
         if self._differs:
             before = ca.vertsplit(x.measured, self._size)
             v_J, v_M = (
@@ -159,24 +159,29 @@ class JointEncoders(Block):
         return {"joint_state": ca.vertcat(q_J, v_J, q_M, v_M)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"measured": y.joint_state, "tick": t} if self._differs else {}
 
     def _velocity(self, x: Values, t: Any, q: Any, q_before: Any, v_before: Any) -> Any:
         quotient = (q - q_before) / self._period
         return where(t > x.tick + 0.5, v_before + self._weight * (quotient - v_before), v_before)
 
-    def _quantized(self, u: Values) -> tuple[Any, Any, Any, Any]:
+    def _quantize(self, u: Values) -> tuple[Any, Any, Any, Any]:
         """Return ``q_J`` and ``q_M`` in whole steps, with their velocities."""
         q_J, v_J, q_M, v_M = ca.vertsplit(u.joint_state, self._size)
-        return _in_steps(q_J, self._resolution[0]), v_J, _in_steps(q_M, self._resolution[1]), v_M
+        return (
+            _round_to_steps(q_J, self._resolution[0]),
+            v_J,
+            _round_to_steps(q_M, self._resolution[1]),
+            v_M,
+        )
 
 
-def _in_steps(q: Any, resolution: np.ndarray) -> Any:
+def _round_to_steps(q: Any, resolution: np.ndarray) -> Any:
     """Return the nearest multiples of steps, where these are not zero."""
     counted, steps = ca.DM(resolution > 0.0), ca.DM(np.where(resolution > 0.0, resolution, 1.0))
     number = q / steps
-    # rounded to the nearest, of two to the even one
+    # rounded half to even
     return where(counted, steps * (number - ca.remainder(number, 1.0)), q)
 
 
@@ -185,7 +190,7 @@ def encoder_resolution(robot: RobotModel, options: EncoderOptions) -> np.ndarray
 
     Args:
         robot: The robot, N joints.
-        options: What the encoders do.
+        options: Encoder model.
 
     Raises:
         InputError: If an option is out of range.

@@ -1,4 +1,4 @@
-"""A clutch between a leader's handle and what it leads: to take hold of the handle elsewhere."""
+"""Clutch between a leader device and its follower, to reposition the handle."""
 
 import math
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from pfsc_drake.errors import require
 
 @dataclass
 class ClutchParameters:
-    """A time for which the leader is let loose, to be taken hold of elsewhere.
+    """Interval in which the leader device is decoupled from the follower.
 
     Attributes:
-        begin: From when on it moves nothing [s].
-        end: Until when [s].
+        begin: Begin of the interval [s].
+        end: End of the interval [s].
     """
 
     begin: float = 0.0
@@ -31,27 +31,27 @@ class ClutchParameters:
         require(good, "begin, end", [self.begin, self.end], "ascending times [s]")
 
 
-# s, within which a hand that takes hold again feels the follower's force in full
+# s, within which the force feedback rises to its full value after the clutch closes
 _GRIP_TIME = 0.2
 
 
 class Clutch(Block):
-    """Where the follower is to be, for where the leader's handle is.
+    """Commanded position of the follower from the position of the leader's handle.
 
-    ``x = y_0 + mu (p - p_0)``. While the clutch is open x stays, the leader feels nothing, and p_0
-    moves along with p; thereafter the force comes back within 0.2 s.
+    ``x = y_0 + mu (p - p_0)``. While the clutch is open x is constant, there is no force feedback,
+    and p_0 moves along with p; afterwards the force feedback rises within 0.2 s.
 
     Ports:
-        handle (input): p as measured [m], shape (3,).
-        opened (input, optional): Above 0.5 while a person opens it, shape (1,).
-        orientation (input, optional): Of what is led, as :class:`TurningClutch` has it, by rows,
-            shape (9,).
+        handle (input): Measured p [m], shape (3,).
+        opened (input, optional): Above 0.5 while the operator opens the clutch, shape (1,).
+        orientation (input, optional): Commanded orientation of the follower by rows, from
+            :class:`TurningClutch`, shape (9,).
         position (output): x, in the world of the follower [m], shape (3,).
-        grip (output): Share of the force that the leader feels, shape (1,).
-        pose (output): What a hand at the handle goes by, in place of a tool's pose
-            ``[y_t, R_e]``, shape (12,): x, and the orientation; while the clutch is open, the way
-            of the handle from the middle of its room, beside x, so that a hand whose target is x
-            brings it there.
+        grip (output): Share of the force feedback, shape (1,).
+        pose (output): Pose for the operator model at the handle instead of a tool's pose
+            ``[y_t, R_e]``, shape (12,): x, and the orientation; while the clutch is open, x plus
+            the displacement of the handle from the middle of its workspace, so that an operator
+            with the target x moves it there.
 
     State:
         held: x; last: p at the last tick; was_open: Whether it was open then; grip, loose: Shares
@@ -60,7 +60,7 @@ class Clutch(Block):
     Args:
         scale: mu.
         start: y_0 [m], shape (3,).
-        opened: When it is open.
+        opened: Intervals in which it is open.
         period: Sampling time [s].
     """
 
@@ -82,20 +82,20 @@ class Clutch(Block):
         self.states = {"held": 3, "last": 3, "was_open": 1, "grip": 1, "loose": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"held": self._start, "last": u.handle, "grip": 1.0}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         position = x.held + where(x.was_open, 0.0, self._scale) * (u.handle - x.last)
-        seen = position + x.loose * u.handle
+        target = position + x.loose * u.handle
         rows = rows_of(ca.DM.eye(3)) if u.orientation is None else u.orientation
-        pose = ca.vertcat(seen, rows)
+        pose = ca.vertcat(target, rows)
         grip = where(_is_open(self._opened, u, t * self._period), 0.0, x.grip)
         return {"position": position, "grip": grip, "pose": pose}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         is_open = _is_open(self._opened, u, t * self._period)
         rise = self._period / _GRIP_TIME
         return {
@@ -108,26 +108,26 @@ class Clutch(Block):
 
 
 class TurningClutch(Block):
-    """How the follower is to be turned, for how the leader's handle is.
+    """Commanded orientation of the follower from the orientation of the leader's handle.
 
-    ``R_x+ = exp(mu [d]) R_x``, d the turn of the handle within a tick, so that held moments work
-    at either end in the ratio mu. While the clutch is open R_x stays.
+    ``R_x+ = exp(mu [d]) R_x`` with the rotation d of the handle within a tick, so that constant
+    moments do work at both ends in the ratio mu. While the clutch is open R_x is constant.
 
     Ports:
-        handle (input): Orientation of the handle as measured, by rows, shape (9,).
-        opened (input, optional): Above 0.5 while a person opens it, shape (1,).
+        handle (input): Measured orientation of the handle by rows, shape (9,).
+        opened (input, optional): Above 0.5 while the operator opens the clutch, shape (1,).
         orientation (output): R_x by rows, in the world of the follower, shape (9,).
-        seen (output): What a hand at the handle goes by in place of it: while the clutch is open,
-            turned as far as the handle is from the middle of its room, shape (9,).
+        seen (output): Orientation for the operator model at the handle: R_x; while the clutch is
+            open, rotated by the orientation of the handle from its middle, shape (9,).
 
     State:
-        held: R_x; last: Of the handle at the last tick; was_open: Whether it was open then;
-        loose: Share from 0 to 1.
+        held: R_x; last: Orientation of the handle at the last tick; was_open: Whether it was open
+        then; loose: Share from 0 to 1.
 
     Args:
         scale: mu.
         start: Orientation of the follower at the start, shape (3, 3).
-        opened: When it is open.
+        opened: Intervals in which it is open.
         period: Sampling time [s].
     """
 
@@ -145,7 +145,7 @@ class TurningClutch(Block):
         self.states = {"held": 9, "last": 9, "was_open": 1, "loose": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"held": self._start, "last": u.handle}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -153,11 +153,11 @@ class TurningClutch(Block):
         handle = matrix_of(u.handle)
         turn = rotation_vector(handle @ matrix_of(x.last).T)
         R = rotation_of(where(x.was_open, 0.0, self._scale) * turn) @ matrix_of(x.held)
-        seen = rotation_of(x.loose * rotation_vector(handle)) @ R
-        return {"orientation": rows_of(R), "seen": rows_of(seen)}
+        target = rotation_of(x.loose * rotation_vector(handle)) @ R
+        return {"orientation": rows_of(R), "seen": rows_of(target)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         is_open = _is_open(self._opened, u, t * self._period)
         rise = self._period / _GRIP_TIME
         return {

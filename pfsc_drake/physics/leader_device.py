@@ -1,4 +1,4 @@
-"""A hand-held device that leads a robot elsewhere: its handle, motors and encoders."""
+"""Leader device of teleoperation: handle, motors and encoders."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,15 +13,15 @@ from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive
 
 @dataclass
 class WristParameters(Parameters):
-    """How the handle of a device with six axes turns.
+    """Rotation of the handle of a device with six axes.
 
     Attributes:
-        inertia: Of the handle and the hand that grips it, about any axis [kg m^2].
+        inertia: Inertia of the handle and the operator's hand about any axis [kg m^2].
         damping: Viscous friction of an axis [Nm s/rad].
         friction: Coulomb friction of an axis [Nm].
-        resolution: Of the encoders [rad]; 0 if they are perfect.
+        resolution: Resolution of the encoders [rad]; 0 if exact.
         torque_limit: Largest moment of the motors [Nm].
-        largest_speed: Fastest that a hand turns it [rad/s].
+        largest_speed: Largest angular velocity by the operator [rad/s].
     """
 
     inertia: Positive = 0.004
@@ -34,16 +34,16 @@ class WristParameters(Parameters):
 
 @dataclass
 class LeaderParameters(Parameters):
-    """A hand-held device, with three axes or six.
+    """Leader device with three or six axes.
 
     Attributes:
-        mass: Of the handle [kg].
+        mass: Mass of the handle [kg].
         damping: Viscous friction of an axis [N s/m].
         friction: Coulomb friction of an axis [N].
-        resolution: Of the encoders, at the handle [m]; 0 if they are perfect.
+        resolution: Resolution of the encoders at the handle [m]; 0 if exact.
         force_limit: Largest force of the motors [N].
-        largest_speed: Fastest that a hand moves it [m/s].
-        wrist: How it turns, where it has six axes.
+        largest_speed: Largest speed by the operator [m/s].
+        wrist: Rotation of the handle, with six axes.
     """
 
     mass: Positive = 0.35
@@ -56,21 +56,21 @@ class LeaderParameters(Parameters):
 
 
 class LeaderDevice(Block):
-    """A mass with friction, between a hand and motors.
+    """A mass with friction under the forces of operator and motors.
 
-    ``m v' = f_hand + f_motor - d v - f_c sgn(v)`` along each axis, forces held over a tick, by
-    implicit steps::
+    ``m v' = f_hand + f_motor - d v - f_c sgn(v)`` along each axis, with constant forces over a
+    tick, by implicit steps::
 
         v+ = shrink(v + T f / m, T f_c / m) / (1 + T d / m),   x+ = x + T v+
 
-    shrink taking off up to the second argument. So the hand's and the motors' work, force times
-    displacement, is never less than what the kinetic energy gains.
+    where shrink reduces the magnitude by up to the second argument. So the work of operator and
+    motors, force times displacement, is never less than the increase of kinetic energy.
 
     Ports:
-        motor_force (input): On the handle [N], shape (3,).
-        hand_wrench (input): Of the hand on it, shape (6,), of which the force counts [N].
-        position (output): As the encoders tell, shape (3,) [m].
-        state (output): Position and velocity as they are, shape (6,) [m, m/s].
+        motor_force (input): Force of the motors on the handle [N], shape (3,).
+        hand_wrench (input): Wrench of the operator on it, shape (6,); its force is used [N].
+        position (output): Measured position, shape (3,) [m].
+        state (output): Actual position and velocity, shape (6,) [m, m/s].
 
     State:
         position, velocity: Zero at the start.
@@ -88,31 +88,33 @@ class LeaderDevice(Block):
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        measured = _encoded(x.position, self._device.resolution)
+        measured = _quantize(x.position, self._device.resolution)
         return {"position": measured, "state": ca.vertcat(x.position, x.velocity)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         device, T = self._device, self._period
         force = u.motor_force + u.hand_wrench[:3]
-        velocity = _driven(x.velocity, force, T, device.mass, device.friction, device.damping)
+        velocity = _next_velocity(
+            x.velocity, force, T, device.mass, device.friction, device.damping
+        )
         return {"position": x.position + T * velocity, "velocity": velocity}
 
 
 class LeaderWrist(Block):
-    """How the handle of a device with six axes turns, a body that is alike about all axes.
+    """Rotation of the handle of a device with six axes, with equal inertia about all axes.
 
-    ``J w' = m_hand + m_motor - d w - f_c sgn(w)`` about the world's axes, as
-    :class:`LeaderDevice` moves, and ``R+ = exp(T [w+]) R``.
+    ``J w' = m_hand + m_motor - d w - f_c sgn(w)`` about the world's axes, integrated as in
+    :class:`LeaderDevice`, and ``R+ = exp(T [w+]) R``.
 
     Ports:
-        motor_moment (input): On the handle [Nm], shape (3,).
-        hand_wrench (input): Of the hand on it, shape (6,), of which the moment counts [Nm].
-        orientation (output): As the encoders tell, R by rows, shape (9,).
-        state (output): R by rows and angular velocity as they are, shape (12,) [1, rad/s].
+        motor_moment (input): Moment of the motors on the handle [Nm], shape (3,).
+        hand_wrench (input): Wrench of the operator on it, shape (6,); its moment is used [Nm].
+        orientation (output): Measured R by rows, shape (9,).
+        state (output): Actual R by rows and angular velocity, shape (12,) [1, rad/s].
 
     State:
-        rows: R; velocity: w; not turned and at rest at the start.
+        rows: R; velocity: w; initially the identity, at rest.
 
     Args:
         parameters: The wrist.
@@ -126,35 +128,37 @@ class LeaderWrist(Block):
         self.states = {"rows": 9, "velocity": 3}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"rows": rows_of(ca.DM.eye(3))}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         step, measured = self._wrist.resolution, x.rows
         if step > 0.0:
-            turn = _encoded(rotation_vector(matrix_of(x.rows)), step)
+            turn = _quantize(rotation_vector(matrix_of(x.rows)), step)
             measured = rows_of(rotation_of(turn))
         return {"orientation": measured, "state": ca.vertcat(x.rows, x.velocity)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         wrist, T = self._wrist, self._period
         moment = u.motor_moment + u.hand_wrench[3:]
-        velocity = _driven(x.velocity, moment, T, wrist.inertia, wrist.friction, wrist.damping)
+        velocity = _next_velocity(
+            x.velocity, moment, T, wrist.inertia, wrist.friction, wrist.damping
+        )
         R = rotation_of(T * velocity) @ matrix_of(x.rows)
         return {"rows": rows_of(R), "velocity": velocity}
 
 
-def _encoded(measured: Any, step: float) -> Any:
-    """Return what encoders of a resolution tell; 0 if they are perfect."""
+def _quantize(measured: Any, step: float) -> Any:
+    """Return positions quantized to a resolution; exact if it is 0."""
     return step * ca.floor(measured / step + 0.5) if step > 0.0 else measured
 
 
-def _driven(
+def _next_velocity(
     velocity: Any, force: Any, period: float, mass: float, friction: float, damping: float
 ) -> Any:
-    """Return velocities a tick later, shape (3,)."""
+    """Return velocities one tick later, shape (3,)."""
     force = where(all_finite(force), force, 0.0)
     driven = velocity + period / mass * force
     least = period / mass * friction

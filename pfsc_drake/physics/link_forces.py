@@ -1,4 +1,4 @@
-"""Wrenches on the links of an arm: what they mean in its joints, and hands that push there."""
+"""Wrenches on the links of an arm: joint torques, and an operator who pushes a link."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -23,16 +23,17 @@ Points = Sequence[tuple[int, np.ndarray]]
 
 
 class LinkForces(Block):
-    """Tells where wrenches on links act and what they mean in the joints.
+    """Computes points of action and joint torques of wrenches on links.
 
-    Forces and torques act **on the robot**; ``tau_ext = sum_k J_k(q_J)^T wrench_k`` is what they
-    mean at the joints, with the sign of (2.65a), ``D_E q'' + n_E = tau_J + tau_ext``.
+    Forces and torques act **on the robot**; their joint torques are
+    ``tau_ext = sum_k J_k(q_J)^T wrench_k`` with the sign of (2.65a),
+    ``D_E q'' + n_E = tau_J + tau_ext``.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         wrenches (input): ``[force, torque]`` at each of K points, world axes, shape (6K,)
             [N, Nm].
-        points (output): Where the points are in the world, shape (3K,) [m].
+        points (output): Positions of the points in the world, shape (3K,) [m].
         tau_ext (output): External torques on the link side, shape (N,) [Nm or N].
 
     Args:
@@ -64,26 +65,26 @@ class LinkForces(Block):
 
 @once_per_content()
 def link_points_function(chain: SerialChain, points: Points) -> ca.Function:
-    """Return ``q -> points``, where K points of links are in the world, as numbers.
+    """Return ``q -> points``, the positions of K points of links in the world.
 
     Args:
         chain: The arm, N joints.
         points: For each point the index of its link and where it is in that link's frame [m].
 
     Returns:
-        Function of q, shape (N,), to positions one after the other, shape (3K,) [m].
+        Function of q, shape (N,), to stacked positions, shape (3K,) [m].
     """
     q = ca.SX.sym("q", chain.dimension)
     still = [jets.constant(q[i], 1) for i in range(chain.dimension)]
-    places = [place.coefficients[0] for place in points_on_links(chain, still, points)]
-    return ca.Function("link_points", [q], [ca.densify(ca.vertcat(*places))], ["q"], ["points"])
+    positions = [position.coefficients[0] for position in points_on_links(chain, still, points)]
+    return ca.Function("link_points", [q], [ca.densify(ca.vertcat(*positions))], ["q"], ["points"])
 
 
 @once_per_content()
 def link_torque_function(chain: SerialChain, points: Points) -> ca.Function:
     """Return ``(q, wrenches) -> tau_ext``, the sum of ``J_k^T wrench_k``, see (2.11).
 
-    ``J_k`` is the geometric Jacobian of the k-th point; joints beyond its link bear nothing.
+    ``J_k`` is the geometric Jacobian of the k-th point; joints beyond its link have zero torque.
 
     Args:
         chain: The arm, N joints.
@@ -105,23 +106,23 @@ def link_torque_function(chain: SerialChain, points: Points) -> ca.Function:
 
 @dataclass
 class LinkHandParameters(Parameters):
-    """Properties of a hand on a link; stiffness and damping as of a relaxed human arm's.
+    """Parameters of an operator's hand on a link; stiffness and damping of a relaxed human arm.
 
-    It pulls a point of the link by a spring and a damper, with a limited force, towards where
-    the point was when the hand took hold, plus a way that grows with minimum jerk.
+    The hand pulls a point of the link by a spring and a damper, with a limited force. The target is
+    the position of the point when it was grasped plus a minimum-jerk displacement.
 
     Attributes:
-        link: Link or frame of the robot's model that it holds.
-        point: Where, in the axes of that link or frame [m], shape (3,).
-        way: How far the hand moves, world axes [m], shape (3,).
-        begin: When it takes hold and begins to move [s].
-        duration: Duration of the way [s].
-        hold: How long it stays at the end of the way [s].
-        comes_back: Whether it then goes the way back, and lets go there; else it lets go.
+        link: Link or frame of the robot's model that is grasped.
+        point: Grasped point in the axes of that link or frame [m], shape (3,).
+        way: Displacement of the hand, world axes [m], shape (3,).
+        begin: Time of grasping and begin of the motion [s].
+        duration: Duration of the displacement [s].
+        hold: Time at rest after the displacement [s].
+        comes_back: Whether the hand then returns before it releases the link.
         stiffness: K [N/m].
         damping: D [N s/m].
         force_limit: Largest magnitude of the force [N].
-        grip_ramp: Time in which the hand takes hold and lets go [s].
+        grip_ramp: Duration of grasping and of releasing the link [s].
     """
 
     link: str = ""
@@ -143,7 +144,7 @@ class LinkHandParameters(Parameters):
         self.hand()
 
     def hand(self) -> HandParameters:
-        """Return the hand, its waypoints from where the point is when it takes hold."""
+        """Return parameters of the hand, with waypoints relative to the grasped point."""
         there = self.begin + self.duration
         times = [self.begin, there, there + self.hold]
         positions = [np.zeros(3), self.way, self.way]
@@ -163,20 +164,19 @@ class LinkHandParameters(Parameters):
 
 
 class LinkHand(Block):
-    """A spring-damper from a point of a link to a hand that moves, see :class:`HandModel`.
+    """A spring-damper between a point of a link and a moving hand, see :class:`HandModel`.
 
-    The hand sees the point once per period, takes its velocity from the last two looks, and
-    holds its force until the next. Its way begins where the point is when it takes hold.
+    The hand observes the point once per period, computes its velocity from the last two samples,
+    and keeps its force constant until the next. Its motion begins at the grasped position.
 
     Ports:
-        point (input): Where the point is in the world, shape (3,) [m].
+        point (input): Position of the point in the world, shape (3,) [m].
         wrench (output): ``[force, torque]`` on the robot at the point, world axes, the torque
-            zero, shape (6,) [N, Nm]; zero before the hand takes hold, and where the point is not
-            finite.
+            zero, shape (6,) [N, Nm]; zero before grasping, and if the position is NaN or infinite.
 
     State:
-        wrench; the point at the last look (``last``), and whether it was ``seen`` then; where it
-        was when the hand took hold (``start``), and whether it ``holds``.
+        wrench; position at the last sample (``last``), and whether it was ``seen`` then; position
+        when the point was grasped (``start``), and whether the hand ``holds`` it.
 
     Args:
         parameters: Properties of the hand.
@@ -197,7 +197,7 @@ class LinkHand(Block):
         return {"wrench": x.wrench}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         time, sees = t * self._period, all_finite(u.point)
         takes = all_of(ca.logic_not(x.holds), time >= self._begin, sees)
         start = where(takes, u.point, x.start)
@@ -217,9 +217,11 @@ class LinkHand(Block):
 
         Args:
             time: [s].
-            point: Where the point is [m], shape (3,).
+            point: Position of the point [m], shape (3,).
             velocity: Velocity of the point [m/s], shape (3,).
-            start: Where the point was when the hand took hold [m], shape (3,).
+            start: Position when the point was grasped [m], shape (3,).
         """
         twist = ca.vertcat(velocity, ca.DM.zeros(3))
-        return self._hand.delivered(time, self._hand.wanted(time, point - start, twist))[:3]
+        return self._hand.output_wrench(
+            time, self._hand.desired_wrench(time, point - start, twist)
+        )[:3]

@@ -1,4 +1,4 @@
-"""Obstacles that move by themselves, and what a sensor tells of them."""
+"""Moving obstacles and the sensor that measures them."""
 
 import dataclasses as dc
 import math
@@ -17,19 +17,19 @@ from pfsc_drake.geometry.curves.polynomial import PieceTable
 from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS, noise_at
 from pfsc_drake.yaml.rules import NotNegative, Numbers, Parameters, Positive, Range, Seed
 
-# of its standard deviation, beyond which noise is cut
+# standard deviations at which noise is cut
 NOISE_CUT = 3.0
 _FARTHEST = 1e3  # m
-_JERK = 1e-6  # m/s, change of velocity at once
+_JERK = 1e-6  # m/s, step of velocity
 
 
 @dc.dataclass
-class Stride(Parameters):
-    """A place on the way of an obstacle.
+class ObstacleWaypoint(Parameters):
+    """A waypoint of an obstacle.
 
     Attributes:
-        time: When it is there [s].
-        position: Where [m], shape (3,).
+        time: Time of arrival [s].
+        position: Position [m], shape (3,).
     """
 
     time: Annotated[float, Range()] = 0.0
@@ -46,9 +46,9 @@ class ObstaclePart(Parameters):
     """A capsule, or a sphere where both ends are the same.
 
     Attributes:
-        start: One end of its line, from the obstacle's position on, axes of the world [m].
-        end: The other one [m].
-        radius: [m].
+        start: One end of its axis relative to the obstacle's position, world axes [m].
+        end: The other end [m].
+        radius: Radius [m].
     """
 
     start: Annotated[list[float], Numbers(3)] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
@@ -68,32 +68,36 @@ class ObstaclePart(Parameters):
 
 @dc.dataclass
 class ObstacleParameters:
-    """An obstacle and its way, place to place without overshooting; before and after it stands.
+    """An obstacle and its trajectory between waypoints; before and after it is at rest.
 
-    The way is a piecewise cubic Hermite interpolation, coordinate by coordinate (Fritsch and
-    Butland 1984), its velocity continuous in between; where two places are the same it stands.
+    The trajectory is a piecewise cubic Hermite interpolation, coordinate by coordinate (Fritsch and
+    Butland 1984), without overshoot and with a continuous velocity in between; the obstacle rests
+    between equal waypoints.
 
     Attributes:
-        kind: ``sphere``, ``column`` of all heights, ``person`` who stands on its position, or
+        kind: ``sphere``, ``column`` of infinite height, ``person`` who stands on its position, or
             ``capsules``, see :class:`~pfsc_drake.control.obstacles.shapes.ObstacleShape`.
-        radius: Of all but capsules [m].
-        height: Of a person [m].
-        parts: Of ``capsules``: which.
-        way: Places, two or more, their times ascending.
+        radius: Radius, except of capsules [m].
+        height: Height of a person [m].
+        parts: Parts of ``capsules``.
+        way: Waypoints, two or more, with ascending times.
     """
 
     kind: str = "column"
     radius: float = 0.25
     height: float = 1.75
     parts: list[ObstaclePart] = dc.field(default_factory=list)
-    way: list[Stride] = dc.field(
-        default_factory=lambda: [Stride(0.0, [3.0, 0.0, 0.0]), Stride(1.0, [3.0, 0.0, 0.0])]
+    way: list[ObstacleWaypoint] = dc.field(
+        default_factory=lambda: [
+            ObstacleWaypoint(0.0, [3.0, 0.0, 0.0]),
+            ObstacleWaypoint(1.0, [3.0, 0.0, 0.0]),
+        ]
     )
 
     def __post_init__(self) -> None:
-        self.shape  # noqa: B018, which checks what it looks like
+        self.shape  # noqa: B018, which checks the shape
         require(len(self.way) >= 2, "way", f"{len(self.way)} places", "two or more")
-        times = [stride.time for stride in self.way]
+        times = [waypoint.time for waypoint in self.way]
         ascending = bool(np.all(np.diff(times) > 0.0))
         require(ascending, "way", f"times {times}", "ascending times")
 
@@ -105,13 +109,13 @@ class ObstacleParameters:
 
     @property
     def curve(self) -> PchipInterpolator:
-        """Its position over time, between the first place and the last."""
-        places = np.array([stride.position for stride in self.way], dtype=float)
-        return PchipInterpolator([stride.time for stride in self.way], places)
+        """Its position over time, between the first and the last waypoint."""
+        positions = np.array([waypoint.position for waypoint in self.way], dtype=float)
+        return PchipInterpolator([waypoint.time for waypoint in self.way], positions)
 
     @property
     def largest_speed(self) -> float:
-        """The largest speed on its way [m/s]."""
+        """The largest speed of its trajectory [m/s]."""
         curve = self.curve
         times = np.concatenate(
             [np.linspace(a, b, 50) for a, b in zip(curve.x[:-1], curve.x[1:], strict=True)]
@@ -120,7 +124,7 @@ class ObstacleParameters:
 
     @property
     def largest_acceleration(self) -> float:
-        """The largest acceleration on its way from time 0 on; infinite where it jerks [m/s^2]."""
+        """The largest acceleration from time 0 on; infinite at a step of velocity [m/s^2]."""
         curve = self.curve
         ends = curve(curve.x[[0, -1]], 1)
         begins = curve.x[0] >= 0.0 and np.linalg.norm(ends[0]) > _JERK
@@ -135,30 +139,31 @@ class ObstacleParameters:
 
 
 class MovingObstacles(Block):
-    """Obstacles on their ways.
+    """Obstacles on their trajectories.
 
     Ports:
         state (output): Position and velocity of K obstacles, shape (6K,) [m, m/s].
 
     Args:
-        obstacles: Which.
+        obstacles: The K obstacles.
         period: Sampling time [s].
     """
 
     expands = False  # tables
 
     def __init__(self, obstacles: Sequence[ObstacleParameters], period: float) -> None:
-        self._ways, self._period = [_Way(obstacle.curve) for obstacle in obstacles], period
+        self._trajectories = [_Trajectory(obstacle.curve) for obstacle in obstacles]
+        self._period = period
         self.inputs, self.states = {}, {}
         self.outputs = {"state": Port(6 * len(obstacles), "m, m/s")}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         time = ca.MX(t * self._period)
-        return {"state": ca.vertcat(*[way.at(time) for way in self._ways])}
+        return {"state": ca.vertcat(*[one.at(time) for one in self._trajectories])}
 
 
-class _Way:
+class _Trajectory:
     """Position and velocity over time, as a table."""
 
     def __init__(self, curve: PchipInterpolator) -> None:
@@ -178,13 +183,13 @@ class _Way:
 
 @dc.dataclass
 class ObstacleSensorParameters(Parameters):
-    """What a sensor makes of where obstacles are.
+    """Sensor model of obstacles.
 
     Attributes:
-        position_noise: Standard deviation of white normal noise, cut at three of them [m].
-        velocity_noise: The same of velocities [m/s].
-        period: From measurement to measurement [s].
-        delay: From a measurement until it is told [s].
+        position_noise: Standard deviation of white normal noise, cut at three deviations [m].
+        velocity_noise: Standard deviation of the noise of velocities [m/s].
+        period: Sampling time of measurements [s].
+        delay: Delay of a measurement [s].
         seed: Seed of the noise.
     """
 
@@ -195,32 +200,31 @@ class ObstacleSensorParameters(Parameters):
     seed: Seed = 1
 
     def deviation(self, count: int) -> np.ndarray:
-        """Return the standard deviation of what is told of so many obstacles, shape (6 count,)."""
+        """Return the standard deviation of the noise of ``count`` obstacles, shape (6 count,)."""
         one = np.repeat([self.position_noise, self.velocity_noise], 3)
         return np.tile(one, count)
 
 
 class ObstacleSensor(Block):
-    """Tells where obstacles were some time ago, measured now and then, with noise.
+    """Measures obstacles with a sampling time, a delay and noise.
 
     Ports:
         state (input): Position and velocity of K obstacles, shape (6K,) [m, m/s].
-        noise (input, optional): Of NOISE_TICKS ticks, see
+        noise (input, optional): Noise of NOISE_TICKS ticks, see
             :class:`~pfsc_drake.systems.physics.sensor_noise.SensorNoise`.
-        obstacles (output): What had been measured then, shape (6K,) [m, m/s]; without direct
-            feedthrough.
+        obstacles (output): Delayed measurement, shape (6K,) [m, m/s]; without direct feedthrough.
 
     State:
-        measured: What was measured last. told: What is under way, the oldest first.
+        measured: Last measurement. delayed: Measurements within the delay, the oldest first.
 
     Args:
         count: K.
-        every: Ticks from measurement to measurement.
-        late: Ticks by which what is told is late.
-        deviation: Standard deviation of the noise, beyond three of which it is cut, shape (6K,).
+        every: Sampling time of measurements in ticks.
+        late: Delay of measurements in ticks.
+        deviation: Standard deviation of the noise, which is cut at three deviations, shape (6K,).
     """
 
-    expands = False  # noise is looked up
+    expands = False  # noise is a table
 
     def __init__(self, count: int, every: int, late: int, deviation: np.ndarray) -> None:
         self._every, self._late, self._size = every, late, 6 * count
@@ -232,23 +236,23 @@ class ObstacleSensor(Block):
         self.outputs = {"obstacles": Port(self._size, "m, m/s")}
         self.states = {"measured": self._size}
         if late:
-            self.states["told"] = late * self._size
+            self.states["delayed"] = late * self._size
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start."""
-        told = {"told": ca.repmat(u.state, self._late, 1)} if self._late else {}
-        return {"measured": u.state, **told}
+        """Return the initial states."""
+        delayed = {"delayed": ca.repmat(u.state, self._late, 1)} if self._late else {}
+        return {"measured": u.state, **delayed}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        return {"obstacles": x.told[: self._size] if self._late else x.measured}
+        return {"obstacles": x.delayed[: self._size] if self._late else x.measured}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick."""
+        """Return the states at the next tick."""
         noise = noise_at(u.noise, self._size, t)
         cut = ca.fmin(ca.fmax(noise, -self._most), self._most)
         measures = ca.fmod(t, self._every) == 0.0
-        told = {}
+        delayed = {}
         if self._late:
-            told["told"] = ca.vertcat(x.told[self._size :], x.measured)
-        return {"measured": where(measures, u.state + cut, x.measured), **told}
+            delayed["delayed"] = ca.vertcat(x.delayed[self._size :], x.measured)
+        return {"measured": where(measures, u.state + cut, x.measured), **delayed}

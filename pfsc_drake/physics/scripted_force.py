@@ -1,4 +1,4 @@
-"""Forces on the tool that were written down beforehand."""
+"""Scripted forces on the tool as functions of time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -40,11 +40,11 @@ def require_vector(key: str, value: np.ndarray) -> np.ndarray:
     """Return three numbers as an array, shape (3,).
 
     Args:
-        key: For the message.
-        value: What was given.
+        key: Name in the message.
+        value: Values to check.
 
     Raises:
-        InputError: If it is anything else.
+        InputError: If they are not 3 finite numbers.
     """
     vector = np.asarray(value, dtype=float)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
@@ -54,19 +54,19 @@ def require_vector(key: str, value: np.ndarray) -> np.ndarray:
 
 @dataclass
 class ForcePulse(Parameters):
-    """A wrench on the robot that comes, stays and goes, smoothly (C^2 in time).
+    """A smooth pulse of a wrench on the robot (C^2 in time).
 
     Attributes:
-        begin: When it leaves zero [s].
-        end: When it is zero again [s].
-        force: In between, shape (3,) [N].
-        torque: In between, shape (3,) [Nm].
-        ramp: Time from zero to full and back [s].
+        begin: Begin of the pulse [s].
+        end: End of the pulse [s].
+        force: Force of the plateau, shape (3,) [N].
+        torque: Torque of the plateau, shape (3,) [Nm].
+        ramp: Duration of rise and of fall [s].
         frame: ``world``: components along the world's axes; ``manifold``: along
             ``e_par, e_perp, e_cross`` of the path next to the tool, so that
             ``force = [-100, 0, 0]`` pushes against a motion with growing ``eta``.
         link: Link or frame of the robot's model that it acts on; empty for the tool.
-        point: Where, in the axes of that link or frame [m], shape (3,).
+        point: Point of action in the axes of that link or frame [m], shape (3,).
     """
 
     begin: float = 0.0
@@ -106,7 +106,7 @@ class ForceProfile:
     """A sum of pulses at one point.
 
     Args:
-        pulses: The pulses; they may overlap, and so make stairs.
+        pulses: The pulses; they may overlap and are added.
     """
 
     def __init__(self, pulses: Sequence[ForcePulse]) -> None:
@@ -116,7 +116,7 @@ class ForceProfile:
 
     @property
     def needs_manifold(self) -> bool:
-        """Whether a pulse is given in manifold coordinates."""
+        """Whether a pulse is in manifold coordinates."""
         return bool(self._by_frame["manifold"])
 
     def at(self, time: Any, axes: Any) -> Any:
@@ -139,16 +139,16 @@ _LOOKS_BEFORE = 0.1  # s
 class DecoupledForce(Block):
     """A pulse of the wrench of :func:`decoupled_force_function`.
 
-    The wrench's direction is that of the last tick; its size follows the time smoothly.
+    The wrench's direction is computed at the last tick; its magnitude is a smooth function of time.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        manifold_point (input): The path next to the tool.
+        manifold_point (input): Projection of the tool onto the path.
         wrench (output): ``[force, torque]`` on the robot at the tool point, world axes,
             shape (6,) [N, Nm].
 
     State:
-        The wrench of ``unit`` size; looked for while there is a force or will be soon.
+        Normalized wrench (``unit``), updated during the pulse and shortly before.
 
     Args:
         robot: A robot with six axes.
@@ -157,7 +157,7 @@ class DecoupledForce(Block):
         period: Sampling time [s].
     """
 
-    expands = False  # the wrench is long, and rarely needed
+    expands = False  # the expression of the wrench is long and rarely needed
 
     def __init__(
         self,
@@ -181,7 +181,7 @@ class DecoupledForce(Block):
         return {"wrench": self._force * pulse * x.unit}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         time, q = t * self._period, u.joint_state[: self._size]
         near = all_of(time >= self._begin - _LOOKS_BEFORE, time <= self._end)
         unit = ca.if_else(near, self._wrench(q, u.manifold_point), x.unit, True)
@@ -192,8 +192,8 @@ def decoupled_force_function(robot: RobotModel, manifold: PathManifold) -> ca.Fu
     """Return the wrench whose effect on the slow dynamics (3.68) is along ``eta`` alone.
 
     An external wrench w accelerates the virtual output by ``A (D_E + D_M)^-1 J_g' w``.
-    A force along the tangent moves the other coordinates too, through the arm's inertia;
-    the wrench returned here moves ``eta`` only, and its force along the tangent is 1 N.
+    A force along the tangent moves the other coordinates too, due to the arm's inertia;
+    this wrench moves ``eta`` only, and its force along the tangent is 1 N.
 
     Args:
         robot: A robot with six axes.
@@ -223,18 +223,18 @@ def decoupled_force_function(robot: RobotModel, manifold: PathManifold) -> ca.Fu
 class ScriptedForce(Block):
     """Force and torque at the tool point over time, see :class:`ForcePulse`.
 
-    The value is that of the tick. Directions in manifold coordinates are those of the manifold's
-    point at the last tick; a point that is not finite leaves them as they were.
+    The wrench is evaluated at the tick. Directions in manifold coordinates are the axes at the
+    manifold point of the last tick; they are unchanged if the point is NaN or infinite.
 
     Ports:
-        manifold_point (input): Where on the manifold the tool is; only if a pulse is given in
+        manifold_point (input): Projection of the tool onto the manifold; only if a pulse is in
             manifold coordinates.
         wrench (output): ``[force, torque]`` on the robot at the tool point, world axes,
             shape (6,) [N, Nm].
 
     State:
-        The manifold's ``axes`` as columns, one after the other, if they are needed; zero before
-        there is a point.
+        The manifold's ``axes`` as stacked columns, if they are needed; zero before the first
+        point.
 
     Args:
         profile: The profile.
@@ -251,8 +251,8 @@ class ScriptedForce(Block):
             self.states["axes"] = 9
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
-        return self._seen(u, ca.DM.zeros(9)) if self.states else {}
+        """Return the initial states; omitted ones are zero."""
+        return self._axes_state(u, ca.DM.zeros(9)) if self.states else {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
@@ -260,9 +260,9 @@ class ScriptedForce(Block):
         return {"wrench": self._profile.at(t * self._period, axes)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
-        return self._seen(u, x.axes) if self.states else {}
+        """Return the states at the next tick; omitted ones keep their values."""
+        return self._axes_state(u, x.axes) if self.states else {}
 
-    def _seen(self, u: Values, before: Any) -> dict[str, Any]:
+    def _axes_state(self, u: Values, before: Any) -> dict[str, Any]:
         axes = ca.vec(self._manifold.axes(u.manifold_point))
         return {"axes": where(all_finite(axes), axes, before)}

@@ -1,4 +1,4 @@
-"""A turntable as it is: behind its command, with encoders that tell late."""
+"""Simulated turntable: it lags behind its command, and its encoders have a delay."""
 
 from typing import Any
 
@@ -9,21 +9,21 @@ from pfsc_drake.blocks.block import Block, Port, Values
 
 
 class TurntableDrive(Block):
-    """Where a turntable's axes truly are, and what its encoders tell of it.
+    """Actual and measured motion of a turntable's axes.
 
     Ports:
-        followed (input): Angles and rates that the axes are at, by rows, shape (2N,)
-            [rad, rad/s]: those of their command some time ago.
-        motion (output): The same, shape (2N,).
-        measured (output): Angles to the nearest increment, late by ``ticks``, shape (N,) [rad].
+        followed (input): Actual angles and rates of the axes, by rows, shape (2N,) [rad, rad/s]:
+            the delayed command.
+        motion (output): The input, shape (2N,).
+        measured (output): Angles to the nearest increment, delayed by ``ticks``, shape (N,) [rad].
 
     State:
-        ``sent``: What the encoders told at the last ticks, the oldest first, shape (N ticks,).
+        ``sent``: Measurements of the last ticks, the oldest first, shape (N ticks,).
 
     Args:
         num_axes: N.
-        increments: Of an encoder per turn; 0 for exact ones.
-        ticks: By how many periods what is measured comes late.
+        increments: Increments of an encoder per revolution; 0 for exact ones.
+        ticks: Delay of the measurement in periods.
     """
 
     def __init__(self, num_axes: int, increments: float, ticks: int) -> None:
@@ -37,19 +37,19 @@ class TurntableDrive(Block):
         self.states = {"sent": num_axes * ticks} if ticks else {}
 
     def _now(self, u: Values) -> Any:
-        """Return what the encoders see."""
+        """Return the present encoder angles."""
         angles, step = u.followed[: self._n], self._resolution
         return step * ca.floor(angles / step + 0.5) if step else angles
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start: that the table rested."""
+        """Return the initial states, of a table at rest."""
         return {"sent": ca.repmat(self._now(u), self._ticks, 1)} if self._ticks else {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        told = x.sent[: self._n] if self._ticks else self._now(u)
-        return {"motion": u.followed, "measured": told}
+        measured = x.sent[: self._n] if self._ticks else self._now(u)
+        return {"motion": u.followed, "measured": measured}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"sent": ca.vertcat(x.sent[self._n :], self._now(u))} if self._ticks else {}

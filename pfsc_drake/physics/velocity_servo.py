@@ -1,4 +1,4 @@
-"""Joint velocity servos: gains, law, the law from tick to tick, and the bus to them."""
+"""Joint velocity servos: gains, control law, sampled servo, and the bus to the drives."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +22,7 @@ class ServoGains:
         proportional: ``K_p`` [Nm s/rad].
         integral: ``K_i`` [Nm/rad].
         reference: ``K_w`` [Nm s/rad], weight of the reference in the proportional part.
-        period: Sampling time T [s] that they are for.
+        period: Sampling time T of the servo [s].
 
     Raises:
         InputError: If the shapes differ, or a gain or the period is out of range.
@@ -57,7 +57,7 @@ def servo_gains(
     period: float,
     integral_rate: float | np.ndarray | None = None,
 ) -> ServoGains:
-    """Return gains that make ``v = v_ref / (s / omega + 1)`` of an inertia, at the ticks.
+    """Return gains with the response ``v = v_ref / (s / omega + 1)`` of an inertia at the ticks.
 
     With ``J v_{k+1} = J v_k + T u_k`` the closed loop has its poles at
     ``a = exp(-omega T)`` and ``b = exp(-omega_I T)``, and the reference does not excite
@@ -65,8 +65,8 @@ def servo_gains(
 
         K_p = J (2 - a - b) / T,  K_i = J (1 - a)(1 - b) / T^2,  K_w = J (1 - a) / T
 
-    A load is removed with the slower rate ``omega_I``. Where the inertia of a robot is c
-    times the given one, the bandwidth is about ``omega / c``.
+    A load disturbance decays with the slower rate ``omega_I``. If the actual inertia is c
+    times ``inertia``, the bandwidth is about ``omega / c``.
 
     Args:
         inertia: ``J`` [kg m^2], shape (N,), see :func:`joint_inertia`.
@@ -76,8 +76,8 @@ def servo_gains(
             for no integral part.
 
     Raises:
-        InputError: If an argument is out of range, or ``omega T`` is above 1, where little
-            is left of the margin against loads between the ticks.
+        InputError: If an argument is out of range, or ``omega T`` is above 1, where the stability
+            margin is small.
     """
     J = checked_vector("servo", "inertia", inertia, np.size(inertia), positive=True)
     if not 0.0 < period < np.inf:
@@ -102,7 +102,7 @@ def servo_gains(
 
 
 def joint_inertia(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
-    """Return the inertia that each drive sees, the others free to hold: ``diag(D_E) + D_M``.
+    """Return the inertia at each drive with all other joints at rest: ``diag(D_E) + D_M``.
 
     Args:
         robot: The robot.
@@ -118,8 +118,8 @@ def joint_inertia(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
 class VelocityServoLaw:
     """PI velocity control of the joints with feed-forward, which closes (3.48).
 
-    With the known load ``g`` - gravity at the present joint coordinates, and what viscous
-    damping takes - and the integral part ``x`` [Nm], at every tick::
+    With the known load ``g`` - gravity at the present joint coordinates, and viscous damping -
+    and the integral part ``x`` [Nm], at every tick::
 
         u     = g(q_J) + K_w v_ref - K_p v_M + x
         tau_d = sat(u)
@@ -164,16 +164,16 @@ class VelocityServoLaw:
 
 
 class SampledServo(Block):
-    """A :class:`VelocityServoLaw` with what it remembers.
+    """Sampled :class:`VelocityServoLaw` with its state.
 
-    The gravity torque is that of the links, the controlled velocity that of the motors. After a
-    fault nothing is remembered any more.
+    The law uses the links' gravity torque and controls the motors' velocity. After a fault the
+    state is constant.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         velocity_reference (input): ``q'_ref``, shape (N,).
-        silence (input, optional): For how long no new reference has come [s], shape (1,).
-        stopping (input): Nonzero from a fault on, shape (1,); acts on what is remembered.
+        silence (input, optional): Time since the last reference arrived [s], shape (1,).
+        stopping (input): Nonzero from a fault on, shape (1,); freezes the state.
         drive_torque (output): ``tau_d`` within its limits, shape (N,).
         input_fault (output): INPUT_NOT_FINITE or NONE, shape (1,).
         bus_fault (output): BUS_LOST if the bus has been silent for too long, or NONE, shape (1,).
@@ -182,10 +182,10 @@ class SampledServo(Block):
         ``integral`` part ``x`` of the law, shape (N,), 0 at the start.
 
     Args:
-        robot: The robot as it is believed, N joints; its gravity torque and the viscous damping
-            of its drives are fed forward.
+        robot: Nominal model of the robot, N joints; its gravity torque and the viscous damping of
+            its drives are fed forward.
         law: The law; its gains' period is the sampling time.
-        longest_silence: How long a reference may be missing [s]; for ever if infinite.
+        longest_silence: Longest allowed time without a reference [s]; may be infinite.
 
     Raises:
         InputError: If the law is for another number of joints.
@@ -227,47 +227,46 @@ class SampledServo(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"integral": where(u.stopping, x.integral, y.integral)}
 
 
-MAX_PERIODS = 10_000  # in a delay; every sample of it is moved at every tick
-# how far the number of periods in a delay may be from a whole number
+MAX_PERIODS = 10_000  # in a delay, whose samples are all shifted at every tick
+# tolerance of the number of periods in a delay
 _ROUNDING = 1e-6
 
 
 class BusDelay(Block):
-    """Samples a vector and delivers each sample a whole number of periods later.
+    """Samples a vector and delays each sample by a whole number of periods.
 
-    ``delivered(t) = sent((j - k) T)`` for ``j T <= t < (j + 1) T``, ``k = delay / T``: exact for
-    readers between the ticks as well as for those at the ticks. Before ``t = k T`` it delivers
-    what was sent at the start, not zero, so that nothing jumps.
+    ``delivered(t) = sent((j - k) T)`` for ``j T <= t < (j + 1) T``, ``k = delay / T``: exact at the
+    ticks and between them. Before ``t = k T`` the output is the initial input, not zero, so that
+    there is no step.
 
-    A frame that is sent while the bus loses its frames does not arrive: what was delivered
-    last is delivered on, and the silence is counted.
+    Frames that are sent while the bus is interrupted do not arrive: the output keeps its last
+    value, and the silence grows.
 
     Ports:
         sent (input): Any vector, shape (size,).
-        delivered (output): The same, later, shape (size,); no direct feedthrough.
-        silence (output): Since when nothing has arrived, beyond the period [s], shape (1,).
+        delivered (output): Delayed vector, shape (size,); no direct feedthrough.
+        silence (output): Time since the last arrival, beyond the period [s], shape (1,).
 
     State:
-        The last k + 1 ``samples``, newest first, shape ((k + 1) size,), where one is lost
-        the one before it again; how old in periods each of them is beyond its delay (``ages``);
-        the last ``tick``, infinite before the first, which takes what is sent then for all that
-        was sent before.
+        The last k + 1 ``samples``, newest first, shape ((k + 1) size,), a lost one replaced by its
+        predecessor; the age of each in periods beyond its delay (``ages``); the last ``tick``,
+        infinite before the first, whose input replaces all previous ones.
 
     Args:
         size: Size of the vector.
         delay: Delay [s], a whole number k of periods, 1 to MAX_PERIODS.
         period: Sampling time T of the bus [s].
-        lost: From when to when it loses its frames [s]; none if it ends before it begins.
+        lost: Begin and end of an interruption of the bus [s]; none if it ends before it begins.
 
     Raises:
         InputError: If the delay is not a positive multiple of the period.
     """
 
-    expands = False  # long vectors are moved
+    expands = False  # long vectors are shifted
 
     def __init__(
         self, size: int, delay: float, period: float, lost: tuple[float, float] = (0.0, 0.0)
@@ -280,26 +279,26 @@ class BusDelay(Block):
         self.states = {"samples": size * count, "ages": count, "tick": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"samples": self._everywhere(u), "tick": np.inf}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        n, moves = self._size, t > x.tick + 0.5  # what is sent at this tick is not among them yet
+        n, moves = self._size, t > x.tick + 0.5  # the input of this tick is not yet among them
         oldest, before = x.samples[-n:], x.samples[-2 * n : -n]
         age = where(moves, x.ages[-2], x.ages[-1])
         return {"delivered": where(moves, before, oldest), "silence": self._period * age}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         time, (begin, end) = t * self._period, self._lost
-        lost, has_begun = all_of(time >= begin, time < end), is_finite(x.tick)
+        lost, has_started = all_of(time >= begin, time < end), is_finite(x.tick)
         newest = where(lost, x.samples[: self._size], u.sent)
         samples = ca.vertcat(newest, x.samples[: -self._size])
         ages = ca.vertcat(where(lost, x.ages[0] + 1.0, 0.0), x.ages[:-1])
         return {
-            "samples": where(has_begun, samples, self._everywhere(u)),
-            "ages": where(has_begun, ages, x.ages),
+            "samples": where(has_started, samples, self._everywhere(u)),
+            "ages": where(has_started, ages, x.ages),
             "tick": t,
         }
 

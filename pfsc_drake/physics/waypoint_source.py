@@ -1,4 +1,4 @@
-"""Way points that come from elsewhere: sent at a rate, late, one after the other."""
+"""Streamed waypoints: sent at a rate, with a delay, one after the other."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,12 +14,12 @@ from pfsc_drake.errors import require
 
 @dataclass(frozen=True)
 class Arrivals:
-    """When way points come.
+    """Arrival times of waypoints.
 
     Attributes:
-        ticks: Sampling interval from which on each has come, not decreasing, shape (n,).
-        rows: Each with whether a new path begins with it, shape (n, d + 1).
-        ends: Sampling interval from which on it is told that there will be no more.
+        ticks: Tick of arrival of each, not decreasing, shape (n,).
+        rows: Waypoints, each with 1 if a new path begins with it, otherwise 0, shape (n, d + 1).
+        ends: Tick from which on the stream is reported as ended.
     """
 
     ticks: np.ndarray
@@ -28,17 +28,17 @@ class Arrivals:
 
 
 class WaypointSource(Block):
-    """Tells the last way points that have come.
+    """Outputs the last waypoints that have arrived.
 
     Ports:
         waypoints (output): Message laid out by ``layout``.
 
     Args:
-        arrivals: When way points come.
+        arrivals: Waypoints and their arrival times.
         layout: Layout of the messages.
 
     Raises:
-        InputError: If rows do not suit the layout, or come in another order.
+        InputError: If rows do not fit the layout, or ticks decrease.
     """
 
     def __init__(self, arrivals: Arrivals, layout: WaypointLayout) -> None:
@@ -47,9 +47,9 @@ class WaypointSource(Block):
         good = rows.ndim == 2 and len(rows) == len(ticks) > 0 and rows.shape[1] == width
         require(good, "rows", rows.shape, f"one of {width} numbers for each tick")
         ordered = bool(np.all(np.diff(ticks) >= 0))
-        require(ordered, "ticks", "decreasing", "one way point after the other")
+        require(ordered, "ticks", "decreasing", "one waypoint after the other")
         self._layout, self._ends = layout, arrivals.ends
-        # the first of those that have come
+        # index of the first row of the message
         self._ticks = ca.MX(ca.DM(np.concatenate([[-np.inf], ticks.astype(float), [np.inf]])))
         before = np.zeros((layout.length, width))
         self._rows = ca.MX(ca.DM(np.concatenate([before, rows]).ravel()))
@@ -60,6 +60,6 @@ class WaypointSource(Block):
         """Return all outputs, and the inner values."""
         layout, width = self._layout, self._layout.dimension + 1
         count = ca.low(self._ticks, ca.MX(t), {"lookup_mode": "binary"})
-        told = self._rows[width * count + ca.DM(range(width * layout.length))]
+        rows = self._rows[width * count + ca.DM(range(width * layout.length))]
         ended = where(ca.MX(t) >= self._ends, 1.0, 0.0)
-        return {"waypoints": ca.vertcat(count, ended, told)}
+        return {"waypoints": ca.vertcat(count, ended, rows)}

@@ -13,17 +13,17 @@ from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 _TOLERANCE = 1e-9
 _RESTARTS = 30
-# limits of this magnitude are none [rad or m]
+# limits of this magnitude are ignored [rad or m]
 UNLIMITED = 1e6
 # below which a turn about an axis is not defined
 _LEAST_TURN = 1e-9
 _STEPS = 100  # of one attempt; one that succeeds needs about ten
-# weight of the way to the guess, m or 1 per rad or m, beside errors of the pose
+# weight of the distance to the guess, m or 1 per rad or m, relative to errors of the pose
 _PULL = 1e-3
 
 
 def middle_posture(robot: RobotModel) -> np.ndarray:
-    """Return joints in the middle of their limits, those without next to zero, shape (N,)."""
+    """Return joints in the middle of their limits, unlimited ones near zero, shape (N,)."""
     lower, upper = np.clip(robot.gather("position_limits"), -UNLIMITED, UNLIMITED).T
     limited = np.maximum(-lower, upper) < UNLIMITED
     return np.where(limited, (lower + upper) / 2.0, np.clip(0.0, lower, upper))
@@ -31,15 +31,15 @@ def middle_posture(robot: RobotModel) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ToolTarget:
-    """Where a tool is to be, as far as it matters.
+    """Desired pose of a tool, or a part of it.
 
     Attributes:
         y_t: Tool point in the world [m], shape (3,).
-        R_e: Orientation of the tool, shape (3, 3), or None if any will do.
-        tool_axis: Axis in the tool frame, of length one, shape (3,), that alone is to have the
-            direction that R_e gives it; None if more of R_e matters.
-        yaw_axis: Axis in the world, of length one, shape (3,), about which alone the tool is to
-            be turned as R_e is; None if more of R_e matters.
+        R_e: Orientation of the tool, shape (3, 3), or None for any orientation.
+        tool_axis: Axis in the tool frame, of length one, shape (3,), whose direction alone is
+            prescribed by R_e; None if more of R_e is.
+        yaw_axis: Axis in the world, of length one, shape (3,), about which alone the turn of the
+            tool is prescribed by R_e; None if more of R_e is.
     """
 
     y_t: np.ndarray
@@ -49,7 +49,7 @@ class ToolTarget:
 
     @property
     def num_outputs(self) -> int:
-        """Number of coordinates that the tool is to have: 3, 4, 5 or 6."""
+        """Number of prescribed coordinates of the tool: 3, 4, 5 or 6."""
         if self.R_e is None:
             return 3
         if self.yaw_axis is not None:
@@ -57,20 +57,20 @@ class ToolTarget:
         return 6 if self.tool_axis is None else 5
 
     def error(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a pose lacks of the target, and its slope.
+        """Return the error of a pose against the target, and its slope.
 
         Args:
             pose: ``[y_t, R by rows]``, shape (12,).
 
         Returns:
-            The error, zero where the pose is one of those that are meant, shape (k,), and its
-            derivatives by the pose, shape (k, 12).
+            The error, zero at poses that fulfil the target, shape (k,), and its derivatives by the
+            pose, shape (k, 12).
         """
         R_e = np.zeros((3, 3)) if self.R_e is None else self.R_e
-        wanted = np.concatenate([self.y_t, np.ravel(R_e)])
+        desired_pose = np.concatenate([self.y_t, np.ravel(R_e)])
         if self.R_e is None or self.yaw_axis is None:
             rows = self._rows
-            return rows @ (pose - wanted), rows
+            return rows @ (pose - desired_pose), rows
         # sine and cosine of the turn, times a positive number, see ``yaw_error``
         _, b, c = rotation_to_axis(self.yaw_axis).T
         turn = np.array([np.outer(c, b) - np.outer(b, c), np.outer(b, b) + np.outer(c, c)])
@@ -84,7 +84,7 @@ class ToolTarget:
         return error, np.vstack([np.eye(3, 12), across])
 
     def tilt(self, R: np.ndarray) -> float:
-        """Return how far an orientation is turned away from R_e about all but the yaw axis [rad].
+        """Return the angle between an orientation and R_e without the turn about the axis [rad].
 
         Args:
             R: Shape (3, 3).
@@ -97,7 +97,7 @@ class ToolTarget:
 
     @property
     def _rows(self) -> np.ndarray:
-        """What matters of ``[y_t, R_e by rows]`` as a linear map, shape (.., 12)."""
+        """Linear map from ``[y_t, R_e by rows]`` to its prescribed part, shape (.., 12)."""
         if self.R_e is None:
             return np.eye(3, 12)
         if self.tool_axis is None:
@@ -107,17 +107,17 @@ class ToolTarget:
 
 
 def solve_pose(robot: RobotModel, target: ToolTarget, guess: np.ndarray, name: str) -> np.ndarray:
-    """Return joint coordinates within their limits that put the tool where it is to be.
+    """Return joint coordinates within their limits for a desired pose of the tool.
 
     The search starts at the guess, so that the guess chooses the branch; other
-    starts are tried only if that one fails. Of the many solutions of a robot that has more
-    joints than the tool needs, one is returned from which no small step leads nearer to the guess.
+    starts are tried only if it fails. For a redundant robot the solution is locally the nearest
+    one to the guess.
 
     Args:
         robot: The robot.
-        target: Where the tool is to be.
+        target: Desired pose of the tool.
         guess: Joint coordinates near the solution, shape (N,).
-        name: What the pose is, for the message.
+        name: Name of the pose in the message.
 
     Raises:
         InputError: If the pose is out of reach within the joint limits.
@@ -154,7 +154,7 @@ def solve_pose(robot: RobotModel, target: ToolTarget, guess: np.ndarray, name: s
         )
 
     def nearer(q: np.ndarray) -> np.ndarray:
-        """Pull a solution to the guess, and put the tool back where it is to be."""
+        """Pull a solution to the guess, and restore the desired pose."""
         pulled = solve(
             q,
             lambda x: np.append(residual(x), _PULL * (x - middle)),

@@ -1,4 +1,4 @@
-"""By how much what is believed of a robot is off the truth."""
+"""Errors of a controller's nominal model of a robot."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,21 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ModelError:
-    """What is believed of a robot of N links, beside what is true of it.
+    """Errors of the nominal model of a robot of N links, relative to the actual robot.
 
     Attributes:
-        mass: Believed mass of each link in units of the true one, shape (N,); scales mass and
+        mass: Nominal mass of each link over the actual one, shape (N,); scales mass and
             inertia alike, as a wrong density does.
-        inertia: Believed inertia about the centre of mass, beyond the factor of the mass,
-            shape (N,).
+        inertia: Nominal inertia about the centre of mass over the actual one, beyond the factor of
+            the mass, shape (N,).
         center: Error of the centre of mass in the link frame [m], shape (N, 3).
-        rotor_inertia: Believed rotor inertia in units of the true one, shape (N,).
-        stiffness: Believed joint stiffness in units of the true one, shape (N,).
-        friction: Believed Coulomb and viscous friction in units of the true ones, shape (2, N).
-        link_length: Believed distance from a joint to the next one, the last to the tool point,
-            in units of the true one, shape (N,).
-        joint_offset: What is believed of each joint's zero, minus the truth [rad or m], shape (N,).
-        tool_mass: Added to the believed tool [kg].
+        rotor_inertia: Nominal rotor inertia over the actual one, shape (N,).
+        stiffness: Nominal joint stiffness over the actual one, shape (N,).
+        friction: Nominal Coulomb and viscous friction over the actual ones, shape (2, N).
+        link_length: Nominal distance from a joint to the next one, the last to the tool point,
+            over the actual one, shape (N,).
+        joint_offset: Nominal minus actual zero of each joint [rad or m], shape (N,).
+        tool_mass: Error of the tool's mass, added to the nominal tool [kg].
         tool_center: Error of the tool's centre of mass, axes of the tool frame [m], shape (3,).
     """
 
@@ -38,7 +38,7 @@ class ModelError:
 
     @classmethod
     def none(cls, num_links: int) -> "ModelError":
-        """Return no error at all.
+        """Return the errors of an exact model.
 
         Args:
             num_links: ``N``.
@@ -59,5 +59,5 @@ class ModelError:
 
     @property
     def moves_tool(self) -> bool:
-        """Whether the tool is elsewhere than believed."""
+        """Whether the tool's nominal pose differs from the actual one."""
         return bool(np.any(self.link_length != 1.0) or np.any(self.joint_offset != 0.0))

@@ -1,4 +1,4 @@
-"""What the laws need to know of a robot, whatever its kinematics."""
+"""Interface of robot models to the control laws, for any kinematics."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -10,15 +10,15 @@ from pfsc_drake import jets
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.jets import Jet
 
-# for functions of a robot whose parameters may be symbols, which no argument brings
+# for functions of a robot whose parameters may be free symbols
 MAY_BE_PARAMETRIC = {"allow_free": True}
 
 
 class RobotModel(Protocol):
     """Kinematics and dynamics of a fully actuated robot on jets.
 
-    Serial chains and the DELTA robot are such models; a robot of another kind needs no
-    more than ``dimension``, ``gather`` and the three maps below to be path controlled.
+    Serial chains and the DELTA robot are such models; a robot of another kind only needs
+    ``dimension``, ``gather`` and the three maps below.
     """
 
     @property
@@ -42,7 +42,7 @@ class RobotModel(Protocol):
 
     @property
     def is_massless(self) -> bool:
-        """Whether nothing of it has mass: its kinematics alone are known."""
+        """Whether all links have no mass: only the kinematics are modelled."""
         return False
 
     @property
@@ -94,7 +94,7 @@ class RobotModel(Protocol):
 
 
 def largest_speeds(robot: RobotModel) -> np.ndarray:
-    """Return the largest speeds of joints [rad/s or m/s], infinite where none is known.
+    """Return the largest speeds of joints [rad/s or m/s], infinite without a limit.
 
     Args:
         robot: The robot, N joints.
@@ -103,12 +103,12 @@ def largest_speeds(robot: RobotModel) -> np.ndarray:
         Shape (N,).
     """
     speed = robot.gather("velocity_limit")
-    # zero is what models say that know none
+    # models without a limit have zero
     return np.where(speed > 0.0, speed, np.inf)
 
 
 def gravity_torque(robot: RobotModel, q: ca.SX) -> ca.SX:
-    """Return the torques that hold the links against gravity, ``g_L(q)`` of (2.65a).
+    """Return the torques that balance gravity, ``g_L(q)`` of (2.65a).
 
     Args:
         robot: The robot.
@@ -122,7 +122,7 @@ def gravity_torque(robot: RobotModel, q: ca.SX) -> ca.SX:
 
 
 def bias_torque(robot: RobotModel, q: ca.SX, v: ca.SX) -> ca.SX:
-    """Return the torques that keep the links at their velocities, ``n_E(q, v)`` of (2.65a).
+    """Return the torques at constant velocities, ``n_E(q, v)`` of (2.65a).
 
     Args:
         robot: The robot.
@@ -140,8 +140,8 @@ def bias_torque(robot: RobotModel, q: ca.SX, v: ca.SX) -> ca.SX:
 def link_acceleration(robot: RobotModel) -> ca.Function:
     """Return the acceleration of elastic joints' links, (2.65a), each argument (N,).
 
-    ``(q, v, tau_J) -> D_E^-1 (tau_J - n_E)``, as if rigid joints, whose torque no spring tells,
-    went on as they go; theirs is zero.
+    ``(q, v, tau_J) -> D_E^-1 (tau_J - n_E)``. The torque of rigid joints is not measured by a
+    spring; their acceleration is assumed to be zero.
     """
     n, elastic = robot.dimension, robot.elastic_joints
     q, v, tau = (ca.SX.sym(name, n) for name in ("q", "v", "tau"))

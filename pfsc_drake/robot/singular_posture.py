@@ -1,4 +1,4 @@
-"""Postures in which a tool cannot move in some direction: which joints bring them about."""
+"""Singular postures, in which a tool cannot move in some direction, and the joints involved."""
 
 from dataclasses import dataclass
 
@@ -11,20 +11,20 @@ from pfsc_drake.geometry import rotation_to_axis
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.links import Linkage
 
-# of the largest component of a vector, from which on a component counts
+# of the largest component of a vector: smallest component that counts
 _SHARE = 0.3
 
 
 @dataclass(frozen=True)
 class SingularPosture:
-    """How close a posture is to a singular one, and through which joints.
+    """Distance of a posture from a singularity, and the joints involved.
 
     Attributes:
         rcond: Smallest over largest singular value of the tool's Jacobian, lengths in units of
-            ``length``, by how much at most one joint alone moves the tool point.
-        free: The motion of the joints that moves the tool least, shape (N,), of norm 1; on robots
-            with more joints than the tool needs, of those across what never moves it.
-        cause: By how much each joint changes the smallest singular value, shape (N,).
+            ``length``, the largest motion of the tool point by a single joint.
+        free: The motion of the joints that moves the tool least, shape (N,), of norm 1; on
+            redundant robots among motions orthogonal to the null space.
+        cause: Derivative of the smallest singular value by each joint, shape (N,).
         jacobian: The Jacobian, shape (m, N), see :func:`task_jacobian`.
         length: Unit of length [m].
     """
@@ -79,19 +79,19 @@ def task_jacobian(
     tool_axis: np.ndarray | None = None,
     yaw_axis: np.ndarray | None = None,
 ) -> ca.SX:
-    """Return the rows of the tool's Jacobian that matter.
+    """Return the rows of the tool's Jacobian for the controlled coordinates.
 
     Args:
         robot: The robot.
         q: Joint coordinates, shape (N, 1).
-        oriented: Whether the tool's orientation matters.
+        oriented: Whether the tool's orientation is controlled.
         tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
-        yaw_axis: Axis in the world about which alone its turn matters, shape (3,), or None.
+        yaw_axis: Axis in the world about which alone its turn is controlled, shape (3,), or None.
 
     Returns:
-        Shape (6, N), (3, N) without orientation, or with an axis (5, N): the angular velocity
-        then is that about two directions across the axis, which turn with the tool; with an axis
-        in the world (4, N): that about it.
+        Shape (6, N), (3, N) without orientation, or with an axis (5, N): angular velocities
+        about two directions across the axis, which turn with the tool; with an axis
+        in the world (4, N): the angular velocity about it.
     """
     J = tool_jacobian(robot, q)
     if not oriented:
@@ -114,18 +114,18 @@ def singular_posture(
     tool_axis: np.ndarray | None = None,
     yaw_axis: np.ndarray | None = None,
 ) -> SingularPosture:
-    """Return how close a posture is to a singular one, and through which joints.
+    """Return the distance of a posture from a singularity, and the joints involved.
 
     With the singular vectors ``u' J v = s`` of the smallest singular value ``s`` of the scaled
     Jacobian J, ``v`` is the motion of the joints that moves the tool least, and
-    ``ds/dq_k = u' (dJ/dq_k) v`` tells which joints lead into the singularity and out of it.
+    ``ds/dq_k = u' (dJ/dq_k) v`` identifies joints that move into the singularity and out of it.
 
     Args:
-        robot: A robot with at least as many joints as the tool needs, N >= m.
+        robot: A robot with at least as many joints as controlled coordinates, N >= m.
         q: Joint coordinates, shape (N,).
-        oriented: Whether the tool's orientation matters.
+        oriented: Whether the tool's orientation is controlled.
         tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
-        yaw_axis: Axis in the world about which alone its turn matters, shape (3,), or None.
+        yaw_axis: Axis in the world about which alone its turn is controlled, shape (3,), or None.
     """
     symbol = ca.SX.sym("q", robot.dimension)
     expression = task_jacobian(
@@ -154,7 +154,7 @@ _WRIST = {3, 5}
 
 
 def joint_axes(chain: Linkage, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return where the joint axes of a chain are.
+    """Return the positions and directions of a chain's joint axes.
 
     Args:
         chain: The chain, N joints.
@@ -178,19 +178,19 @@ def joint_axes(chain: Linkage, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
 
 
 def singularity_name(chain: Linkage, q: np.ndarray, posture: SingularPosture) -> str | None:
-    """Return ``wrist``, ``elbow`` or ``shoulder``, or None where these words do not fit.
+    """Return ``wrist``, ``elbow`` or ``shoulder``, or None if these names do not apply.
 
-    They fit arms with a vertical first axis, as it were, and two parallel ones across it: with
-    three joints, or with six of which the last three meet in a point. Of these a wrist
+    They apply to arms whose second and third axes are parallel and perpendicular to the first:
+    with three joints, or with six of which the last three axes meet in a point. A wrist
     is singular when axes 4 and 6 are in line, an elbow when it is stretched out or folded
     (joints 2 and 3 can then move, joint 1 cannot), and a shoulder when the centre of the
-    wrist, or the tool point, is on axis 1. Where there are more joints than the tool needs, a
-    wrist alone is recognized by the joints that can move.
+    wrist, or the tool point, is on axis 1. On redundant robots only the wrist is recognized by the
+    joints that can move.
 
     Args:
         chain: The chain.
         q: Joint coordinates, shape (N,).
-        posture: What :func:`~pfsc_drake.robot.singular_posture.singular_posture` makes of them.
+        posture: Result of :func:`~pfsc_drake.robot.singular_posture.singular_posture` for them.
     """
     points, directions, _ = joint_axes(chain, q)
     if not all(link.is_revolute for link in chain.links) or len(q) not in (3, 6):
@@ -214,7 +214,7 @@ def singularity_name(chain: Linkage, q: np.ndarray, posture: SingularPosture) ->
 
 def _meet(points: np.ndarray, directions: np.ndarray) -> bool:
     """Return whether lines meet in a point."""
-    # the point of least distance from all lines; of lines that are parallel any will do
+    # the point of least distance from all lines; for parallel lines any such point
     across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     system = across.reshape(-1, 3)
     offsets = np.einsum("kij,kj->ki", across, points).ravel()

@@ -39,7 +39,7 @@ class ToolLoad:
 
 
 def predicted_load(robot: RobotModel, load: ToolLoad, q: Sequence[Jet]) -> tuple[ca.SX, ca.SX]:
-    """Return what the tool alone makes the sensor read, and the sensor's orientation.
+    """Return the sensor's reading due to the tool alone, and the sensor's orientation.
 
     ``f = m (g - a_C)``, ``tau = p_SC x f - h'``: the load of the tool on the sensor, about
     its origin. The rate of the angular momentum about the centre of mass is

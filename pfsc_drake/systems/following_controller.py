@@ -1,4 +1,4 @@
-"""The law that makes a robot follow a manifold, with what watches and stops it, in Drake."""
+"""Manifold following controller with supervision and safe stop, as a Drake diagram."""
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, OutputPort
@@ -19,13 +19,13 @@ from pfsc_drake.systems.fuse import BlockAccess
 
 
 class FaultAccess:
-    """What a diagram that stops a robot after a fault has found, fused with other blocks or not.
+    """Access to fault and suspects of a diagram that stops a robot, fused or not.
 
     Args:
-        diagram: With a ``fault_latch``, a ``safe_stop`` and, where joints are watched, a
+        diagram: Diagram with a ``fault_latch``, a ``safe_stop`` and, if joints are supervised, a
             ``supervision``; in a builder under its name.
         period: Sampling time of its blocks [s].
-        path: Names of the diagrams that it is in, each with a dot.
+        path: Names of the enclosing diagrams, each with a dot.
 
     Attributes:
         name: Name of the diagram, with its path.
@@ -37,7 +37,7 @@ class FaultAccess:
         self._is_supervised = diagram.HasSubsystemNamed("supervision")
 
     def fault(self, blocks: BlockAccess, root: Context) -> Fault:
-        """Return the fault that holds since the last tick, the present instant if it is one.
+        """Return the latched fault at the last tick, the present instant if it is a tick.
 
         Args:
             blocks: Blocks of the diagram.
@@ -48,7 +48,7 @@ class FaultAccess:
         return Fault(int(read(root, latch)[0]))
 
     def suspects(self, blocks: BlockAccess, root: Context) -> np.ndarray:
-        """Return which measured values are not believed, nonzero if so, shape (4N,).
+        """Return which measured values are rejected, nonzero if so, shape (4N,).
 
         Args:
             blocks: Blocks of the diagram.
@@ -61,41 +61,41 @@ class FaultAccess:
 
 
 class FollowingController(Diagram):
-    """A following law, what watches joints and drives, and what stops the robot after a fault.
+    """A following law with supervision of joints and drives, and a safe stop after a fault.
 
-    With what :class:`ExactLinearization` finds, a :class:`SampledLaw` tells the drives what to do
-    until there is a fault: its own, one that :class:`Supervision` or :class:`DriveWatch` find, or
-    one of the :class:`Alarms` of others. The first one holds (:class:`FaultLatch`): from then on
-    the drives stop the robot and hold it where it has come to rest (:class:`SafeStop`), velocity
-    servos get the reference zero; only a new initialization leaves that state.
+    A :class:`SampledLaw`, with the results of :class:`ExactLinearization`, commands the drives
+    until
+    there is a fault: its own, one found by :class:`Supervision` or :class:`DriveWatch`, or one of
+    the external :class:`Alarms`. The first fault is latched (:class:`FaultLatch`): from then on the
+    drives stop the robot and hold it at rest (:class:`SafeStop`), velocity servos get the reference
+    zero; only a new initialization leaves this state.
 
     Ports:
         joint_state, manifold_point, reference, tau_ext (optional), friction_torque (optional),
             posture_reference (input): See :class:`SampledLaw`.
         alarms (input, optional): See :class:`Alarms`.
         drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
-            For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
-            m/s]; the attribute ``drive_port`` holds the name.
+            For velocity servos (r = 1) its name is velocity_reference instead [rad/s or m/s]; the
+                attribute ``drive_port`` is its name.
         manifold_state, virtual_input, reference_velocity (output): See :class:`SampledLaw`.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`Fault`, shape (1,).
         stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`.
-        law (output): All of these, laid out by the law's ``layout``.
-        joint_jet (output): Of a robot that carries something, see :class:`JointJet`.
+        law (output): All of these, in the order of the law's ``layout``.
+        joint_jet (output): If ``carries``, see :class:`JointJet`.
 
     Args:
         law: The law.
         period: Sampling time [s].
-        supervision: What is watched of joints and drives; nothing if omitted.
-        carries: Whether the robot carries something that moves with it, for which its motion is
-            told.
-        hold: Holds the torques of drives that stick; they follow the law if omitted.
+        supervision: Parameters of the supervision of joints and drives; no supervision if omitted.
+        carries: Whether the motion of the robot is an output, for parts that move with it.
+        hold: Holds the torques of sticking drives; they follow the law if omitted.
 
     Attributes:
         period: Sampling time [s].
         layout: Layout of the port ``law``.
         relative_degree: ``r`` of the law.
-        drive_port: Name of the port that leads to the drives.
+        drive_port: Name of the output port for the drives.
     """
 
     def __init__(
@@ -199,14 +199,14 @@ class FollowingController(Diagram):
 
 
 class ControllerAccess(FaultAccess):
-    """What a diagram's controller is told, found and remembers, fused with other blocks or not.
+    """Access to a diagram's controller: command and last state, fused or not.
 
     Args:
         controller: The controller, in a builder under its name.
-        path: Names of the diagrams that it is in, each with a dot.
+        path: Names of the enclosing diagrams, each with a dot.
 
     Attributes:
-        drive_port: Name of the port that leads to the drives.
+        drive_port: Name of the output port for the drives.
     """
 
     def __init__(self, controller: FollowingController, path: str = "") -> None:
@@ -214,7 +214,7 @@ class ControllerAccess(FaultAccess):
         self.drive_port = controller.drive_port
 
     def drive(self, blocks: BlockAccess, root: Context) -> np.ndarray:
-        """Return what the drives are told, shape (N,).
+        """Return the command of the drives, shape (N,).
 
         Args:
             blocks: Blocks of the diagram.
@@ -223,7 +223,7 @@ class ControllerAccess(FaultAccess):
         return blocks.output(root, f"{self.name}.switch.command")
 
     def set_last_state(self, blocks: BlockAccess, root: Context, joint_state: np.ndarray) -> None:
-        """Let a state be that of the last tick, before which nothing has been compared.
+        """Set the state of the last tick; earlier comparisons are dropped.
 
         Args:
             blocks: Blocks of the diagram.

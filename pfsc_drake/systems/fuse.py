@@ -1,4 +1,4 @@
-"""The blocks of a diagram as one system, and by name whether they are one system or many."""
+"""Blocks of a diagram as one system, and access by name to fused and single blocks."""
 
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -26,10 +26,10 @@ class FusedSystem(BlockSystem):
     """Blocks that are evaluated as one function, and drawn one by one.
 
     Args:
-        wiring: How they are connected.
-        network: What they do together.
+        wiring: Connections of the blocks.
+        network: All blocks as one network.
         period: Sampling time [s].
-        parts: The systems that they were, by name.
+        parts: Original systems, by name.
     """
 
     def __init__(
@@ -70,15 +70,15 @@ class FusedSystem(BlockSystem):
 
 
 def fuse(diagram: Diagram) -> BlockSystem:
-    """Return one system that does what a diagram of blocks does, with the same ports.
+    """Return one system that replaces a diagram of blocks, with the same ports.
 
-    Its states and wires are called ``block.name``.
+    Its states and wires are named ``block.name``.
 
     Args:
         diagram: The diagram; all its systems are blocks of one sampling time, or such diagrams.
 
     Raises:
-        InputError: If one is not.
+        InputError: If one of them is not.
     """
     period = _period(diagram)
     if period is None:
@@ -91,15 +91,15 @@ def fuse(diagram: Diagram) -> BlockSystem:
 def fuse_blocks(builder: DiagramBuilder, name: str = "blocks") -> list[BlockSystem]:
     """Replace all blocks in a builder by one system, or one for each sampling time.
 
-    What stands between other systems and blocks is connected to the new system's ports, which are
-    called ``block.port``. Ports that the builder has exported must be those of other systems.
+    Connections between blocks and other systems use the new system's ports, which are named
+    ``block.port``. Ports that the builder has exported must belong to other systems.
 
     Args:
         builder: The builder, with everything connected.
         name: Name of the new system.
 
     Returns:
-        What has been added.
+        The added systems.
     """
     by_period: dict[float, list[System]] = {}
     for system in builder.GetSystems():
@@ -118,7 +118,7 @@ def _replace(
 ) -> BlockSystem:
     connections, inside = builder.connection_map(), set(systems)
     wiring = Wiring()
-    # of what stays: the ports that feed the new system, and those that it feeds
+    # connections of the remaining systems: the ports that feed the new system, and those it feeds
     sources: dict[str, OutputPort] = {}
     targets: list[tuple[InputPort, str]] = []
     for system in systems:
@@ -156,7 +156,7 @@ def _replace(
 
 
 def _period(system: System) -> float | None:
-    """Return the sampling time of a block, or of all blocks of a diagram; None of others."""
+    """Return the sampling time of a block, or of all blocks of a diagram; None for others."""
     if isinstance(system, BlockSystem):
         return system.period
     if not isinstance(system, Diagram):
@@ -166,11 +166,11 @@ def _period(system: System) -> float | None:
 
 
 def network_of(system: System, unconnected: Collection[str] = ()) -> Network:
-    """Return what a block or a diagram of blocks does.
+    """Return a block, or a diagram of blocks, as a network.
 
     Args:
         system: The system.
-        unconnected: Names of its input ports that nothing is connected to.
+        unconnected: Names of its input ports that are not connected.
     """
     if isinstance(system, BlockSystem):
         if system.block is None or not unconnected:
@@ -202,7 +202,7 @@ def network_of(system: System, unconnected: Collection[str] = ()) -> Network:
 
 
 class BlockAccess:
-    """Reads and sets what the blocks of a diagram remember.
+    """Access to the states and outputs of blocks in a diagram.
 
     Args:
         diagram: The diagram, with its blocks as systems of their own or fused.
@@ -225,7 +225,7 @@ class BlockAccess:
                 self._collect(system, f"{path}{system.get_name()}.")
 
     def output(self, root: Context, name: str) -> np.ndarray:
-        """Return what a block puts out.
+        """Return the value of a block's output.
 
         Args:
             root: Context of the diagram.
@@ -235,7 +235,7 @@ class BlockAccess:
         return system.wire(system.GetMyContextFromRoot(root), wire)
 
     def state(self, root: Context, name: str) -> np.ndarray:
-        """Return what a block remembers.
+        """Return the value of a block's state.
 
         Args:
             root: Context of the diagram.
@@ -245,7 +245,7 @@ class BlockAccess:
         return system.state(system.GetMyContextFromRoot(root), state)
 
     def presets(self, root: Context) -> dict[str, np.ndarray]:
-        """Return what has been set before the start, by ``block.state``.
+        """Return the states that were set before the start, by ``block.state``.
 
         Args:
             root: Context of the diagram.
@@ -258,7 +258,7 @@ class BlockAccess:
         return found
 
     def set_state(self, root: Context, name: str, value: np.ndarray) -> None:
-        """Set what a block remembers; see :meth:`BlockSystem.set_state`.
+        """Set a block's state; see :meth:`BlockSystem.set_state`.
 
         Args:
             root: Context of the diagram.

@@ -1,4 +1,4 @@
-"""Dataclasses as YAML text and plain data, which the reader undoes."""
+"""YAML text and plain data of dataclasses, in the form that the reader loads again."""
 
 import dataclasses
 import types
@@ -8,26 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from pfsc_drake.yaml.fields import OneForAll
+from pfsc_drake.yaml.fields import OneForAll, fields_of
 from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml
 
 
 def dump_typed(value: Any) -> str:
-    """Returns a dataclass as YAML text; :func:`pfsc_drake.yaml.typed.load_typed` undoes it."""
+    """Returns a dataclass as YAML text, which :func:`~pfsc_drake.yaml.typed.load_typed` loads."""
     return dump_yaml(typed_data(value))
 
 
 def typed_data(value: Any) -> dict[str, Any]:
-    """Returns a dataclass as plain data, as :func:`pfsc_drake.yaml.reading.read_yaml` gives it.
+    """Returns a dataclass as plain data, as :func:`pfsc_drake.yaml.reading.read_yaml` returns it.
 
-    Every key is there; a mapping that is a later member of a union has its tag.
+    Every key is present; a mapping of a later member of a union has its tag.
 
     Args:
         value: Instance of a dataclass whose fields have the types that
-            :func:`pfsc_drake.yaml.typed.load_typed` names.
+            :func:`pfsc_drake.yaml.typed.load_typed` supports.
 
     Raises:
-        TypeError: If a value is of none of the types that its field allows.
+        TypeError: If a value has none of the types that its field allows.
     """
     hints = typing.get_type_hints(type(value))
     return {
@@ -37,7 +37,7 @@ def typed_data(value: Any) -> dict[str, Any]:
 
 
 def _plain(value: Any, schema: Any) -> Any:
-    """Returns a value of a field as scalars, lists and mappings."""
+    """Returns a field's value as scalars, lists and mappings."""
     origin, arguments = typing.get_origin(schema), typing.get_args(schema)
     if origin in (typing.Union, types.UnionType):
         return _member(value, arguments)
@@ -57,7 +57,7 @@ def _plain(value: Any, schema: Any) -> Any:
 
 
 def _member(value: Any, members: tuple[Any, ...]) -> Any:
-    """Returns a value of a union, with a tag unless it is of its first member or null."""
+    """Returns a value of a union, with a tag unless it belongs to the first member or is null."""
     if value is None and type(None) in members:
         return None
     choices = [member for member in members if member is not type(None)]
@@ -71,3 +71,37 @@ def _member(value: Any, members: tuple[Any, ...]) -> Any:
     if dataclasses.is_dataclass(value) and type(value) is not choices[0]:
         plain[TAG_KEY] = f"!{type(value).__name__}"
     return plain
+
+
+def changed_data(value: Any, base: Any = None) -> dict[str, Any]:
+    """Returns the keys of a dataclass that differ from the defaults, as plain data.
+
+    Mandatory keys are always present. :func:`pfsc_drake.yaml.typed.load_typed` loads the data as
+    the same dataclass.
+
+    Args:
+        value: As in :func:`typed_data`.
+        base: Instance whose values apply to missing keys; None for the defaults of the class.
+    """
+    changed, owner = {}, typing.cast(Any, type(value))
+    for name, field in fields_of(owner).items():
+        own = getattr(value, name)
+        old = getattr(base, name) if base is not None else field.default and field.default()
+        whole, has_old = _plain(own, field.kind), base is not None or field.default is not None
+        if field.required or not has_old or whole != _plain(old, field.kind):
+            changed[name] = _changed(own, whole, old)
+    return changed
+
+
+def _changed(value: Any, whole: Any, old: Any) -> Any:
+    """Returns the changed part of a field's plain value ``whole``."""
+    if dataclasses.is_dataclass(value):
+        part = changed_data(value, old if type(old) is type(value) else None)
+        return part | {TAG_KEY: whole[TAG_KEY]} if TAG_KEY in whole else part
+    if isinstance(value, list) and isinstance(whole, list):
+        return [_changed(item, plain, None) for item, plain in zip(value, whole, strict=True)]
+    if isinstance(value, dict) and set(old or ()) <= set(value):
+        before = old or {}
+        parts = {key: _changed(value[key], whole[key], before.get(key)) for key in value}
+        return {key: part for key, part in parts.items() if part != {} or key not in before}
+    return whole

@@ -1,9 +1,9 @@
 """JSON schema of a dataclass, for completion and checks in editors.
 
-It says what the reader (:mod:`pfsc_drake.yaml.typed`) checks of single keys: names, types, words,
-bounds, lengths, defaults; what keys allow each other is known to the reader alone. JSON has no
-YAML tags: a block that a tag chooses is one of several (``anyOf``), titled by their tags, and
-:func:`tags_of` lists these for the editor. It is of draft 7, which editors of YAML read.
+It covers the checks of single keys by the reader (:mod:`pfsc_drake.yaml.typed`): names, types,
+words, bounds, lengths, defaults. Checks across keys are left to the reader. JSON has no YAML tags:
+a block that a tag chooses is one of several (``anyOf``), titled by their tags, and :func:`tags_of`
+lists these for the editor. The schema is of draft 7, which YAML editors read.
 """
 
 import dataclasses
@@ -29,40 +29,40 @@ def json_schema(owner: type, title: str) -> dict[str, Any]:
     """Return the JSON schema of a file.
 
     Args:
-        owner: Dataclass that reads it; root keys that begin with ``_`` are allowed beside its own.
-        title: What the file is.
+        owner: Dataclass of the file; root keys that begin with ``_`` are allowed beside its own.
+        title: Title of the schema.
 
     Raises:
-        ValueError: If two of the dataclasses in it have one name.
+        ValueError: If two of its dataclasses have the same name.
     """
     blocks: dict[str, type] = {}
     for block in blocks_of(owner):
         if blocks.setdefault(block.__name__, block) is not block:
             raise ValueError(f"{block} and {blocks[block.__name__]} have one name")
-    root = _block(owner)
+    root = _block_schema(owner)
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": title,
         **root,
         "patternProperties": {"^_": {}},
-        "definitions": {name: _block(blocks[name]) for name in sorted(blocks)},
+        "definitions": {name: _block_schema(blocks[name]) for name in sorted(blocks)},
     }
 
 
 def blocks_of(owner: type) -> Iterator[type]:
-    """Yield the dataclasses that a dataclass is made of, itself excluded, each once."""
-    found, ways = {owner}, [field.kind for field in fields_of(owner).values()]
-    while ways:
-        kind = ways.pop(0)
-        ways += typing.get_args(kind)
+    """Yield all dataclasses within a dataclass, itself excluded, each once."""
+    found, pending = {owner}, [field.kind for field in fields_of(owner).values()]
+    while pending:
+        kind = pending.pop(0)
+        pending += typing.get_args(kind)
         if dataclasses.is_dataclass(kind) and isinstance(kind, type) and kind not in found:
             found.add(kind)
             yield kind
-            ways += [field.kind for field in fields_of(kind).values()]
+            pending += [field.kind for field in fields_of(kind).values()]
 
 
 def tags_of(owner: type) -> list[str]:
-    """Return the tags that a file may have, sorted, each with its exclamation mark."""
+    """Return the allowed tags of a file, sorted, each with its exclamation mark."""
     kinds = [
         field.kind for block in (owner, *blocks_of(owner)) for field in fields_of(block).values()
     ]
@@ -71,7 +71,7 @@ def tags_of(owner: type) -> list[str]:
 
 
 def _choices(kind: Any) -> list[Any]:
-    """Return the dataclasses of the unions of several that a type has."""
+    """Return the dataclasses in a type's unions of several dataclasses."""
     arguments = typing.get_args(kind)
     inner = [choice for argument in arguments for choice in _choices(argument)]
     union = typing.get_origin(kind) in (typing.Union, types.UnionType)
@@ -79,21 +79,21 @@ def _choices(kind: Any) -> list[Any]:
     return [*inner, *blocks] if union and len(blocks) > 1 else inner
 
 
-def _block(owner: type) -> dict[str, Any]:
+def _block_schema(owner: type) -> dict[str, Any]:
     """Return the schema of a mapping with the keys of a dataclass."""
     fields, plain = fields_of(owner), _defaults(owner)
-    said: dict[str, Any] = {
+    schema: dict[str, Any] = {
         "type": "object",
         "description": _plain((owner.__doc__ or "").split("\n\n")[0]),
-        "properties": {name: _field(owner, field, plain) for name, field in fields.items()},
+        "properties": {name: _field_schema(owner, field, plain) for name, field in fields.items()},
         "additionalProperties": False,
     }
     required = [name for name, field in fields.items() if field.required]
-    return said | ({"required": required} if required else {})
+    return schema | ({"required": required} if required else {})
 
 
 def _defaults(owner: type) -> dict[str, Any]:
-    """Return the defaults of a dataclass that JSON can say: no blocks, nothing infinite."""
+    """Return the defaults of a dataclass that JSON can represent: no blocks, nothing infinite."""
     data = (
         {}
         if any(field.default is None for field in fields_of(owner).values())
@@ -108,91 +108,93 @@ def _is_plain(value: Any) -> bool:
     return not isinstance(value, dict) and not (isinstance(value, float) and math.isinf(value))
 
 
-def _field(owner: type, field: Field, plain: dict[str, Any]) -> dict[str, Any]:
+def _field_schema(owner: type, field: Field, plain: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of a key."""
-    said = _written(field, _typed(field.hint, field.bounds))
+    schema = _input_schema(field, _type_schema(field.hint, field.bounds))
     if field.name in plain and not field.required:
-        said["default"] = plain[field.name] or field.form.get("empty_word", plain[field.name])
+        schema["default"] = plain[field.name] or field.form.get("empty_word", plain[field.name])
     text = _plain(attribute_text(owner, field.name) or "")
     if field.name.endswith("_deg") and "[" not in text:
         text += " [deg]"
-    # beside a reference nothing else counts
-    said = {"allOf": [said]} if "$ref" in said else said
-    return {"description": text, **said} if text else said
+    # JSON schema ignores everything beside a reference
+    schema = {"allOf": [schema]} if "$ref" in schema else schema
+    return {"description": text, **schema} if text else schema
 
 
-def _written(field: Field, said: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of what may be written for a value of a field."""
-    form, single = field.form, [said["items"]] if field.takes_a_number else []
+def _input_schema(field: Field, schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a field with all accepted spellings."""
+    form, single = field.form, [schema["items"]] if field.takes_a_number else []
     if "words" in form:
         item = {"anyOf": [{"type": "number"}, {"enum": list(form["words"])}]}
-        return {**said, "items": item}
+        return {**schema, "items": item}
     if form.get("parts", 1) > 1:
-        said = {**said, "minItems": form["parts"]}
+        schema = {**schema, "minItems": form["parts"]}
     if "empty_word" in form:
         single.append({"const": form["empty_word"]})
-    return {"anyOf": [said, *single]} if single else said
+    return {"anyOf": [schema, *single]} if single else schema
 
 
-def _typed(hint: Any, bounds: Range | None) -> dict[str, Any]:
+def _type_schema(hint: Any, bounds: Range | None) -> dict[str, Any]:
     """Return the schema of a type.
 
     Args:
         hint: The type with its rules.
-        bounds: Of its numbers, by their unit.
+        bounds: Bounds of its numbers, by their unit.
     """
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is Annotated:
-        return _ruled(hint, bounds)
+        return _rule_schema(hint, bounds)
     if origin in (typing.Union, types.UnionType):
-        return {"anyOf": [_member(member, bounds, hint) for member in arguments]}
+        return {"anyOf": [_member_schema(member, bounds, hint) for member in arguments]}
     if origin is list:
-        return {"type": "array", "items": _typed(arguments[0], bounds)}
+        return {"type": "array", "items": _type_schema(arguments[0], bounds)}
     if origin is dict:
-        return {"type": "object", "additionalProperties": _typed(arguments[1], bounds)}
+        return {"type": "object", "additionalProperties": _type_schema(arguments[1], bounds)}
     if hint is np.ndarray:
-        return {"type": "array", "items": _typed(float, bounds)}
+        return {"type": "array", "items": _type_schema(float, bounds)}
     if hint is types.NoneType:
         return {"type": "null"}
     if dataclasses.is_dataclass(hint):
         return {"$ref": f"#/definitions/{hint.__name__}"}  # type: ignore[union-attr]
-    said: dict[str, Any] = {"type": _SCALARS[hint]}
-    return said | (bounds.json() if bounds is not None and hint in (int, float) else {})
+    schema: dict[str, Any] = {"type": _SCALARS[hint]}
+    return schema | (bounds.json() if bounds is not None and hint in (int, float) else {})
 
 
-def _member(member: Any, bounds: Range | None, union: Any) -> dict[str, Any]:
+def _member_schema(member: Any, bounds: Range | None, union: Any) -> dict[str, Any]:
     """Return the schema of a member of a union, with the tag that chooses it as its title."""
-    said = _typed(member, bounds)
-    return {"title": f"!{member.__name__}", "allOf": [said]} if member in _choices(union) else said
+    schema = _type_schema(member, bounds)
+    return (
+        {"title": f"!{member.__name__}", "allOf": [schema]} if member in _choices(union) else schema
+    )
 
 
-def _ruled(hint: Any, bounds: Range | None) -> dict[str, Any]:
+def _rule_schema(hint: Any, bounds: Range | None) -> dict[str, Any]:
     """Return the schema of a type with rules, which are tighter than bounds by units."""
-    said = _typed(typing.get_args(hint)[0], bounds)
+    schema = _type_schema(typing.get_args(hint)[0], bounds)
     for rule in rules_of(hint):
         own = rule.json()
         if isinstance(rule, Range):
-            said = _within(said, own)
+            schema = _tighter_range(schema, own)
         elif isinstance(rule, Numbers):
-            item = _typed(Annotated[float, rule.each], bounds)
-            said = {**said, **own, "items": item}
+            item = _type_schema(Annotated[float, rule.each], bounds)
+            schema = {**schema, **own, "items": item}
         else:
-            said = {**said, **own}
-    return said
+            schema = {**schema, **own}
+    return schema
 
 
-def _within(said: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+def _tighter_range(schema: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     """Return a schema of numbers with the tighter of two bounds on either side."""
     least, most = own.get("exclusiveMinimum", own.get("minimum")), own.get("maximum")
-    if least is not None and least >= said.get("minimum", least):
-        said = {key: value for key, value in said.items() if key != "minimum"}
+    if least is not None and least >= schema.get("minimum", least):
+        schema = {key: value for key, value in schema.items() if key != "minimum"}
     elif least is not None:
         own = {key: value for key, value in own.items() if not key.endswith("inimum")}
-    if most is not None and most > said.get("maximum", most):
+    if most is not None and most > schema.get("maximum", most):
         own = {key: value for key, value in own.items() if key != "maximum"}
-    return {**said, **own}
+    return {**schema, **own}
 
 
 def _plain(text: str) -> str:
-    """Return text of a docstring without its markup, in one line."""
+    """Return docstring text without markup, in one line."""
     return " ".join(_MARKUP.sub(lambda match: match[1] or match[2], text).split())

@@ -1,4 +1,4 @@
-"""Sentences on values that do not fit a schema."""
+"""Messages about values that do not fit a schema."""
 
 import collections.abc
 import dataclasses
@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 
 from pfsc_drake.checks import NUMBER
-from pfsc_drake.errors import shortened
+from pfsc_drake.errors import shorten
 from pfsc_drake.yaml.fields import fields_of
-
-Place = tuple[Any, ...]  # keys and indices, e.g. ("controller", "gains", "eta", 1)
 
 MAX_INTEGER = 2**63 - 1
 _LONG_INTEGER = re.compile(r"[-+]?[0-9]+")
@@ -28,16 +26,8 @@ SCALARS: dict[Any, str] = {
 }
 
 
-def spelled(place: Place) -> str:
-    """Return a place as a path of keys, e.g. ``controller.gains.eta[1]``."""
-    text = ""
-    for step in place:
-        text += f"[{step}]" if type(step) is int and text else f".{step}" if text else f"{step}"
-    return text
-
-
 def range_of_type(kind: Any, value: Any) -> str:
-    """Return the numbers of a type, where a number was refused for its size."""
+    """Return the range of a type in words, where a number was refused for its size."""
     if isinstance(value, str):
         beyond = bool((NUMBER if kind is float else _LONG_INTEGER).fullmatch(value))
     else:
@@ -48,12 +38,12 @@ def range_of_type(kind: Any, value: Any) -> str:
 
 
 def decimal_comma(mapping: dict[Any, Any], name: Any) -> str:
-    """Return what to write for ``{velocity: 0,3}``, where YAML reads a key 3 without value."""
+    """Return a hint for ``{velocity: 0,3}``, where YAML reads a key 3 without value."""
     names = list(mapping)
-    place = names.index(name)
-    if type(name) is not int or mapping[name] is not None or not place:
+    index = names.index(name)
+    if type(name) is not int or mapping[name] is not None or not index:
         return ""
-    before = names[place - 1]
+    before = names[index - 1]
     if type(mapping[before]) is not int:
         return ""
     return f"a decimal comma? write {before}: {mapping[before]}.{name} "
@@ -88,7 +78,7 @@ def alternatives(members: tuple[Any, ...]) -> list[str]:
     ]
 
 
-def shown(value: Any) -> str:
+def value_text(value: Any) -> str:
     """Return a value as written in YAML, shortened to fit a line."""
     if value is None:
         return "empty (null)"
@@ -97,6 +87,6 @@ def shown(value: Any) -> str:
     if isinstance(value, int) and abs(value) > MAX_INTEGER:
         return f"an integer of {value.bit_length()} bits"
     try:
-        return shortened(repr(value))
+        return shorten(repr(value))
     except ValueError:  # an integer inside, of more digits than Python writes
         return f"a {type(value).__name__}"

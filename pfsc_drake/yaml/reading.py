@@ -1,11 +1,11 @@
-"""Reading YAML into plain data, with errors a person can act on, and writing it again.
+"""YAML files as plain data and back, with messages that name file and line.
 
-A mapping with a tag, ``!Circle {radius: 1}``, is held as Drake holds it, with the tag as one more
-key: ``{"radius": 1, "_tag": "!Circle"}``. Drake itself is not imported: it is slow to import and,
-of a key that is there twice, keeps the second without a word.
+A mapping with a tag, ``!Circle {radius: 1}``, has the tag as one more key, as in Drake:
+``{"radius": 1, "_tag": "!Circle"}``. Drake itself is not imported: its import is slow, and it
+silently accepts a key that appears twice.
 
-A document may have MAX_NODES values and keys once its aliases are copies, and MAX_DEPTH levels;
-both are counted before anything is copied.
+A document may have MAX_NODES values and keys after its aliases have been copied, and MAX_DEPTH
+levels; both are counted before anything is copied.
 """
 
 import dataclasses
@@ -16,13 +16,14 @@ from typing import Any, NoReturn
 
 import yaml
 
-from pfsc_drake.errors import InputError, nearest_file, shortened
+from pfsc_drake.errors import InputError, nearest_file, shorten
+from pfsc_drake.yaml.source import KeyPath, join_keys
 
 MAX_BYTES = 1_000_000  # of a YAML file
 
 
 def find_status(path: Path) -> os.stat_result | None:
-    """Returns what the system knows of a path; None if there is no such file, or cannot be."""
+    """Returns the file status of a path; None if there is no such file, or cannot be."""
     try:
         return path.stat()
     except (OSError, ValueError):  # e.g. a name that is too long, a NUL in it
@@ -32,16 +33,16 @@ def find_status(path: Path) -> os.stat_result | None:
 def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
     """Returns the text of a regular file.
 
-    Pipes, devices and folders are refused before they are opened: opening one may wait for ever,
-    and reading one may never end.
+    Pipes, devices and folders are refused before they are opened: opening or reading one may block
+    forever.
 
     Args:
         path: Path of the file; links are followed.
         max_bytes: Largest size that is read.
 
     Raises:
-        InputError: If the file cannot be read, is no regular file, is too large or not UTF-8; one
-            line that names it.
+        InputError: If the file cannot be read, is not a regular file, is too large or not UTF-8;
+            one line with its name.
     """
     try:
         status = path.stat()
@@ -53,7 +54,7 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
                 f"{path}: cannot be read: {status.st_size} bytes; allowed: up to {max_bytes}"
             )
         with path.open("rb") as file:
-            # what grows meanwhile, and what claims to be empty as files of /proc do
+            # a file may grow meanwhile, and files of /proc claim to be empty
             content = file.read(max_bytes + 1)
     except InputError:
         raise
@@ -72,14 +73,14 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
 
 
 def resolve_files(value: Any, folder: Path) -> None:
-    """Makes the names of files in a dataclass absolute, in place, so that it may stand anywhere.
+    """Makes file names in a dataclass absolute, in place, so that it can be saved anywhere.
 
-    Empty names and URIs stay as they are.
+    Empty names and URIs are not changed.
 
     Args:
-        value: Dataclass, or a list or mapping with some in it, whose fields are declared with
-            FILE and NAME_OR_FILE.
-        folder: Where relative names start.
+        value: Dataclass, or a list or mapping of dataclasses, whose fields are declared with FILE
+            and NAME_OR_FILE.
+        folder: Base folder of relative names.
     """
     if isinstance(value, list):
         for item in value:
@@ -93,33 +94,33 @@ def resolve_files(value: Any, folder: Path) -> None:
             if "file" not in field.metadata:
                 resolve_files(content, folder)
             elif isinstance(content, dict):
-                resolved = {key: _resolved(name, folder) for key, name in content.items()}
+                resolved = {key: _absolute_path(name, folder) for key, name in content.items()}
                 setattr(value, field.name, resolved)
             elif field.metadata["file"] or Path(content).suffix:
-                setattr(value, field.name, _resolved(content, folder))
+                setattr(value, field.name, _absolute_path(content, folder))
 
 
-def _resolved(name: str, folder: Path) -> str:
+def _absolute_path(name: str, folder: Path) -> str:
     return str((folder / name).resolve()) if name and "://" not in name else name
 
 
 TAG_KEY = "_tag"
 MAX_NODES = 100_000
 MAX_DEPTH = 100
-_LONGEST_NUMBER = 100  # characters, of one to the base of 60
+_LONGEST_NUMBER = 100  # characters, of a sexagesimal number
 _NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
 class _Loader(yaml.SafeLoader):
-    """Keeps tags; its messages are for people."""
+    """A loader that keeps tags, with readable messages."""
 
 
 class _QuickLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Reads the same from the same text, where nothing is wrong."""
+    """A faster loader with the same results for valid text."""
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Writes tags."""
+    """A dumper that writes tags."""
 
 
 def _construct_tagged(loader: yaml.SafeLoader, tag: str, node: yaml.Node) -> dict[str, Any]:
@@ -148,43 +149,68 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """Reads a file with a mapping at its root.
 
     Args:
-        path: of the file. Root keys that start with ``_`` are private (places for anchors) and
+        path: Path of the file. Root keys that start with ``_`` are private (for anchors) and
             dropped.
 
     Returns:
         The data.
 
     Raises:
-        InputError: if the file is unreadable (see :func:`pfsc_drake.yaml.reading.read_text`),
-            no mapping, or refused by :func:`parse_yaml`. One line that names the file and, where
-            there is one, the line in it.
+        InputError: If the file is unreadable (see :func:`pfsc_drake.yaml.reading.read_text`), has
+            no mapping at its root, or is refused by :func:`parse_yaml`. One line that names the
+            file and, if there is one, the line in it.
     """
-    data = parse_yaml(read_text(path), str(path))
+    return read_with_lines(path)[0]
+
+
+def read_with_lines(path: Path) -> tuple[dict[str, Any], dict[str, int]]:
+    """Reads a file as :func:`read_yaml`, and returns the lines of its keys as well.
+
+    Args:
+        path: Path of the file.
+
+    Returns:
+        The data; and the line of every key and list item by its key path, such as
+        ``controller.gains.eta[1]``, for an alias that of its anchor.
+
+    Raises:
+        InputError: As :func:`read_yaml`.
+    """
+    data, node = _parse(read_text(path), str(path))
     if not isinstance(data, dict):
         kind = "empty" if data is None else f"a {type(data).__name__}"
         raise InputError(f"{path}: the root is {kind}; allowed: a mapping of keys to values")
-    return {
+    lines: dict[str, int] = {}
+    _find_lines(node, (), lines)
+    data = {
         key: value for key, value in data.items() if key == TAG_KEY or not str(key).startswith("_")
     }
+    return data, {key: line for key, line in lines.items() if not key.startswith("_")}
 
 
 def parse_yaml(text: str, source: str) -> Any:
     """Returns the data of a YAML text; aliases (``*name``) become copies.
 
     Args:
-        text: one YAML document.
-        source: name of the text, for messages.
+        text: One YAML document.
+        source: Name of the text, for messages.
 
     Raises:
-        InputError: if the text is invalid, holds a key twice, is too large or too deep once its
-            aliases are copies, or holds characters that no name of a file can have; one line.
+        InputError: If the text is invalid, contains a key twice, is too large or too deep after its
+            aliases have been copied, or contains characters that no file name can have; one line.
     """
+    return _parse(text, source)[0]
+
+
+def _parse(text: str, source: str) -> tuple[Any, yaml.Node | None]:
+    """Return the data of a YAML text, and its nodes with merged keys (``<<``) in place."""
     try:
         _refuse_depth(text, source)
-        loader, node = _composed(text)
+        loader, node = _compose(text)
         if node is not None:
             _NodeCheck(source).check(node)
-        return None if node is None else _without_sharing(loader.construct_document(node))
+        data = None if node is None else _copy_aliases(loader.construct_document(node))
+        return data, node
     except InputError:
         raise
     except RecursionError:
@@ -200,8 +226,23 @@ def parse_yaml(text: str, source: str) -> Any:
         raise InputError(f"{source}: invalid YAML: {' '.join(str(error).split())}") from None
 
 
-def _composed(text: str) -> tuple[Any, yaml.Node | None]:
-    """Return a loader, and the only document of a text as its nodes."""
+def _find_lines(node: yaml.Node | None, key_path: KeyPath, lines: dict[str, int]) -> None:
+    """Add the lines of all keys and list items below a node, by their key paths."""
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            _add_line(key, value, (*key_path, str(key.value)), lines)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            _add_line(item, item, (*key_path, index), lines)
+
+
+def _add_line(start: yaml.Node, value: yaml.Node, key_path: KeyPath, lines: dict[str, int]) -> None:
+    lines[join_keys(key_path)] = start.start_mark.line + 1
+    _find_lines(value, key_path, lines)
+
+
+def _compose(text: str) -> tuple[Any, yaml.Node | None]:
+    """Return a loader, and the nodes of the only document in a text."""
     try:
         quick = _QuickLoader(text)
         return quick, quick.get_single_node()
@@ -211,7 +252,7 @@ def _composed(text: str) -> tuple[Any, yaml.Node | None]:
 
 
 def _refuse_depth(text: str, source: str) -> None:
-    """Count levels without building anything: libyaml builds in recursion.
+    """Check the number of levels without building anything: libyaml builds in recursion.
 
     Raises:
         InputError: If there are more than MAX_DEPTH.
@@ -225,13 +266,13 @@ def _refuse_depth(text: str, source: str) -> None:
                 line = event.start_mark.line + 1
                 break
     except (yaml.YAMLError, ValueError):
-        return  # is explained by what builds it
+        return  # the loader reports it
     if line is not None:
         raise InputError(f"{source}: line {line}: {_TOO_DEEP}")
 
 
 def dump_yaml(data: Any) -> str:
-    """Returns data as YAML text, with tags, in the order of its keys; undoes :func:`parse_yaml`."""
+    """Returns data as YAML text, with tags and in their order; inverse of :func:`parse_yaml`."""
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False)
 
 
@@ -239,7 +280,7 @@ _TOO_DEEP = f"nested too deeply; allowed: up to {MAX_DEPTH} levels"
 
 
 class _NodeCheck:
-    """Refuses what YAML allows and data cannot be; visits what aliases share only once."""
+    """Checks of nodes that YAML allows and plain data cannot represent; shared nodes only once."""
 
     def __init__(self, source: str) -> None:
         self._source = source
@@ -247,7 +288,7 @@ class _NodeCheck:
         self._open: set[int] = set()
 
     def check(self, node: yaml.Node) -> tuple[int, int]:
-        """Returns how many nodes and levels a node has once its aliases are copies."""
+        """Returns the numbers of nodes and levels of a node after its aliases have been copied."""
         key = id(node)
         if key in self._open:
             self._refuse(node, "an alias (*name) contains itself")
@@ -272,26 +313,26 @@ class _NodeCheck:
         depth = 1 + max((depth for _, depth in sizes), default=0)
         if total > MAX_NODES:
             what = f"{total} values and keys, with aliases (*name) written out"
-            self._refuse(node, f"{shortened(what, 100)}; allowed: up to {MAX_NODES}")
+            self._refuse(node, f"{shorten(what, 100)}; allowed: up to {MAX_NODES}")
         if depth > MAX_DEPTH:
             self._refuse(node, _TOO_DEEP)
         return total, depth
 
     def _refuse_duplicate_keys(self, node: yaml.MappingNode) -> None:
-        """Raises InputError at the first key that a mapping holds twice."""
-        seen: set[str] = set()
+        """Raises InputError at the first key that appears twice in a mapping."""
+        names: set[str] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
-                if key.value in seen:
+                if key.value in names:
                     where = f"a second time in line {key.start_mark.line + 1}"
-                    name = shortened(repr(key.value))
+                    name = shorten(repr(key.value))
                     raise InputError(f"{self._source}: key {name} appears {where}")
-                seen.add(key.value)
+                names.add(key.value)
 
     def _check_text(self, node: yaml.ScalarNode) -> None:
         """Raises InputError at a character that neither files nor their names can have."""
         if any(character == "\0" or "\ud800" <= character <= "\udfff" for character in node.value):
-            text = shortened(ascii(node.value))
+            text = shorten(ascii(node.value))
             self._refuse(node, f"{text} holds a NUL or half a character; allowed: text")
         if node.tag in _NUMBER_TAGS and ":" in node.value and len(node.value) > _LONGEST_NUMBER:
             length = len(node.value)
@@ -301,10 +342,10 @@ class _NodeCheck:
         raise InputError(f"{self._source}: line {node.start_mark.line + 1}: {reason}")
 
 
-def _without_sharing(data: Any) -> Any:
-    """Data in which aliases are copies, so that a change to it changes one place only."""
+def _copy_aliases(data: Any) -> Any:
+    """Return data in which aliases are copies, so that a change affects one of them only."""
     if isinstance(data, dict):
-        return {key: _without_sharing(value) for key, value in data.items()}
+        return {key: _copy_aliases(value) for key, value in data.items()}
     if isinstance(data, list):
-        return [_without_sharing(value) for value in data]
+        return [_copy_aliases(value) for value in data]
     return data

@@ -1,8 +1,8 @@
-"""Rules of values, declared on the fields of dataclasses that people fill in.
+"""Rules of values, declared on the fields of parameter dataclasses.
 
-A rule is the metadata of an annotated type, and is declared once for everybody who needs it: it is
-checked where an object is made, in Python or from a file (:mod:`pfsc_drake.yaml.typed`), and told
-by the reference of keys and the JSON schema of editors (:mod:`pfsc_drake.yaml.json_schema`)::
+A rule is metadata of an annotated type, declared once for all its uses: it is checked when an
+object is created, in Python or from a file (:mod:`pfsc_drake.yaml.typed`), and appears in the
+reference of keys and in the JSON schema for editors (:mod:`pfsc_drake.yaml.json_schema`)::
 
     @dataclass
     class Tank(Parameters):
@@ -11,7 +11,7 @@ by the reference of keys and the JSON schema of editors (:mod:`pfsc_drake.yaml.j
         kind: Annotated[str, OneOf(KINDS)] = "soft"
 
         def __post_init__(self) -> None:
-            super().__post_init__()  # what each field allows, then what they allow each other
+            super().__post_init__()  # rules of single fields, then checks across fields
             require(self.initial <= self.capacity, "initial", self.initial, "capacity or less")
 """
 
@@ -30,10 +30,10 @@ from pfsc_drake.errors import require, require_one_of
 
 
 class Rule:
-    """What a value must be; ``str`` of it says so in words."""
+    """Requirement on a value; ``str`` returns it in words."""
 
     def allows(self, value: Any) -> bool:
-        """Return whether a value is allowed; one of another type may raise TypeError."""
+        """Return whether a value is allowed; a value of another type may raise TypeError."""
         raise NotImplementedError
 
     def check(self, key: str, value: Any) -> None:
@@ -48,18 +48,18 @@ class Rule:
         """
         try:
             good = bool(self.allows(value))
-        except (TypeError, ValueError):  # text where there must be a number
+        except (TypeError, ValueError):  # text instead of a number
             good = False
         require(good, key, value, str(self))
 
     def json(self) -> dict[str, Any]:
-        """Return what a JSON schema says of a value."""
+        """Return the JSON schema of the rule."""
         return {}
 
 
 @dataclasses.dataclass(frozen=True)
 class Range(Rule):
-    """A number within a range; NaN is in none.
+    """A number within a range; NaN is never within.
 
     Attributes:
         least: Smallest number.
@@ -67,9 +67,9 @@ class Range(Rule):
         unit: Unit, empty for none.
         open: Whether ``least`` itself is refused.
         below: Whether ``most`` itself is refused.
-        besides: A number outside that is allowed, too, such as 0 for none.
+        besides: A number outside the range that is allowed too, such as 0 for none.
         infinite: Whether infinity stands for no limit.
-        words: What is allowed, where it is not to be said as numbers.
+        words: Allowed values in words, instead of the numbers.
     """
 
     least: float = -math.inf
@@ -119,15 +119,15 @@ class Range(Rule):
         return f"above {self.least:g}" if self.open else f"{self.least:g} or more"
 
     def json(self) -> dict[str, Any]:
-        """Return the range as a JSON schema has it."""
+        """Return the range as JSON schema."""
         ends = {
             "exclusiveMinimum" if self.open else "minimum": self.least,
             "exclusiveMaximum" if self.below else "maximum": math.inf
             if self.infinite
             else self.most,
         }
-        said: dict[str, Any] = {key: end for key, end in ends.items() if math.isfinite(end)}
-        return said if self.besides is None else {"anyOf": [{"const": self.besides}, said]}
+        schema: dict[str, Any] = {key: end for key, end in ends.items() if math.isfinite(end)}
+        return schema if self.besides is None else {"anyOf": [{"const": self.besides}, schema]}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,12 +135,12 @@ class Numbers(Rule):
     """A list or an array of finite numbers.
 
     Attributes:
-        count: How many they are; None for any number of them.
-        each: What each of them may be.
-        fewest: How many there must be, where their number is free.
-        empty: Whether there may be none, where it is not.
-        some: Whether one must not be zero.
-        words: What is allowed, where it is not to be said as numbers.
+        count: Length; None for any length.
+        each: Range of each number.
+        fewest: Smallest length, if the length is free.
+        empty: Whether the list may be empty although its length is fixed.
+        some: Whether at least one number must not be zero.
+        words: Allowed values in words, instead of the numbers.
     """
 
     count: int | None = None
@@ -151,7 +151,7 @@ class Numbers(Rule):
     words: str = ""
 
     def allows(self, value: Any) -> bool:
-        """Return whether numbers are as many as is said, and each is allowed."""
+        """Return whether the numbers have the required length and each is allowed."""
         if self.empty and len(value) == 0:
             return True
         shape = np.shape(value)
@@ -159,15 +159,15 @@ class Numbers(Rule):
         return fits and all(map(self.each.allows, value)) and (not self.some or any(value))
 
     def __str__(self) -> str:
-        """Return what is allowed in words."""
+        """Return the allowed values in words."""
         if self.words:
             return self.words
         count = "" if self.count is None else f"{self.count} "
-        said = f"{count}numbers, not all zero" if self.some else f"{count}{self._each()}"
-        return f"empty, or {said}" if self.empty else said
+        text = f"{count}numbers, not all zero" if self.some else f"{count}{self._each()}"
+        return f"empty, or {text}" if self.empty else text
 
     def _each(self) -> str:
-        """Return what each may be in words, of them all."""
+        """Return the range of each number in words, in the plural."""
         each = self.each
         most = f" at most {each.most:g} {each.unit}".rstrip() if each.most < math.inf else ""
         if each.least == -each.most:
@@ -178,11 +178,11 @@ class Numbers(Rule):
         return f"numbers from {each}"
 
     def json(self) -> dict[str, Any]:
-        """Return what a JSON schema says of the list."""
-        said: dict[str, Any] = {"minItems": self.fewest} if self.fewest else {}
+        """Return the JSON schema of the list."""
+        schema: dict[str, Any] = {"minItems": self.fewest} if self.fewest else {}
         if self.count is not None:
-            said = {"minItems": 0 if self.empty else self.count, "maxItems": self.count}
-        return {**said, "items": {"type": "number", **self.each.json()}}
+            schema = {"minItems": 0 if self.empty else self.count, "maxItems": self.count}
+        return {**schema, "items": {"type": "number", **self.each.json()}}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,8 +192,8 @@ class Count(Rule):
     Attributes:
         least: Fewest items.
         most: Most items; None for any number.
-        empty: Whether there may be none, too.
-        words: What is allowed, where it is not to be said as numbers.
+        empty: Whether it may be empty, too.
+        words: Allowed values in words, instead of the numbers.
     """
 
     least: int
@@ -202,24 +202,24 @@ class Count(Rule):
     words: str = ""
 
     def allows(self, value: Any) -> bool:
-        """Return whether there are as many items as is said."""
+        """Return whether the length is allowed."""
         if self.empty and len(value) == 0:
             return True
         return self.least <= len(value) and (self.most is None or len(value) <= self.most)
 
     def check(self, key: str, value: Any) -> None:
-        """Refuse too few or too many; see :meth:`Rule.check`."""
+        """Refuse too few or too many items; see :meth:`Rule.check`."""
         blocks = any(map(dataclasses.is_dataclass, value))
         require(self.allows(value), key, f"{len(value)} given" if blocks else value, str(self))
 
     def __str__(self) -> str:
-        """Return what is allowed in words."""
+        """Return the allowed lengths in words."""
         return self.words or (
             f"{self.least} to {self.most}" if self.most else f"{self.least} or more"
         )
 
     def json(self) -> dict[str, Any]:
-        """Return what a JSON schema says of the list."""
+        """Return the JSON schema of the list."""
         return {"minItems": 0 if self.empty else self.least} | (
             {"maxItems": self.most} if self.most else {}
         )
@@ -236,11 +236,11 @@ class OneOf(Rule):
     allowed: Sequence[str]
 
     def allows(self, value: Any) -> bool:
-        """Return whether a word is one of those that are allowed."""
+        """Return whether a word is allowed."""
         return value in self.allowed
 
     def check(self, key: str, value: Any) -> None:
-        """Refuse another word, and name the nearest; see :meth:`Rule.check`."""
+        """Refuse any other word, and suggest the nearest; see :meth:`Rule.check`."""
         require_one_of(key, value, self.allowed)
 
     def __str__(self) -> str:
@@ -248,7 +248,7 @@ class OneOf(Rule):
         return ", ".join(self.allowed)
 
     def json(self) -> dict[str, Any]:
-        """Return the words as a JSON schema has them."""
+        """Return the words as JSON schema."""
         return {"enum": list(self.allowed)}
 
 
@@ -268,7 +268,7 @@ Positives = Annotated[list[float], Numbers(each=Range(0.0, open=True))]
 
 
 class Parameters:
-    """Base of a dataclass whose fields have rules: it is checked as it is made.
+    """Base of a dataclass whose fields have rules, checked when it is created.
 
     A dataclass with checks across fields calls ``super().__post_init__()`` first.
     """
@@ -277,7 +277,7 @@ class Parameters:
         """Check each field.
 
         Raises:
-            InputError: If one has a value that its rules refuse.
+            InputError: If a value violates a rule of its field.
         """
         owner: Any = type(self)
         for name, hint in ruled_fields(owner).items():
@@ -285,10 +285,10 @@ class Parameters:
 
 
 def check_value(hint: Any, key: str, value: Any) -> None:
-    """Refuse a value that a rule of its type refuses, or of the types within.
+    """Refuse a value that violates a rule of its type, or of inner types.
 
     Args:
-        hint: Its type, with rules; null, where the type has it, has none.
+        hint: Its type, with rules; null, if the type allows it, has none.
         key: Its key, for the message.
         value: The value.
 
@@ -304,8 +304,8 @@ def check_value(hint: Any, key: str, value: Any) -> None:
         check_value(arguments[0], key, value)
     elif origin in (typing.Union, types.UnionType):
         for member in arguments:
-            # what is a word is none of the numbers that may stand in its place
-            if isinstance(value, str) == (_bare(member) is str):
+            # a word is checked as text, not as one of the numbers that may replace it
+            if isinstance(value, str) == (_without_rules(member) is str):
                 check_value(member, key, value)
     elif origin is list and isinstance(value, list) and has_rules(arguments[0]):
         for index, item in enumerate(value):
@@ -322,19 +322,19 @@ def rules_of(hint: Any) -> list[Rule]:
 
 
 def has_rules(hint: Any) -> bool:
-    """Return whether a type, or one within, has a rule."""
+    """Return whether a type, or one of its inner types, has a rule."""
     return bool(rules_of(hint)) or any(map(has_rules, typing.get_args(hint)))
 
 
 @cache
 def ruled_fields(owner: type) -> dict[str, Any]:
-    """Return the types, with rules, of those fields of a dataclass that have some."""
+    """Return the types, with rules, of the fields of a dataclass that have rules."""
     hints = typing.get_type_hints(owner, include_extras=True)
     names = [field.name for field in dataclasses.fields(owner)]
     return {name: hints[name] for name in names if has_rules(hints[name])}
 
 
-def _bare(hint: Any) -> Any:
+def _without_rules(hint: Any) -> Any:
     """Return a type without its rules."""
     return typing.get_args(hint)[0] if typing.get_origin(hint) is Annotated else hint
 

@@ -100,7 +100,7 @@ def _replay(
     world: dict[str, np.ndarray] | None,
 ) -> Callable[[], Simulator]:
     builder, period = DiagramBuilder(), settings.controller.sampling_time
-    part = add_arm(builder, StationOptions(settings, SCENARIO_DIRECTORY).belief_source)
+    part = add_arm(builder, StationOptions(settings, SCENARIO_DIRECTORY).nominal_model_source)
 
     def told(values: np.ndarray, ahead: float = 0.0) -> OutputPort:
         begins = times[: len(values)] - ahead
@@ -145,7 +145,7 @@ def _replay(
     def start() -> Simulator:
         alone = Simulator(diagram)
         configure(alone, _SCHEME, period)
-        part.place(part.plant.GetMyMutableContextFromRoot(alone.get_mutable_context()), x)
+        part.set_state(part.plant.GetMyMutableContextFromRoot(alone.get_mutable_context()), x)
         return alone
 
     x = station.initial_state

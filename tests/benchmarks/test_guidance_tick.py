@@ -17,10 +17,10 @@ from diagrams.scenario import Scenario
 from experiments.integration import choose_integration
 from experiments.scenario_file import find_scenario
 from experiments.simulation import configure
-from pfsc_drake.control.fixtures.fixture_guidance import LedTool
+from pfsc_drake.control.fixtures.command_dynamics import ServoDynamics
+from pfsc_drake.control.fixtures.fixture_guidance import GuidedTool
 from pfsc_drake.control.fixtures.fixture_parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
-from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
 from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.geometry.shapes.sphere import SphereRegion
@@ -44,9 +44,9 @@ def test_rules_alone(benchmark, place):
     regions = [HalfSpace([0, 0, 0], normal) for normal in ([0, 0, 1], [1, 0, 0], [0, 1, 0])]
     regions += [SphereRegion(centre, 0.05, inside=False) for centre in far]
     parameters = GuidanceParameters()
-    tool = LedTool(
+    tool = GuidedTool(
         point([]).motion,
-        ServoLead(5e-3, 2e-3, PERIOD),
+        ServoDynamics(5e-3, 2e-3, PERIOD),
         Admittance(3.0, 90.0, PERIOD),
         REGIONS,
         near_rows(regions, reaches(parameters, PERIOD, [0.0] * REGIONS)),

@@ -139,7 +139,7 @@ class Chain:
         self._value = self.diagram.get_input_port().FixValue(self.context, self.states[0])
         self._drive = self.diagram.get_output_port()
         inner = projector.GetMyMutableContextFromRoot(self.context)
-        projector.set_state(inner, "place", np.array([THETA]))
+        projector.set_state(inner, "projection", np.array([THETA]))
         self.diagram.ExecuteInitializationEvents(self.context)
         self._start, self._tick = self.context.Clone(), 0
 
@@ -229,6 +229,6 @@ def test_law(chain, benchmark):
     state = rows @ chain.states[0]
     point = chain.path.evaluator(r).evaluate_at(THETA)
     reference, integral = np.zeros((r + 1) * m), np.zeros(m)
-    last_held = np.zeros(linearization.num_joints)
-    result = benchmark(chain.law.evaluate, state, point, reference, integral, last_held)
+    last_varying_input = np.zeros(linearization.num_joints)
+    result = benchmark(chain.law.evaluate, state, point, reference, integral, last_varying_input)
     assert np.all(np.isfinite(result))

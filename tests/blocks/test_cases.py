@@ -45,7 +45,7 @@ def test_no_case_at_all():
 
 
 def test_the_first_that_is_found_stays(evaluate):
-    assert evaluate(cases.latched, [0.0, 0.0, 4.0, 4.0], [0.0, 3.0, 0.0, 5.0]).tolist() == [
+    assert evaluate(cases.latch, [0.0, 0.0, 4.0, 4.0], [0.0, 3.0, 0.0, 5.0]).tolist() == [
         0,
         3,
         4,
@@ -78,5 +78,5 @@ def test_the_least_of_those_that_count(evaluate):
 
 
 @pytest.mark.parametrize(("which", "expected"), [(1.0, [0, 1, 0]), (-1.0, [0, 0, 0])])
-def test_a_one_at_a_place(evaluate, which, expected):
+def test_a_one_at_an_index(evaluate, which, expected):
     assert evaluate(lambda k: cases.unit(k, 3), [which]).tolist() == expected

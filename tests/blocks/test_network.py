@@ -31,7 +31,7 @@ class Lag(Block):
 
 
 class Clock(Block):
-    """``y = 10 t + u``, and how often it was asked."""
+    """``y = 10 t + u``, with a count of its evaluations."""
 
     def __init__(self):
         self.inputs, self.outputs, self.states = {"u": Port(1)}, {"y": Port(1)}, {"asked": 1}
@@ -167,7 +167,7 @@ def test_stages_share_what_they_evaluate():
     assert sorted(calls) == 2 * ["Lag_output_0"] + 2 * ["Lag_output_1"] + 2 * ["Lag_update_0"]
 
 
-def test_what_is_found_on_the_way_is_remembered_and_not_put_out():
+def test_inner_values_reach_the_update_and_no_output():
     stepper = Stepper(Square())
     outs = [stepper.step(u=float(u)) for u in range(4)]
     assert [set(out) for out in outs] == 4 * [{"y"}]
@@ -220,7 +220,7 @@ def test_unfed_inputs_are_named():
 
 
 def test_what_is_remembered_is_evaluated_with_the_stage_that_needs_as_much():
-    """One function then, of what two would tell; a lag's bias is needed by its update alone."""
+    """One function instead of two; a lag's bias is needed by its update alone."""
     assert Program(Network.of(Lag())).update_stage is None
     program = Program(Network.of(Square()))
     k = program.update_stage
@@ -245,9 +245,9 @@ def test_a_network_without_what_some_outputs_do_not_need():
         {"far": ("other", "lagged"), "near": ("lag", "lagged")},
     )
     whole = wiring.network()
-    near = whole.restricted(["near"])
+    near = whole.subnetwork(["near"])
     assert set(near.states) == {"lag.value"} and list(near.outputs) == ["near"]
-    far = whole.restricted(["far", "near"])
+    far = whole.subnetwork(["far", "near"])
     assert set(far.states) == {"lag.value", "other.value"} and list(far.outputs) == ["far", "near"]
     steppers = [Stepper(network) for network in (whole, near, far)]
     for k in range(4):

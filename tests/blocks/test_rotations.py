@@ -30,7 +30,7 @@ def vectors(*sizes):
 
 
 def test_rotation_vectors_are_scipys():
-    """Of small turns, of any, and of nearly half a turn about all axes."""
+    """Small rotations, any rotations, and nearly half a turn about all axes."""
     random = np.random.default_rng(0)
     R = ca.MX.sym("R", 3, 3)
     function = ca.Function("f", [R], [rotation_vector(R)])

@@ -11,7 +11,7 @@ from pfsc_drake.blocks.slope import NetworkSlope
 
 
 class Pendulum(Block):
-    """``y = sin(x) u``, ``x+ = x + y cos(x)``, a state that stays, one that nobody asks for."""
+    """``y = sin(x) u``, ``x+ = x + y cos(x)``, a constant state, and an unused one."""
 
     inputs, outputs, states = {"u": Port(1)}, {"y": Port(1)}, {"x": 1, "kept": 1, "unheard": 1}
 
@@ -68,8 +68,8 @@ def test_the_derivative_is_that_of_the_whole_step():
 
 def test_what_an_output_depends_on_sooner_or_later():
     at = NetworkSlope(pendulums()).at(X, U, 0)
-    told = {"one.x", "one.kept", "two.x", "two.kept"}
-    assert set(at.reaching(["two.y"])) == told
+    states_found = {"one.x", "one.kept", "two.x", "two.kept"}
+    assert set(at.reaching(["two.y"])) == states_found
     assert set(at.reaching(["one.y"])) == {"one.x", "one.kept"}
 
 

@@ -1,4 +1,4 @@
-"""What only leads vectors from one place to another, on numbers."""
+"""Blocks that route vectors, with numbers."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Linear, Rows, Sum
 
 @pytest.mark.parametrize("size", [1, 3])
 @pytest.mark.parametrize("ticks", [1, 2, 5])
-def test_what_is_held_came_in_so_many_ticks_before(size, ticks):
+def test_hold_delays_by_its_ticks(size, ticks):
     values = np.random.default_rng(ticks).normal(size=(12, size))
     hold = Stepper(Hold(size, ticks))
     held = np.array([hold.step(value=value)["held"] for value in values])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.block import Block, Port
-from pfsc_drake.blocks.cases import all_finite, latched, where
+from pfsc_drake.blocks.cases import all_finite, latch, where
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.codegen.c_controller import CController, CFault
@@ -22,7 +22,7 @@ FLAGS = ["-std=c99", "-O1", *WARNINGS, "-shared", "-fPIC"]
 
 
 class Damper(Block):
-    """A torque against the velocity, off after an input that is no number; and a sum of it."""
+    """A torque against the velocity, off after an input that is not finite; and its sum."""
 
     def __init__(self):
         self.inputs = {"joint_state": Port(4, "rad, rad/s"), "gain": Port(1)}
@@ -33,7 +33,7 @@ class Damper(Block):
         return {"sum": u.joint_state[:2]}
 
     def output(self, x, u, t):
-        fault = latched(x.fault, where(all_finite(u.joint_state, u.gain), 0.0, 3.0))
+        fault = latch(x.fault, where(all_finite(u.joint_state, u.gain), 0.0, 3.0))
         torque = where(fault, 0.0, -u.gain * u.joint_state[2:] + x.set)
         return {"drive_torque": torque, "int": x.sum + t, "fault": fault}
 
@@ -49,15 +49,15 @@ def fixture_controller():
 
 def test_the_interface_says_what_there_is(controller, tmp_path):
     controller.write(tmp_path)
-    said = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))
-    assert said["inputs"] == [
+    interface_data = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))
+    assert interface_data["inputs"] == [
         {"name": "joint_state", "size": 4, "unit": "rad, rad/s"},
         {"name": "gain", "size": 1, "unit": ""},
     ]
-    assert [port["name"] for port in said["outputs"]] == ["drive_torque", "int", "fault"]
-    assert said["sampling_time"] == 1e-3
-    assert said["state_bytes"] == 8 * (2 + 4)
-    assert said["scenario"] == "damper"
+    assert [port["name"] for port in interface_data["outputs"]] == ["drive_torque", "int", "fault"]
+    assert interface_data["sampling_time"] == 1e-3
+    assert interface_data["state_bytes"] == 8 * (2 + 4)
+    assert interface_data["scenario"] == "damper"
 
 
 @pytest.mark.parametrize(
@@ -73,8 +73,11 @@ def test_units_are_those_of_the_joints(turning, joints, drives):
     block = Damper()
     block.inputs = block.inputs | {"joint_state": Port(4, "rad, rad/s or m, m/s")}
     block.outputs = block.outputs | {"drive_torque": Port(2, "Nm or N")}
-    said = CController.of(Network.of(block), 1e-3, turning=turning).interface()
-    assert (said["inputs"][0]["unit"], said["outputs"][0]["unit"]) == (joints, drives)
+    interface_data = CController.of(Network.of(block), 1e-3, turning=turning).interface()
+    assert (interface_data["inputs"][0]["unit"], interface_data["outputs"][0]["unit"]) == (
+        joints,
+        drives,
+    )
 
 
 @needs_gcc
@@ -203,9 +206,12 @@ def test_a_fault_that_is_no_number_of_one_is_a_fault(sanitized, bad):
 
 def test_every_fault_has_a_sentence(controller, tmp_path):
     controller.write(tmp_path)
-    said = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))["faults"]
-    assert said["0"] == "no fault" and "before controller_initialize" in said["101"]
-    assert {*map(int, said)} == {*Fault, *CFault}
+    interface_data = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))["faults"]
+    assert (
+        interface_data["0"] == "no fault"
+        and "before controller_initialize" in interface_data["101"]
+    )
+    assert {*map(int, interface_data)} == {*Fault, *CFault}
     assert max(Fault) < min(CFault)
 
 

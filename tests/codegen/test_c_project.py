@@ -1,4 +1,4 @@
-"""The door to C: a diagram of blocks, written with a record that C repeats."""
+"""Export to C: a diagram of blocks, written with a record that C repeats."""
 
 import json
 import subprocess
@@ -42,10 +42,10 @@ def diagram(*, more=None):
 
 def test_what_is_written(tmp_path):
     exported = export(diagram(), tmp_path / "new")
-    said = json.loads((tmp_path / "new" / "interface.json").read_text(encoding="utf-8"))
-    assert said == exported.interface()
-    assert said["sampling_time"] == 2e-3
-    assert [port["name"] for port in said["inputs"]] == ["joint_state", "gain"]
+    interface_data = json.loads((tmp_path / "new" / "interface.json").read_text(encoding="utf-8"))
+    assert interface_data == exported.interface()
+    assert interface_data["sampling_time"] == 2e-3
+    assert [port["name"] for port in interface_data["inputs"]] == ["joint_state", "gain"]
     names = {file.name for file in (tmp_path / "new").iterdir()}
     assert {"main_rt.c", "replay.c", "Makefile", "CMakeLists.txt", "README.md"} <= names
     assert "replay.bin" not in names
@@ -87,8 +87,8 @@ def test_a_record_has_the_order_of_the_interface(tmp_path):
 
 def test_the_header_says_what_interface_json_does(tmp_path):
     export(diagram(), tmp_path)
-    said = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))
-    assert [port["unit"] for port in said["outputs"]] == ["Nm", "", ""]
+    interface_data = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))
+    assert [port["unit"] for port in interface_data["outputs"]] == ["Nm", "", ""]
     header = (tmp_path / "controller.h").read_text(encoding="utf-8")
     for line in (
         "#define CONTROLLER_SAMPLING_TIME 0.002 /* s */",

@@ -46,12 +46,12 @@ def test_shared_arrays_need_no_copy(code):
 
 
 def test_it_is_compiled_when_bound(monkeypatch):
-    asked = []
-    monkeypatch.setattr(bound_function, "native_code", asked.append)
+    compiled_names = []
+    monkeypatch.setattr(bound_function, "native_code", compiled_names.append)
     bound = BoundFunction(FUNCTION)
-    assert len(asked) == 1
+    assert len(compiled_names) == 1
     check_values(bound)
-    assert len(asked) == 1
+    assert len(compiled_names) == 1
 
 
 def test_evaluate_keeps_code_and_arrays_alive(code):

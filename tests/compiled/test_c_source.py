@@ -32,9 +32,9 @@ def operations():
 def indices():
     module = test_computed_indices
     grid = ca.DM([-2.0, -1.0, 0.5, 3.0, 5.0, 6.5, 7.0])
-    places = [ca.low(grid, module.X, {"lookup_mode": m}) for m in ("linear", "binary", "exact")]
+    look_ups = [ca.low(grid, module.X, {"lookup_mode": m}) for m in ("linear", "binary", "exact")]
     read = {name: e for name, e in module.READ.items() if name != "rows of columns"}
-    results = [*read.values(), *module.WRITTEN.values(), *places]
+    results = [*read.values(), *module.WRITTEN.values(), *look_ups]
     return ca.Function("indices", [module.X, module.V, module.K, module.J, module.A], results)
 
 
@@ -56,7 +56,7 @@ FUNCTIONS = {
 
 @pytest.fixture(scope="module", name="compiled")
 def fixture_compiled(tmp_path_factory):
-    """Return what calls the functions, as compiled at once; every warning is an error."""
+    """Return what calls the functions, as compiled together; every warning is an error."""
     folder = tmp_path_factory.mktemp("source")
     for name, text in c_source(FUNCTIONS, "test").items():
         (folder / name).write_text(text)
@@ -76,17 +76,17 @@ def test_results(name, compiled):
     evaluate.restype = None
     pointer = ctypes.POINTER(ctypes.c_double)
     for k in range(60):
-        given = []
+        passed = []
         for i in range(function.n_in()):
             size = function.nnz_in(i)
             values = [rng.normal(size=size), rng.integers(-2, 8, size).astype(float)][k % 2]
             odd = rng.choice(SPECIAL, size)
-            given.append(np.where(rng.uniform(size=size) < 0.4 * (k % 3), odd, values))
+            passed.append(np.where(rng.uniform(size=size) < 0.4 * (k % 3), odd, values))
         results = [np.full(function.nnz_out(i), 7.0) for i in range(function.n_out())]
-        evaluate(*[a.ctypes.data_as(pointer) for a in [*given, *results]])
+        evaluate(*[a.ctypes.data_as(pointer) for a in [*passed, *results]])
         buffer, interpreted = function.buffer()
         expected = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
-        for i, values in enumerate(given):
+        for i, values in enumerate(passed):
             buffer.set_arg(i, values.data)
         for i, values in enumerate(expected):
             buffer.set_res(i, values.data)

@@ -27,8 +27,8 @@ def tick():
     m, law = linearization.num_outputs, linearization.function
     A, rhs = ca.SX.sym("A", m, n), ca.SX.sym("rhs", m)
     inverse = ca.Function("inverse", [A, rhs], [ca.densify(x) for x in solve(A, rhs)])
-    given = [ca.MX.sym(law.name_in(i), law.sparsity_in(i)) for i in range(law.n_in())]
-    state, *others = given
+    symbols = [ca.MX.sym(law.name_in(i), law.sparsity_in(i)) for i in range(law.n_in())]
+    state, *others = symbols
     v, before, results = ca.MX.sym("v", m), ca.MX.sym("before", n), []
     last = before
     table = ca.DM(np.linspace(0.0, 2.0, 120))
@@ -36,14 +36,19 @@ def tick():
         _, A, b, gain, drift, offset, _ = law(state, *others)
         x, rcond = inverse(A, v - b)
         speed = state[n : 2 * n]
-        place = ca.low(table, ca.norm_2(speed))
-        held = gain @ x + drift
-        lead = ca.if_else(place > 60.0, 0.5, 0.0)
-        wanted = held + lead * (held - last) + offset + ca.sin(ca.MX(table)[place] * speed)
-        drive = ca.fmin(ca.fmax(wanted, -100.0), 100.0)
+        found_index = ca.low(table, ca.norm_2(speed))
+        base_value = gain @ x + drift
+        lead = ca.if_else(found_index > 60.0, 0.5, 0.0)
+        command = (
+            base_value
+            + lead * (base_value - last)
+            + offset
+            + ca.sin(ca.MX(table)[found_index] * speed)
+        )
+        drive = ca.fmin(ca.fmax(command, -100.0), 100.0)
         results.append(ca.if_else(rcond > 1e-12, drive, ca.MX.zeros(n), True))
         state, last = 0.999 * state, results[-1]
-    return ca.Function("tick", [*given, v, before], results)
+    return ca.Function("tick", [*symbols, v, before], results)
 
 
 def test_law():

@@ -47,8 +47,8 @@ def derivative(expression):
 WRITTEN = {
     "assigned": assigned(add=False),
     "added": assigned(add=True),
-    "derivative of what is read": derivative(ca.sin(X)[K]),
-    "derivative of what is read twice": derivative(X[ca.vertcat(K, K)] ** 2),
+    "derivative of read elements": derivative(ca.sin(X)[K]),
+    "derivative of elements read twice": derivative(X[ca.vertcat(K, K)] ** 2),
     "read again": assigned(add=False)[J] + X[J],
 }
 
@@ -70,10 +70,10 @@ def test_look_up(grid, mode):
     x = ca.MX.sym("x", 40)
     function = ca.Function("f", [x], [ca.low(grid, x, {"lookup_mode": mode})])
     values = np.array(ca.evalf(grid)).ravel()
-    places = [*values, *np.nextafter(values, 9.0), *np.nextafter(values, -9.0), 0.0, -0.0]
+    points = [*values, *np.nextafter(values, 9.0), *np.nextafter(values, -9.0), 0.0, -0.0]
     odd = [np.nan, np.inf, -np.inf, 1e300, -1e300]
-    for chunk in range(0, len(places), 35):
-        assert_same_bits(*both(function, np.resize([*places[chunk : chunk + 35], *odd], 40)))
+    for chunk in range(0, len(points), 35):
+        assert_same_bits(*both(function, np.resize([*points[chunk : chunk + 35], *odd], 40)))
 
 
 @pytest.mark.parametrize("mode", ["linear", "binary", "exact"])
@@ -85,9 +85,9 @@ def test_look_up_in_an_argument(mode):
 def test_modes_are_not_mixed_up():
     modes = ["exact", "binary", "linear", "exact", "linear"]
     grid = ca.MX(ca.DM([0.0, 5.0, 1.0, 6.0, 2.0, 8.0]))
-    places = [ca.low(grid, V, {"lookup_mode": mode}) for mode in modes]
-    inner = ca.Function("inner", [V], places[:3])
-    assert_agrees(ca.Function("f", [V], [*places[2:], *inner(V + 1.0)]), rounds=100)
+    points = [ca.low(grid, V, {"lookup_mode": mode}) for mode in modes]
+    inner = ca.Function("inner", [V], points[:3])
+    assert_agrees(ca.Function("f", [V], [*points[2:], *inner(V + 1.0)]), rounds=100)
 
 
 def test_what_is_left_to_the_interpreter():

@@ -1,4 +1,4 @@
-"""Tests of what is made once per content."""
+"""Results that are computed once per content."""
 
 import dataclasses
 import functools
@@ -64,7 +64,7 @@ def make(mass=1.0, inertia=3.0, name="link"):
 
 
 @pytest.mark.parametrize(
-    "made",
+    "create",
     [
         lambda: make(),
         lambda: [make(), {"a": (1, 2.5, "b", None, True)}, {"x", "y"}, b"c", slice(1, 3)],
@@ -80,8 +80,8 @@ def make(mass=1.0, inertia=3.0, name="link"):
         lambda: [Link, make, np.sin, np.float64(1.0), float("nan")],
     ],
 )
-def test_equal_content_has_an_equal_key(made):
-    assert content(made()) == content(made())
+def test_equal_content_has_an_equal_key(create):
+    assert content(create()) == content(create())
 
 
 LARGE = np.zeros(1000)
@@ -135,21 +135,21 @@ def test_types_of_equal_names_are_two():
 
 
 def test_what_follows_from_the_rest_does_not_count():
-    asked = Lag(2.0)
-    assert asked.period == 0.5
-    assert content(asked) == content(Lag(2.0))
+    evaluated = Lag(2.0)
+    assert evaluated.period == 0.5
+    assert content(evaluated) == content(Lag(2.0))
 
 
 def test_an_object_may_say_what_decides():
-    class Told:
+    class Reported:
         def __init__(self, value, scratch):
             self.value, self.scratch = value, scratch
 
         def __content__(self):
             return self.value
 
-    assert content(Told(1, 2)) == content(Told(1, 3))
-    assert content(Told(1, 2)) != content(Told(2, 2))
+    assert content(Reported(1, 2)) == content(Reported(1, 3))
+    assert content(Reported(1, 2)) != content(Reported(2, 2))
 
 
 def itself():
@@ -207,7 +207,7 @@ def test_any_change_gives_another():
     assert len(counted.calls) == 5
 
 
-def test_an_argument_that_is_changed_in_place_is_another():
+def test_a_changed_argument_has_other_content():
     counted = Counted()
     link = make()
     before = counted.double(link)
@@ -215,8 +215,8 @@ def test_an_argument_that_is_changed_in_place_is_another():
     assert counted.double(link) is not before
 
 
-def test_only_so_many_are_kept():
-    counted = Counted(most_kept=2)
+def test_the_number_of_results_is_limited():
+    counted = Counted(capacity=2)
     first = counted.double(make(1.0))
     counted.double(make(2.0))
     assert counted.double(make(1.0)) is first  # asked for last
@@ -227,7 +227,7 @@ def test_only_so_many_are_kept():
     assert len(counted.calls) == 4
 
 
-def test_without_content_it_is_made_anew():
+def test_without_content_the_function_is_called_anew():
     calls = []
     count = once_per_content()(lambda system: calls.append(system))
     builder = DiagramBuilder()
@@ -276,7 +276,7 @@ def test_the_digest_of_a_function_is_of_what_it_does():
     assert function_digest(squared(2.0)) != function_digest(squared(2.5))
 
 
-def test_not_all_functions_are_kept(monkeypatch):
+def test_the_number_of_digests_is_limited(monkeypatch):
     monkeypatch.setattr(module, "_MOST_FUNCTIONS", 3)
     for factor in range(10):
         function_digest(squared(factor))

@@ -1,4 +1,4 @@
-"""Machine code of whole functions: kept, loaded, bound, and refused with a reason."""
+"""Machine code of whole functions: stored, loaded, bound, and refused with a reason."""
 
 import gc
 import sys
@@ -19,7 +19,7 @@ FUNCTION = ca.Function("f", [X], [ca.sin(X)])
 def fixture_afresh(monkeypatch, tmp_path):
     """Forget what has been compiled, here and on disk; return the folder for the latter."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(module, "_compiled", {})
+    monkeypatch.setattr(module, "_codes", {})
     return tmp_path / "pfsc_drake" / "machine_code"
 
 
@@ -52,7 +52,7 @@ def test_callable_keeps_code_and_arrays_alive(afresh):
     x = ca.SX.sym("x", 50_000)
     result = np.zeros(1)
     evaluate = native_code(ca.Function("f", [x[:2]], [x[0] + x[1]])).bind([np.ones(2)], [result])
-    module._compiled.clear()
+    module._codes.clear()
     gc.collect(1)  # of all that a process has it takes seconds
     trash = [np.full(2, np.nan) for _ in range(100)]
     evaluate()
@@ -111,19 +111,19 @@ def test_the_next_process_reads_it_from_disk(monkeypatch, afresh):
     translations = Counter(monkeypatch)
     for _ in range(3):
         assert_same_bits(*both(FUNCTION, [0.3, -2.0]))
-        module._compiled.clear()
+        module._codes.clear()
     assert translations.count == 1
     assert len(list(afresh.iterdir())) == 1
 
 
 @pytest.mark.parametrize("damage", [b"", b"short", None])
-def test_a_damaged_file_is_made_again(monkeypatch, afresh, damage):
+def test_a_damaged_file_is_compiled_again(monkeypatch, afresh, damage):
     translations = Counter(monkeypatch)
     native_code(FUNCTION)
     (file,) = afresh.iterdir()
     content = file.read_bytes()
     file.write_bytes(content[:-9] + b"?" + content[-8:] if damage is None else damage)
-    module._compiled.clear()
+    module._codes.clear()
     assert_same_bits(*both(FUNCTION, [0.3, -2.0]))
     assert translations.count == 2
     assert file.read_bytes() == content
@@ -132,7 +132,7 @@ def test_a_damaged_file_is_made_again(monkeypatch, afresh, damage):
 def test_another_maker_makes_it_again(monkeypatch, afresh):
     translations = Counter(monkeypatch)
     native_code(FUNCTION)
-    module._compiled.clear()
+    module._codes.clear()
     monkeypatch.setattr(module, "_maker", lambda: "llvmlite of tomorrow")
     native_code(FUNCTION)
     assert translations.count == 2
@@ -144,9 +144,9 @@ def test_nothing_on_disk_is_needed(monkeypatch, afresh):
     assert_same_bits(*both(FUNCTION, [0.3, -2.0]))
 
 
-def test_what_is_bound_outlives_what_is_kept(monkeypatch):
-    """Of many functions the last ones are kept; code that is in use stays."""
-    monkeypatch.setattr("pfsc_drake.compiled.native_code._MOST_KEPT", 3)
+def test_bound_code_outlives_the_store(monkeypatch):
+    """The last ones of many functions are stored; code in use stays."""
+    monkeypatch.setattr("pfsc_drake.compiled.native_code._MOST_CODES", 3)
     x = ca.SX.sym("x")
     functions = [ca.Function("f", [x], [(k + 0.5) * x]) for k in range(6)]
     results = [np.zeros(1) for _ in functions]

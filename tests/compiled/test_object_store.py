@@ -1,4 +1,4 @@
-"""The store of machine code: what is lost, damaged or shared."""
+"""The store of machine code: lost, damaged and shared files."""
 
 import os
 import threading
@@ -30,7 +30,7 @@ def test_half_a_file_is_none(tmp_path, length):
     assert store.get("key") == CODE
 
 
-def test_the_oldest_give_way(tmp_path):
+def test_the_oldest_are_deleted(tmp_path):
     store = ObjectStore(tmp_path, capacity=10_000)
     for i in range(6):
         store.put(str(i), CODE)

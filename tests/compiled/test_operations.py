@@ -87,10 +87,10 @@ def test_unary_operation(name):
     assert_same_bits(actual, expected)
     for value, result in zip(values.tolist(), actual, strict=True):
         try:
-            wanted = reference(value)
+            expected_value = reference(value)
         except (ValueError, ZeroDivisionError):
             continue
-        assert result == pytest.approx(wanted, rel=4e-16, abs=0)
+        assert result == pytest.approx(expected_value, rel=4e-16, abs=0)
 
 
 @pytest.mark.parametrize("name", BINARY)
@@ -106,10 +106,10 @@ def test_binary_operation(name):
             actual, expected = both(function, a, b)
             assert_same_bits(actual, expected)
             try:
-                wanted = reference(a, b)
+                expected_value = reference(a, b)
             except (ValueError, ZeroDivisionError):
                 continue
-            assert actual[0] == pytest.approx(wanted, rel=4e-16, abs=0)
+            assert actual[0] == pytest.approx(expected_value, rel=4e-16, abs=0)
 
 
 def test_every_known_operation_is_tested():

@@ -107,7 +107,7 @@ def test_a_table_of_all_kinds_of_numbers():
     assert_agrees(ca.Function("f", [Y], [table[Y], table[5], table[3:9].T, 2.0 * table]))
 
 
-def test_functions_of_the_same_name_and_shape_are_told_apart():
+def test_functions_of_the_same_name_and_shape_are_distinguished():
     up, down = (ca.Function("f", [Y], [Y + step]) for step in (1.0, -1.0))
     assert_agrees(ca.Function("g", [Y], [up(Y), down(Y), up(2.0 * Y)]))
 

@@ -1,4 +1,4 @@
-"""A tool that yields to a hand on a user's own path or surface: options of the same call."""
+"""A tool that complies on a user's own path or surface: options of the same call."""
 
 from types import SimpleNamespace
 
@@ -169,7 +169,7 @@ def test_velocity_servos_tell_no_torques_that_forces_are_found_from(path):
 
 
 class Asked(Exception):
-    """What was asked for."""
+    """Arguments of the call."""
 
 
 def ask(*given, **more):
@@ -184,7 +184,7 @@ def impedance_law(kinds, **impedances):
 
 
 def test_a_tool_that_presses_swings_on_no_spring():
-    """The stiffest spring that mass and damping across bear without a swing."""
+    """The stiffest spring without oscillation for mass and damping across."""
     across = CoordinateImpedance(Profile(2.0), Profile(80.0), Profile(0.0))
     kinds = [Kind.TANGENTIAL, Kind.TANGENTIAL, Kind.TRANSVERSAL]
     law, coordinates = impedance_law(kinds, tangential=FREE, transversal=across)
@@ -207,7 +207,7 @@ def test_what_is_rigid_is_made_soft_with_the_mass_along(monkeypatch):
 
 
 def test_limits_that_are_off_limit_nobody(monkeypatch):
-    monkeypatch.setattr(compliance_module, "LedMotion", lambda *_: "limits")
+    monkeypatch.setattr(compliance_module, "GuidedMotion", lambda *_: "limits")
     monkeypatch.setattr(compliance_module, "RobotLimits", lambda *_, **__: None)
     along = PathManifold(2, oriented=False)
     for tangential, on, expected in (

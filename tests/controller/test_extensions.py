@@ -78,7 +78,7 @@ def test_the_weight_of_the_tool_and_the_bias_are_taken_off():
     rest = bench.rest(200, bench.reading())
     assert np.abs(rest["manifold_force"]).max() < 1e-9
     pushed = bench.rest(1, bench.reading(PUSH))
-    place = bench.follower.task.place
+    place = bench.follower.task.projected_manifold
     axes = place.axes(pushed["manifold_point"]).full()
     across = axes[:, 1:3].T @ PUSH[:3]
     np.testing.assert_allclose(pushed["manifold_force"][1:3], across, atol=1e-9)

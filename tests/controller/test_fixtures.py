@@ -1,14 +1,14 @@
-"""What is near a tool that is led by hand, as an expression or by a schedule."""
+"""Regions near a hand-guided tool, as an expression or by a schedule."""
 
 import casadi as ca
 import numpy as np
 import pytest
 
+from pfsc_drake.control.fixtures.command_dynamics import FilterDynamics, ServoDynamics
 from pfsc_drake.control.fixtures.fixture_parameters import Admittance, Fixture
-from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.controller import fixtures as fixtures_module
-from pfsc_drake.controller.fixtures import _robot_limits, make_lead, near_expression
+from pfsc_drake.controller.fixtures import _robot_limits, make_command_dynamics, near_expression
 from pfsc_drake.controller.options.follower_options import FixtureOptions
 from pfsc_drake.controller.tasks.space_task import SpaceTask
 from pfsc_drake.geometry import torus
@@ -21,10 +21,10 @@ BALL = SphereRegion((0.0, 0.0, 0.0), 0.1, inside=False)
 
 def guided(regions, looks=0):
     options = FixtureOptions(looks=looks)
-    lead = make_lead(2, options, PERIOD, lag=0.0, delay=0.0)
+    command_dynamics = make_command_dynamics(2, options, PERIOD, lag=0.0, delay=0.0)
     fixtures = [Fixture(region) for region in regions]
     motion = Admittance(3.0, 60.0, PERIOD)
-    return SpaceTask(SpaceManifold(2), np.zeros(3), fixtures, motion, lead, options, {})
+    return SpaceTask(SpaceManifold(2), np.zeros(3), fixtures, motion, command_dynamics, options, {})
 
 
 def test_what_has_no_formula_is_left_to_a_schedule():
@@ -41,11 +41,11 @@ def test_many_regions_and_those_on_a_budget_are_left_to_a_schedule():
 
 def test_before_servos_their_lag_counts_before_torques_a_filter():
     options = FixtureOptions(smoothing=0.004)
-    servo = make_lead(1, options, PERIOD, lag=0.005, delay=0.002)
-    assert isinstance(servo, ServoLead)
+    servo = make_command_dynamics(1, options, PERIOD, lag=0.005, delay=0.002)
+    assert isinstance(servo, ServoDynamics)
     assert servo.lag == pytest.approx(0.007)
-    filtered = make_lead(3, options, PERIOD, lag=0.005, delay=0.002)
-    assert isinstance(filtered, FilterLead)
+    filtered = make_command_dynamics(3, options, PERIOD, lag=0.005, delay=0.002)
+    assert isinstance(filtered, FilterDynamics)
     assert filtered.lag == pytest.approx(0.008)
 
 

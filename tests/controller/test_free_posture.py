@@ -1,4 +1,4 @@
-"""What joints do that a task leaves free: what their posture may ask of them."""
+"""Posture of redundant joints: limits of speeds and ends."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Guidance by hand of a user's own plant, kept out of regions: one call, and what it refuses."""
+"""Hand guiding of a user's own plant outside of regions: one call, and refused options."""
 
 import dataclasses as dc
 
@@ -22,10 +22,10 @@ from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
-from pfsc_drake.controller.hand_guiding import _told
+from pfsc_drake.controller.hand_guiding import _with_force
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.geometry.regions.moving import CurveCourse, ShiftedRegion
+from pfsc_drake.geometry.regions.moving import CurveMotion, ShiftedRegion
 from pfsc_drake.geometry.shapes.plane import HalfSpace
 from pfsc_drake.robot.models.files import models_directory
 from tests.controller.pulled import Pulled
@@ -44,7 +44,7 @@ def load(builder, name="comau_racer_1_4"):
 
 
 def led(regions, law="rigid", model="comau_racer_1_4", options=None, start=START, guides=()):
-    """Return a led tool at the start."""
+    """Return a guided tool at the start."""
     builder = DiagramBuilder()
     plant = load(builder, model)
     follower = add_guidance(
@@ -64,7 +64,7 @@ def led(regions, law="rigid", model="comau_racer_1_4", options=None, start=START
 def test_laws_of_torques_are_told_of_the_hand(law, told):
     """With derivatives where those count."""
     for tells, expected in ((True, told), (False, ("none", 0.0))):
-        torque = _told(GuidanceOptions(tells_law=tells), law).controller.external_torque
+        torque = _with_force(GuidanceOptions(tells_law=tells), law).controller.external_torque
         assert (torque.source, torque.bandwidth) == expected
 
 
@@ -85,7 +85,7 @@ def test_a_hand_feels_the_mass_and_damping_that_are_given(law, model):
     tool.pull(force)
     tool.run(time)
     assert tool.fault() == Fault.NONE
-    rate, lag = DAMPING / MASS, tool.follower.followed.lead.lag
+    rate, lag = DAMPING / MASS, tool.follower.followed.command_dynamics.lag
     later = time - lag - 1.5e-3
     way = force / DAMPING * (later - (1.0 - np.exp(-rate * later)) / rate)
     moved = tool.pose().translation() - start.translation()
@@ -113,7 +113,7 @@ def test_a_hard_region_holds_the_tool_and_a_soft_one_gives_way():
 @pytest.mark.slow
 def test_a_region_that_rises_lifts_the_tool():
     """A floor that is 20 mm higher after 0.2 s, against a hand that presses with 6 N."""
-    rises = ShiftedRegion(FLOOR, CurveCourse(rest_to_rest([0.0, 0.02], **RISE)), [0.0, 0.0, 1.0])
+    rises = ShiftedRegion(FLOOR, CurveMotion(rest_to_rest([0.0, 0.02], **RISE)), [0.0, 0.0, 1.0])
     tool = led([rises], options=GuidanceOptions(bandwidth=150.0))
     tool.pull([0.0, 0.0, -6.0])
     lowest = np.inf
@@ -149,7 +149,7 @@ def test_a_path_attracts_the_tool_until_the_hand_pulls_it_away():
 
 @pytest.mark.slow
 def test_without_the_hands_force_told_the_law_lets_it_push_the_tool():
-    """What makes `tells_law` worth it: the tool is pushed into the floor."""
+    """Benefit of `tells_law`: without it the tool is pushed into the floor."""
     depths = []
     for tells in (True, False):
         tool = led([FLOOR], options=GuidanceOptions(tells_law=tells))
@@ -202,7 +202,7 @@ def test_servos_are_told_velocities_along_the_pull():
     follower = add_guidance(
         builder, plant, "tool_point", [], "velocity_servo", start=START, options=options
     )
-    assert follower.followed.lead.lag == pytest.approx(0.006)
+    assert follower.followed.command_dynamics.lag == pytest.approx(0.006)
     stepper = follower.stepper()
     for _ in range(2):
         told = stepper.step(plant_state=follower.start_state, wrench=[30.0, 0, 0, 0, 0, 0])

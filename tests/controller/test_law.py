@@ -14,8 +14,8 @@ from pfsc_drake.control.law.laws import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.controller import law as law_module
-from pfsc_drake.controller.believed import Believed
 from pfsc_drake.controller.law import make_law, safe_state, sampled_robot, supervision
+from pfsc_drake.controller.nominal_robot import NominalRobot
 from pfsc_drake.controller.options.follower_options import FaultParameters
 from pfsc_drake.errors import InputError
 
@@ -55,7 +55,7 @@ def test_torques_that_lead(load_arm):
     for leads, lead in ((False, 0.0), (True, 0.5)):
         parameters = controller("rigid", eta, eta, torque_lead=leads)
         assert make(parameters, load_arm("comau_racer_1_4_3r").chain).linearization.lead == lead
-    with pytest.raises(InputError, match="torque_lead = True; allowed: false but with the law"):
+    with pytest.raises(InputError, match="torque_lead = True; allowed: false except with the law"):
         ControllerParameters("elastic", torque_lead=True)
 
 
@@ -89,19 +89,19 @@ def test_after_a_fault_motors_are_braked_by_their_scaled_limits(load_arm):
 
 
 def test_what_is_watched_knows_how_well_motion_is_measured(load_arm):
-    believed = Believed(load_arm("comau_racer_1_4_3r").chain, resolution=1e-5, filter_time=2e-3)
-    watched = supervision("rigid", FaultParameters(), believed)
+    nominal = NominalRobot(load_arm("comau_racer_1_4_3r").chain, resolution=1e-5, filter_time=2e-3)
+    watched = supervision("rigid", FaultParameters(), nominal)
     np.testing.assert_array_equal(watched.resolution, np.full(3, 1e-5))
     assert watched.filter_time == 2e-3
     # servos may stay at their limits of velocity, unless somebody minds
     times = [("rigid", None, 0.2), ("velocity_servo", None, 0.0), ("velocity_servo", 0.3, 0.3)]
     for law, given, expected in times:
-        found = supervision(law, FaultParameters(saturation_time=given), believed)
+        found = supervision(law, FaultParameters(saturation_time=given), nominal)
         assert found.saturation_time == expected
 
 
 def test_poles_are_chosen_for_the_largest_error_and_the_delay(load_arm, monkeypatch):
-    """Of all coordinates, each of which keeps its own bandwidth."""
+    """All coordinates, each with its own bandwidth."""
     chain, asked = load_arm("comau_racer_1_4_elastic_3r").chain, []
     monkeypatch.setattr(law_module, "sampled_robot", lambda parameters, *_: parameters.delay)
     monkeypatch.setattr(law_module, "choose_fast_pole", lambda *given: asked.append(given) or 100.0)
@@ -137,14 +137,23 @@ def test_a_law_at_rest_has_its_delay(load_arm, monkeypatch):
                 "given are elastic; write rigid: {eta: {poles: [-20.0, -20.0]}, xi: {poles: ",
             ),
         ),
-        (controller("rigid", by_poles(-1, -1), GainParameters()), ("gains.rigid.xi", "needs 2")),
+        (
+            controller("rigid", by_poles(-1, -1), GainParameters()),
+            (
+                "gains.rigid.xi: neither poles nor coefficients; allowed: 2 poles (1/s) or 2 "
+                "coefficients with the law 'rigid'",
+            ),
+        ),
         (
             controller("rigid", GainParameters(coefficients=[1.0]), by_poles(-1, -1)),
-            ("controller.gains.rigid.eta", "1 coefficients", "needs 2"),
+            (
+                "controller.gains.rigid.eta.coefficients = [1.0]; allowed: 2 poles (1/s) or 2 "
+                "coefficients with the law 'rigid'",
+            ),
         ),
         (
             controller("rigid", by_poles(-1, -1), by_poles(-1)),
-            ("controller.gains.rigid.xi", "1 gains", "needs 2"),
+            ("controller.gains.rigid.xi.poles = [-1]; allowed: 2 negative numbers",),
         ),
         (
             controller("velocity_servo", GainParameters(free=True), by_poles(-1)),
@@ -152,7 +161,7 @@ def test_a_law_at_rest_has_its_delay(load_arm, monkeypatch):
         ),
         (
             controller("rigid", by_poles(-1, 0), by_poles(-1, -1)),
-            ("controller.gains.rigid.eta", "not Hurwitz"),
+            ("controller.gains.rigid.eta.poles = [-1, 0]; allowed: 2 negative numbers",),
         ),
         (
             controller(
@@ -160,15 +169,19 @@ def test_a_law_at_rest_has_its_delay(load_arm, monkeypatch):
                 GainParameters(coefficients=[1.0, 1.0], integral=1.5),
                 by_poles(-1, -1),
             ),
-            ("eta", "a_0 = 1.5", "not Hurwitz"),
+            (
+                "controller.gains.rigid.eta.coefficients = [1.0, 1.0] with integral = 1.5: not "
+                "Hurwitz, pole at 0.",
+                "allowed: ",
+            ),
         ),
         (
             controller("rigid", by_poles(-1, -1), by_poles(-1, -1), max_alpha=1.5),
-            ("max_alpha", "1.5"),
+            ("controller.max_alpha = 1.5; allowed: above 0, below 1",),
         ),
         (
             controller("rigid", by_poles(-1, -1), by_poles(-1, -1), min_rcond=0.0),
-            ("min_rcond", "0.0"),
+            ("controller.min_rcond = 0.0; allowed: above 0, below 1",),
         ),
     ],
 )

@@ -17,7 +17,7 @@ from pfsc_drake import (
     path_from_waypoints,
     rest_to_rest,
 )
-from pfsc_drake.controller.moving_start import placed
+from pfsc_drake.controller.moving_start import target_in_world
 from pfsc_drake.controller.options.compliance_parameters import ComplianceParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_quaternion
@@ -42,7 +42,7 @@ def turntable(t, order):
 
 
 class Table(LeafSystem):
-    """Tells the table's motion, up to an order, of another length."""
+    """Source of the table's motion, up to an order, of another length."""
 
     def __init__(self, order, told):
         super().__init__()
@@ -124,7 +124,7 @@ def test_wrong_frames_are_refused(path):
     refused("frame", frame=2.0 * turntable(0.0, 0))
     yielding = ComplianceParameters()
     yielding.tangential.stiffness.value = 0.0
-    refused("frame: given; must be None where the tool yields", compliance=yielding)
+    refused("frame: given; must be None if the tool complies", compliance=yielding)
 
 
 def test_a_target_in_a_tilted_frame_is_transformed_with_its_yaw_axis():
@@ -133,9 +133,9 @@ def test_a_target_in_a_tilted_frame_is_transformed_with_its_yaw_axis():
     yaw_axis = np.array([0.6, 0.0, 0.8])
     target = ToolTarget(np.array([0.1, -0.2, 0.3]), R_Ce.matrix(), yaw_axis=yaw_axis)
     frame = np.concatenate([CENTER, X_WC.rotation().matrix().ravel()])
-    found = placed(target, frame)
+    found = target_in_world(target, frame)
     np.testing.assert_allclose(found.y_t, X_WC @ target.y_t, atol=1e-15)
     np.testing.assert_allclose(found.R_e, (X_WC.rotation() @ R_Ce).matrix(), atol=1e-15)
     np.testing.assert_allclose(found.yaw_axis, X_WC.rotation() @ target.yaw_axis, atol=1e-15)
-    bare = placed(ToolTarget(target.y_t), frame)
+    bare = target_in_world(ToolTarget(target.y_t), frame)
     assert bare.R_e is None and bare.yaw_axis is None

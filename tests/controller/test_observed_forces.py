@@ -1,4 +1,4 @@
-"""Observers of forces and of friction: what they are told, and which velocities they see."""
+"""Observers of forces and of friction: inputs, and velocities."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from pfsc_drake.control.estimation.momentum import (
     link_momentum,
 )
 from pfsc_drake.controller import friction_compensation as friction_module
-from pfsc_drake.controller.believed import Believed
 from pfsc_drake.controller.friction_compensation import add_friction_compensation
+from pfsc_drake.controller.nominal_robot import NominalRobot
 from pfsc_drake.controller.observed_forces import add_observed_forces
 from pfsc_drake.controller.options.compliance_parameters import ObservedForceParameters
 from pfsc_drake.controller.options.controller_parameters import ControllerParameters
@@ -32,7 +32,7 @@ class Bench:
     def __init__(self, robot):
         n = robot.dimension
         self.builder, self.robot = DiagramBuilder(), robot
-        self.believed = Believed(robot, (F_C, F_V), velocity_delay=DELAY)
+        self.nominal = NominalRobot(robot, (F_C, F_V), velocity_delay=DELAY)
         sizes = {"joint_state": 4 * n, "friction": n, "tau_ext": n, "drive_torque": n}
         self.ports = {name: self._source(size) for name, size in sizes.items()}
         self._told = self.builder.AddSystem(PassThrough(n)).get_input_port()
@@ -61,7 +61,7 @@ class Bench:
 
 
 def assert_observes(block, expected):
-    """Both tell the same of a motion that is told at random."""
+    """Both have the same outputs for random inputs."""
     rng, n = np.random.default_rng(0), expected.outputs["estimate"].size
     steppers = [Stepper(each, ("known_torque",)) for each in (block, expected)]
     for _ in range(3):
@@ -76,7 +76,7 @@ def test_forces_are_observed_with_old_velocities_and_without_friction(load_arm):
     bench = Bench(load_arm("comau_racer_1_4_3r").chain)
     options = ControllerParameters("rigid")
     tool = ObservedForceParameters(rate=80.0)
-    add_observed_forces(bench.builder, bench.believed, options, tool, bench, bench.ports)
+    add_observed_forces(bench.builder, bench.nominal, options, tool, bench, bench.ports)
     observer = bench.system("tool_force_observer")
     model = link_momentum(bench.robot).with_delay(DELAY)
     assert_observes(observer.block, MomentumObserver(model, 80.0, PERIOD))
@@ -88,7 +88,7 @@ def test_forces_and_torques_on_the_tool_have_dead_bands_of_their_own(load_arm):
     bench = Bench(load_arm("comau_racer_1_4").chain)
     tool = ObservedForceParameters(damping=0.0, force_dead_band=3.0, torque_dead_band=0.5)
     options = ControllerParameters("rigid")
-    add_observed_forces(bench.builder, bench.believed, options, tool, bench, bench.ports)
+    add_observed_forces(bench.builder, bench.nominal, options, tool, bench, bench.ports)
     q = np.array([0.2, 1.6, -0.5, 0.1, 1.2, 0.1])
     tau = joint_torque_function(bench.robot)(q, [10.0, 0.0, 0.0, 0.0, 2.0, 0.0]).full().ravel()
     fit = Stepper(bench.system("tool_wrench").block)
@@ -101,7 +101,7 @@ def test_friction_is_observed_with_old_velocities_and_without_forces(load_arm):
     options = ControllerParameters(
         "rigid", friction=FrictionCompensationParameters(source="observer", rate=70.0)
     )
-    add_friction_compensation(bench.builder, bench.believed, options, bench, bench.ports)
+    add_friction_compensation(bench.builder, bench.nominal, options, bench, bench.ports)
     observer = bench.system("friction_observer")
     model = drive_momentum(bench.robot).with_delay(DELAY)
     assert_observes(observer.block, MomentumObserver(model, 70.0, PERIOD))
@@ -109,7 +109,7 @@ def test_friction_is_observed_with_old_velocities_and_without_forces(load_arm):
 
 
 class Asked(Exception):
-    """What was asked for."""
+    """Arguments of the call."""
 
 
 def test_coefficients_drift_by_a_thousandth_of_what_is_believed(load_arm, monkeypatch):
@@ -122,7 +122,7 @@ def test_coefficients_drift_by_a_thousandth_of_what_is_believed(load_arm, monkey
     friction.kalman.start = 0.8
     options = ControllerParameters("rigid", friction=friction)
     with pytest.raises(Asked) as asked:
-        add_friction_compensation(bench.builder, bench.believed, options, bench, bench.ports)
+        add_friction_compensation(bench.builder, bench.nominal, options, bench, bench.ports)
     momentum, start, noise, period = asked.value.args
     assert (momentum.delay, period) == (DELAY, PERIOD)
     np.testing.assert_allclose(start, [0.8 * F_C, 0.8 * F_V])

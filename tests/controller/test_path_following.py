@@ -96,7 +96,7 @@ def test_a_users_own_plant_follows_a_users_own_path(path, model, law):
 
 @pytest.mark.slow
 def test_a_stream_of_way_points_is_followed_and_waited_for(path):
-    """The tool goes on when a way point comes, rests at the last one, and is on the path always."""
+    """The tool moves on with a new waypoint, rests at the last one, and stays on the path."""
     options = FollowerOptions(stream=StreamLimits(velocity=0.3, acceleration=3.0, bandwidth=40.0))
     simulator, follower = closed_loop(path, "comau_racer_1_4", "rigid", options)
     goal, root = simulator.get_system().GetInputPort("goal"), simulator.get_mutable_context()
@@ -183,7 +183,7 @@ def test_actuators_that_are_added_drive_their_joints(path, undriven):
 
 @pytest.mark.slow
 def test_doubts_that_a_scenario_has_are_told_and_logged_once(path, caplog):
-    """Of gains that are unstable on a perfect model, and of waypoints in nearly one place."""
+    """Gains that are unstable on a perfect model, and nearly equal waypoints."""
     close = np.array([*POINTS[:2], POINTS[1], *POINTS[2:]])
     close[2] += [0.0, 0.24e-6, 0.0]
     close = path_from_waypoints(WaypointTable(close), smoothness=6, closed=True)
@@ -221,7 +221,7 @@ def test_a_law_that_does_not_suit_the_robot_is_named(path):
     ],
 )
 def test_a_fault_is_described(path, row, value, said):
-    """By what is measured at the sample of the fault; a value jumps there."""
+    """By the measurement at the sample of the fault; a value jumps there."""
     builder = DiagramBuilder()
     plant = load(DiagramBuilder(), "comau_racer_1_4")
     follower = add_path_following(builder, plant, "tool_point", path, "rigid")
@@ -309,7 +309,7 @@ def test_a_trajectory_is_tracked_for_comparison(path):
 @pytest.mark.slow
 @pytest.mark.parametrize("state", ["observed", "from_torque"])
 def test_links_are_found_where_motors_alone_are_measured(path, state):
-    """The links' side of what is measured is wrong; torques are those of the springs."""
+    """The links' side of the measurement is wrong; torques are those of the springs."""
     builder = DiagramBuilder()
     plant = load(builder, "comau_racer_1_4_elastic_3r")
     chain, coordinates = chain_from_plant(plant, plant.GetFrameByName("tool_point"))

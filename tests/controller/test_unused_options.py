@@ -182,7 +182,7 @@ def shape(follower):
 
 
 def leaves(options, key=""):
-    """Yield the keys of all options, those within blocks too, with their values."""
+    """Iterate over the keys of all options, including nested blocks, with their values."""
     for field in dc.fields(options):
         value, name = getattr(options, field.name), f"{key}{field.name}"
         if dc.is_dataclass(value) and not isinstance(value, WHOLE):

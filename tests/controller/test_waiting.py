@@ -109,9 +109,9 @@ def test_friction_is_taken_off_what_drives_can_do(monkeypatch):
     motion = rest_to_rest([0.0, 0.1], velocity=0.5, acceleration=3.0)
     made = []
 
-    def spy(demand, course, step, allowed, order):
+    def spy(demand, trajectory, step, allowed, order):
         made.append(allowed)
-        return stopping_bandwidth(demand, course, step, allowed, order)
+        return stopping_bandwidth(demand, trajectory, step, allowed, order)
 
     monkeypatch.setattr(waiting, "stopping_bandwidth", spy)
     f_c = np.array([40.0, 0.0, 30.0, 10.0, 8.0, 3.0])
@@ -149,7 +149,7 @@ def test_an_elbow_avoids_obstacles_where_there_is_one():
         plant = load(builder, f"comau_racer_1_4{model}")
         return add_path_following(builder, plant, "tool_point", path, "rigid", options=chosen)
 
-    with pytest.raises(InputError, match=r"obstacles\.elbow = given; .*without joints to spare"):
+    with pytest.raises(InputError, match=r"obstacles\.elbow = given; .*without redundant joints"):
         follower("_3r", options)
     torques = []
     for made in (follower("", OPTIONS), follower("", options)):

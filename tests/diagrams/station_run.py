@@ -14,7 +14,7 @@ def run_station(settings, end, like=None):
     Args:
         settings: The scenario.
         end: For how long [s].
-        like: The same but for what is believed, if it has been built.
+        like: Station that differs in the nominal model only, if it has been built.
     """
     station = build_station(settings, SCENARIO_DIRECTORY, like=like)
     simulator = Simulator(station.diagram)

@@ -1,4 +1,4 @@
-"""The path following station: what is connected to what, and when it acts."""
+"""The path following station: connections, and times at which signals act."""
 
 from pathlib import Path
 
@@ -169,8 +169,8 @@ def test_start(station):
     x = station.part.plant.GetPositionsAndVelocities(plant)
     np.testing.assert_array_equal(x, station.initial_state)
     point = station.blocks.output(root, "controller.path_projector.manifold_point")
-    layout = station.task.place.layout
-    assert point[layout.theta][0] == pytest.approx(station.initial_place[0], abs=1e-12)
+    layout = station.task.projected_manifold.layout
+    assert point[layout.theta][0] == pytest.approx(station.initial_projection[0], abs=1e-12)
     assert point[layout.eta][0] == pytest.approx(0.96, abs=1e-9)
 
 
@@ -208,7 +208,7 @@ def test_log_holds_every_signal(station):
     simulator, root = start(station)
     simulator.AdvanceTo(2e-3)
     _, signals = station.log.read(root)
-    layout = station.task.place.layout
+    layout = station.task.projected_manifold.layout
     assert {name: x.shape for name, x in signals.items()} == {
         "joint_state": (3, 12),
         "tool_pose": (3, 12),

@@ -61,7 +61,7 @@ def delta(load_exact_scenario):
 
 @pytest.mark.slow
 def test_a_delta_robot_that_touches_nothing_yields_to_its_sensor(delta):
-    """The analytic plant has no joint that bears the load; its reaction is computed."""
+    """The analytic plant has no joint for the load; its reaction is computed."""
     delta.robot.plant = "analytic"
     delta.compliance, force = soft(), 3.0
     delta.forces = [ForcePulse(0.1, 2.0, np.array([0.0, force, 0.0]), frame="manifold")]
@@ -85,7 +85,7 @@ def test_the_sensor_of_a_delta_robot_takes_off_the_load_while_it_moves(delta):
 
 
 def test_a_slide_that_is_not_measured_spoils_the_compensation_but_not_what_is_borne(delta):
-    """The sensor bears what it bears; the load's share can no longer be taken off."""
+    """The sensor measures the load; its share can no longer be compensated."""
     delta.compliance = soft()
     delta.simulation.sensor_failure.time = 0.0505
     delta.simulation.sensor_failure.component = 1
@@ -172,7 +172,7 @@ def test_the_contacts_torque_is_about_the_true_tool_point(arm_in_a_notch):
     root = simulator.get_mutable_context()
     station.set_start(root)
     # 2 mm are free
-    station.place_robot(root, shifted(station, np.array([0.0023, 0.0, 0.0])))
+    station.set_robot_state(root, shifted(station, np.array([0.0023, 0.0, 0.0])))
     simulator.AdvanceTo(1e-3)
     now, plant = station.log.now(station.blocks, root), station.part.plant
     context = plant.GetMyContextFromRoot(root)

@@ -1,4 +1,4 @@
-"""What a station says of a fault, and where: on real runs into it, and at made-up instants."""
+"""Fault messages of a station: from real runs, and at artificial instants."""
 
 import re
 
@@ -28,7 +28,7 @@ FOLDER = find_scenario("pfc_compliant_6r").parent
 
 @pytest.fixture
 def six_axes(load_scenario):
-    """Six rigid axes that wait for nobody."""
+    """Six rigid axes, without waiting."""
     settings = load_scenario("pfc_compliant_6r")
     settings.forces, settings.reference.dwell = [], 0.02
     settings.compliance = type(settings.compliance)()
@@ -70,7 +70,7 @@ def test_a_wrist(through_the_wrist):
     _, raw = station.log.read(root)
     first = np.flatnonzero(raw["law"][:, station.law.layout.status.start])[0]
     q_5 = np.rad2deg(raw["joint_state"][first, 4])
-    eta = raw["manifold_point"][first, station.task.place.layout.eta].item()
+    eta = raw["manifold_point"][first, station.task.projected_manifold.layout.eta].item()
     assert abs(q_5) < 1.0
     assert sentence == (
         f"wrist singular at eta = {eta:.4g} m, t = {1e-3 * first:.3f} s: q_5 = {q_5:.1f} deg "
@@ -186,7 +186,7 @@ def test_an_unstable_loop_is_not_blamed_on_sensors_alone(six_axes, unstable):
     scene = FaultScene(
         station.law,
         station.robot,
-        station.task.place,
+        station.task.projected_manifold,
         False,
         now,
         before,
@@ -195,7 +195,7 @@ def test_an_unstable_loop_is_not_blamed_on_sensors_alone(six_axes, unstable):
     )
     sentence = describe(Fault.MEASUREMENT_IMPLAUSIBLE, scene)
     assert "measured values of a joint contradict each other: v_J_5 at eta = " in sentence
-    assert ("commands of 2 and 5 swung to and fro" in sentence) == unstable
+    assert ("commands of 2 and 5 oscillated" in sentence) == unstable
     assert ("an unstable loop does that with good sensors" in sentence) == unstable
 
 
@@ -207,7 +207,9 @@ def test_what_is_known_without_a_run(six_axes):
 
     def sentence(fault, **changes):
         changed = FaultInstant(0.5, {**now.signals, **changes})
-        scene = FaultScene(station.law, station.robot, station.task.place, False, changed, now)
+        scene = FaultScene(
+            station.law, station.robot, station.task.projected_manifold, False, changed, now
+        )
         return describe(fault, scene)
 
     wrong = sentence(Fault.INPUT_NOT_FINITE, wrench_measured=np.full(6, np.nan))
@@ -222,9 +224,9 @@ def test_what_is_known_without_a_run(six_axes):
     assert "phi_z = 0.0 deg" in turned or "phi_z = -0.0 deg" in turned
     force, asked = np.array([3.0, 12.5, 7.0, 0.0, 0.0, 0.0]), np.array([30.0])
     pressed = sentence(Fault.PRESS_FORCE_LOST, manifold_force=force, press=asked)
-    assert pressed.endswith(": 12.5 N are measured, 30 N asked for at eta = 0.026 m, t = 0.500 s")
+    assert pressed.endswith(": 12.5 N measured, 30 N desired at eta = 0.026 m, t = 0.500 s")
     point = now.signals["manifold_point"].copy()
-    point[station.task.place.layout.eta] = np.nan
+    point[station.task.projected_manifold.layout.eta] = np.nan
     lost = sentence(Fault.PROJECTION_FAILED, manifold_point=point)
     y_t = np.round(now.signals["tool_pose"][:3], 4).tolist()
     assert lost.startswith(Fault.PROJECTION_FAILED.explanation)
@@ -238,7 +240,9 @@ def test_a_joint_that_runs_away_next_to_a_singular_posture(six_axes, fast):
     state = now.measured_state.copy()
     state[[4, 16]], state[[6 + fast, 18 + fast]] = np.deg2rad(2.0), np.deg2rad(600.0)
     near = FaultInstant(0.5, {**now.signals, "joint_state_measured": state})
-    scene = FaultScene(station.law, station.robot, station.task.place, False, near, now)
+    scene = FaultScene(
+        station.law, station.robot, station.task.projected_manifold, False, near, now
+    )
     sentence, name = describe(Fault.JOINT_SPEED, scene), station.robot.names[fast]
     assert sentence.startswith(f"joint {fast + 1} '{name}' moves at 600.0 deg/s of ")
     ending = "; wrist nearly singular: q_5 = 2.0 deg (q_4 and q_6 can move without the tool)"
@@ -255,7 +259,9 @@ def test_a_robot_without_names(load_scenario):
         station.blocks, root, "law", station.law.layout.status.start
     )
     assert before is None
-    scene = FaultScene(station.law, station.robot, station.task.place, False, now, None)
+    scene = FaultScene(
+        station.law, station.robot, station.task.projected_manifold, False, now, None
+    )
     sentence = describe(Fault.SINGULAR, scene)
     assert sentence.startswith(f"robot singular at eta = {settings.reference.points[0]:.4g} m")
     assert "q_1 = 0.1781 m" in sentence or "q_2 = 0.186 m" in sentence or "q_3" in sentence

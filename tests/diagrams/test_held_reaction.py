@@ -1,4 +1,4 @@
-"""A process between two robots: what Drake's plants bear, and what it does to the tool."""
+"""A process between two robots: wrenches on both plants, and deviations of the tool."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def grinding(source, **holder):
 
 @pytest.fixture(scope="module")
 def known():
-    """Return the run of two arms that are told of the process."""
+    """Return the run of two arms that receive the force of the process."""
     return run(grinding("known"))
 
 
@@ -46,7 +46,7 @@ def applied(part, root, about):
 
 
 @pytest.mark.slow
-def test_the_plants_bear_opposite_wrenches(known):
+def test_opposite_wrenches_act_on_the_plants(known):
     """As sums over the bodies of both of Drake's plants, moments about a point of neither."""
     station, root, log = known
     about = np.array([0.3, -0.7, 0.2])
@@ -59,8 +59,8 @@ def test_the_plants_bear_opposite_wrenches(known):
     _, X_WT = poses(station, root)
     wrench = log["wrench_ext"].values[-1]
     acting = SpatialForce(tau=wrench[3:], f=wrench[:3])
-    told = acting.Shift(about - X_WT.translation()).get_coeffs()
-    assert np.abs(told - first).max() < 0.05
+    measured = acting.Shift(about - X_WT.translation()).get_coeffs()
+    assert np.abs(measured - first).max() < 0.05
 
 
 @pytest.mark.slow
@@ -76,7 +76,7 @@ def test_the_force_along_the_seam_is_one_of_the_seam_in_the_world(known):
 
 
 @pytest.mark.slow
-def test_told_both_arms_stay_where_they_are_to_be(known):
+def test_with_known_forces_both_arms_stay_on_their_paths(known):
     _, _, log = known
     late = log.time >= 0.5
     for name in ("xi", "holder_xi"):
@@ -84,11 +84,11 @@ def test_told_both_arms_stay_where_they_are_to_be(known):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("untold", ["both", "holder"])
-def test_untold_the_tool_leaves_the_seam(known, untold):
+@pytest.mark.parametrize("unmodelled", ["both", "holder"])
+def test_with_unmodelled_forces_the_tool_leaves_the_seam(known, unmodelled):
     settings = grinding("known")
     settings.holder.controller.external_torque.source = "none"
-    if untold == "both":
+    if unmodelled == "both":
         settings.controller.external_torque.source = "none"
     _, _, log = run(settings, like=known[0])
     off = {name: np.linalg.norm(log[name].values, axis=1).max() for name in ("xi", "holder_xi")}
@@ -97,15 +97,15 @@ def test_untold_the_tool_leaves_the_seam(known, untold):
 
 
 @pytest.mark.slow
-def test_the_holder_is_told_what_the_other_ones_sensor_measures(known):
-    """As it is seen at the workpiece's frame; it has no sensor of its own."""
+def test_the_holder_receives_the_force_measured_by_the_other_robot(known):
+    """At the workpiece's frame; it has no sensor of its own."""
     settings = grinding("measured")
     settings.sensor.noise = np.zeros(6)
     station, root, _ = run(settings, end=0.5, like=known[0])
     _, raw = station.log.read(root)
-    told, true = raw["holder_wrench_measured"][-1], raw["holder_wrench_ext"][-1]
+    measured, true = raw["holder_wrench_measured"][-1], raw["holder_wrench_ext"][-1]
     assert np.linalg.norm(true[:3]) > 60.0
-    assert np.abs(told - true).max() < 0.3
+    assert np.abs(measured - true).max() < 0.3
     assert not any("sensor" in line for line in station.holder.warnings())
 
 
@@ -121,5 +121,5 @@ def test_what_does_not_know_of_the_process_is_warned_of(known):
 def test_forces_on_links_are_refused():
     settings = exact()
     settings.forces = [ForcePulse(link="link_3")]
-    with pytest.raises(InputError, match=r"^forces\[0\].link = 'link_3'; allowed: empty where"):
+    with pytest.raises(InputError, match=r"^forces\[0\].link = 'link_3'; allowed: empty with a"):
         build_station(settings, SCENARIO_DIRECTORY)

@@ -1,4 +1,4 @@
-"""Two robots in one station: what Drake's plants say of them, and what stops both."""
+"""Two robots in one station: poses in Drake's plants, and faults that stop both."""
 
 from copy import deepcopy
 
@@ -9,7 +9,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Gain
 
 from diagrams.builder import build_station
 from diagrams.holder_station import HOLDER, PrefixingBuilder
-from diagrams.robots.belief import WORKPIECE
+from diagrams.robots.nominal_model import WORKPIECE
 from diagrams.scenario import Scenario, SensorFailureParameters
 from diagrams.scenario.robot import PoseParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
@@ -54,14 +54,14 @@ def poses(station, root):
     return found
 
 
-def test_the_log_tells_the_tool_in_the_workpiece_by_drakes_own_kinematics(known):
+def test_the_log_has_the_tool_in_the_workpiece_frame(known):
     station, root, log = known
     X_WC, X_WT = poses(station, root)
     X_CT = X_WC.inverse() @ X_WT
     assert log.time[-1] == pytest.approx(END)
-    told = log["y_t"].values[-1], log["R_e"].values[-1].reshape(3, 3)
-    assert np.abs(told[0] - X_CT.translation()).max() < 1e-12
-    assert np.abs(told[1] - X_CT.rotation().matrix()).max() < 1e-12
+    pose = log["y_t"].values[-1], log["R_e"].values[-1].reshape(3, 3)
+    assert np.abs(pose[0] - X_CT.translation()).max() < 1e-12
+    assert np.abs(pose[1] - X_CT.rotation().matrix()).max() < 1e-12
     pose = log["workpiece_pose"].values[-1]
     assert np.abs(pose[:3] - X_WC.translation()).max() < 1e-12
     assert np.abs(log["y_t_world"].values[-1] - X_WT.translation()).max() < 1e-12
@@ -81,18 +81,18 @@ def test_the_seam_is_followed_while_the_workpiece_moves(known):
 
 
 def test_rates_are_those_of_the_true_coordinates(known):
-    """Which are found from the true motion of the workpiece, not from what is believed."""
+    """They are computed from the actual motion of the workpiece, not from the nominal one."""
     _, _, log = known
     rate = np.gradient(log["eta"].values[:, 0], log.time)
     assert np.abs(rate - log["eta_dot"].values[:, 0])[5:-5].max() < 2e-5
 
 
-def test_what_the_drives_are_asked_for_is_known_beforehand(known):
+def test_the_demand_on_the_drives_is_predicted(known):
     """Of both robots: torques and speeds of the plan are those of Drake's plants."""
     station, _, log = known
     for robot, prefix in ((station.controlled, ""), (station.holder.robot, HOLDER)):
         plan, last = robot.task.drive_plan, robot.controller.robot.dimension - 1
-        assert not plan.said
+        assert not plan.messages
         at = np.flatnonzero((plan.times >= BEGIN) & (plan.times <= END))
         ticks = np.rint(plan.times[at] / 1e-3).astype(int)
         torque, speed = np.hsplit(plan.demand[at], 2)
@@ -116,16 +116,16 @@ def test_two_robots_that_are_too_fast_are_warned_of():
         return build_station(settings, SCENARIO_DIRECTORY)
 
     station = built(3.0)
-    (said,) = station.task.drive_plan.said
-    assert said.startswith("as asked for it takes 94 % of the torque of axis 2 at eta = 0.45")
+    (said,) = station.task.drive_plan.messages
+    assert said.startswith("the requested motion needs 94 % of the torque of axis 2 at eta = 0.45")
     assert said in station.warnings and not station.task.drive_plan.is_slowed
     pace = float(said.split("it fits with ")[1].split()[0])
     assert f"{pace**2:.2f} of the accelerations of both robots" in said
-    assert not built(3.0 * pace - 0.03).task.drive_plan.said
+    assert not built(3.0 * pace - 0.03).task.drive_plan.messages
 
 
 @pytest.mark.slow
-def test_an_error_of_placement_is_seen_one_to_one(known):
+def test_an_error_of_placement_becomes_an_error_of_the_tool(known):
     """No controller knows of it: as measured the tool is on the seam, and in truth beside it."""
     error = PoseParameters(position=[0.1e-3, 0.2e-3, -0.1e-3], zyx_deg=[0.0, 0.02, 0.0])
     station, root, log = run(exact(placement_error=error), like=known[0])
@@ -133,8 +133,8 @@ def test_an_error_of_placement_is_seen_one_to_one(known):
     assert seen < 1e-6
     X_WB = station.holder.parameters.robot.base_pose.transform()
     X_WC, X_WT = poses(station, root)
-    believed = X_WB @ error.transform() @ X_WB.inverse() @ X_WC
-    off = (X_WC.inverse() @ X_WT).translation() - (believed.inverse() @ X_WT).translation()
+    X_WC_nominal = X_WB @ error.transform() @ X_WB.inverse() @ X_WC
+    off = (X_WC.inverse() @ X_WT).translation() - (X_WC_nominal.inverse() @ X_WT).translation()
     tangent = np.diff(log["y_t"].values[-2:], axis=0)[0]
     tangent /= np.linalg.norm(tangent)
     across = np.linalg.norm(off - (off @ tangent) * tangent)
@@ -143,7 +143,7 @@ def test_an_error_of_placement_is_seen_one_to_one(known):
 
 
 @pytest.mark.slow
-def test_what_is_not_told_of_the_motion_costs(known):
+def test_missing_derivatives_cost_accuracy(known):
     deviation = {
         highest: np.linalg.norm(
             run(exact(highest=highest), like=known[0])[2]["xi"].values, axis=1
@@ -156,17 +156,17 @@ def test_what_is_not_told_of_the_motion_costs(known):
 
 @pytest.mark.slow
 def test_planned_derivatives_are_those_of_the_pose(known):
-    """As differences of the true poses say, of a holder that is where it was planned to be."""
+    """They equal differences of the actual poses, for a workpiece robot without errors."""
     station, root, log = run(exact(derivatives="planned"), like=known[0])
     moving = log.time >= BEGIN
     assert np.linalg.norm(log["xi"].values[moving], axis=1).max() < 1e-6
     _, raw = station.log.read(root)
-    told, pose = raw["holder_frame_jet"], log["workpiece_pose"].values
+    jet, pose = raw["holder_frame_jet"], log["workpiece_pose"].values
     middle = np.flatnonzero(moving)[1:-1]
     slope = (pose[middle + 1] - pose[middle - 1]) / 2e-3
     bend = (pose[middle + 1] - 2.0 * pose[middle] + pose[middle - 1]) / 1e-6
-    assert np.abs(told[middle, 12:24] - slope).max() < 1e-4 * np.abs(slope).max()
-    assert np.abs(told[middle, 24:36] - bend).max() < 3e-3 * np.abs(bend).max()
+    assert np.abs(jet[middle, 12:24] - slope).max() < 1e-4 * np.abs(slope).max()
+    assert np.abs(jet[middle, 24:36] - bend).max() < 3e-3 * np.abs(bend).max()
 
 
 @pytest.mark.slow(but="holder")
@@ -181,8 +181,10 @@ def test_a_fault_of_one_stops_both(known, failing):
     station, root, log = run(settings, end=0.8, like=known[0])
     names = ["fault", f"{HOLDER}fault"]
     first, second = names if failing == "follower" else names[::-1]
-    begun = [int(np.flatnonzero(log[name].values[:, 0])[0]) for name in (first, second)]
-    assert begun[1] - begun[0] == (1 if failing == "follower" else 0)
+    initial_conditions = [
+        int(np.flatnonzero(log[name].values[:, 0])[0]) for name in (first, second)
+    ]
+    assert initial_conditions[1] - initial_conditions[0] == (1 if failing == "follower" else 0)
     assert log[first].values[-1, 0] == Fault.INPUT_NOT_FINITE
     assert log[second].values[-1, 0] == Fault.STOP_REQUESTED
     for name in ("v_J", f"{HOLDER}v_J"):
@@ -232,7 +234,7 @@ def test_wrong_input_is_refused_by_its_key(said):
 
 def test_where_there_are_no_two_robots(known):
     for further in ({"remote": True}, {"with_slope": True}):
-        with pytest.raises(InputError, match="holder = given; allowed: null where margins"):
+        with pytest.raises(InputError, match="holder = given; allowed: null for margins"):
             build_station(exact(), SCENARIO_DIRECTORY, like=known[0], **further)
 
 

@@ -1,4 +1,4 @@
-"""Stability of integration schemes against what Drake does."""
+"""Stability of integration schemes against Drake's integrators."""
 
 import numpy as np
 import pytest

@@ -13,7 +13,7 @@ LIMITS = np.array([100.0, 40.0])
     ("frequency", "swing", "found"),
     [(90.0, 30.0, True), (480.0, 30.0, True), (90.0, 22.0, False), (30.0, 60.0, False)],
 )
-def test_fast_swings_by_a_quarter_of_the_limit(frequency, swing, found):
+def test_fast_oscillations_by_a_quarter_of_the_limit(frequency, swing, found):
     """Peak to peak, on a command that grows."""
     commands = np.zeros((100, 2))
     commands[:, 0] = 20.0 + 50.0 * TIMES + 0.5 * swing * np.sin(2.0 * np.pi * frequency * TIMES)

@@ -57,12 +57,12 @@ class ControllerBlock(Block):
 
     def __init__(self, share=1.0):
         self._gain = share * ca.DM(GAIN)
-        self.inputs, self.outputs = {"motion": Port(2)}, {"told": Port(1)}
+        self.inputs, self.outputs = {"motion": Port(2)}, {"command": Port(1)}
         self.states = {"last": 2, "count": 1, "stopped": 1}
 
     def output(self, x, u, t):
-        told = -self._gain @ (u.motion + 0.1 * x.last)
-        return {"told": where(x.stopped, 0.0, told)}
+        command = -self._gain @ (u.motion + 0.1 * x.last)
+        return {"command": where(x.stopped, 0.0, command)}
 
     def update(self, x, u, y, t):
         return {"last": u.motion, "count": x.count + 1.0}
@@ -149,12 +149,12 @@ def test_the_derivative_is_that_of_the_sampled_loop(make):
     exponential = expm(np.block([[F, B], [np.zeros((1, 3))]]) * T)
     motion, hold_row = exponential[:2], int(one_period.rows(hold)[-1])
     controller = one_period.rows(diagram.GetSubsystemByName("controller"))[-4:]
-    memory, plant, told = controller[:2], [0, 1], -GAIN @ motion
+    memory, plant, command = controller[:2], [0, 1], -GAIN @ motion
     columns = [0, 1, hold_row]
     np.testing.assert_allclose(A[np.ix_(plant, columns)], motion, rtol=1e-6, atol=1e-7)
     # right after the tick the controller remembers x, and the hold has what it made of both
     np.testing.assert_allclose(A[np.ix_(memory, columns)], motion, rtol=1e-6, atol=1e-7)
-    np.testing.assert_allclose(A[hold_row, columns], told[0], rtol=1e-6)
+    np.testing.assert_allclose(A[hold_row, columns], command[0], rtol=1e-6)
     np.testing.assert_allclose(A[hold_row, memory], -0.1 * GAIN[0], rtol=1e-6)
     np.testing.assert_array_equal(A[plant][:, memory], 0.0)
     # what stops the controller when it is not zero has no slope
@@ -212,9 +212,9 @@ def test_what_is_no_block_is_the_same_for_other_blocks(fused):
 def test_it_tells_what_blocks_put_out():
     diagram, one_period, _, hold, derivative = LOOPS[3]()
     section = after_ticks(diagram, 3)
-    told = derivative.wires(section)["controller.told"]
+    command = derivative.wires(section)["controller.command"]
     one_period.approach(section)
     one_period.pass_tick()
     own = hold.GetMyContextFromRoot(one_period.context)
-    np.testing.assert_allclose(hold.state(own, "held"), told, rtol=1e-14)
+    np.testing.assert_allclose(hold.state(own, "held"), command, rtol=1e-14)
     assert one_period.rows(hold)[-1] == derivative.states["hold.held"][0]

@@ -1,4 +1,4 @@
-"""How runs end after a fault: they are simulated on, and the robot stands."""
+"""End of runs after a fault: the simulation continues until the robot is at rest."""
 
 from dataclasses import replace
 
@@ -224,8 +224,8 @@ def test_a_sensor_that_is_not_tared_may_be_at_the_end_of_its_range(six_axes):
     six_axes.sensor.measurement_range = np.full(6, 1.0)
     station, result, *_ = go_on(six_axes, 0.2)
     assert result.fault is None
-    told = station.blocks.output(result.root, "controller.tool_compensation.fault")
-    assert told == SensorFault.SATURATED
+    fault = station.blocks.output(result.root, "controller.tool_compensation.fault")
+    assert fault == SensorFault.SATURATED
 
 
 @pytest.mark.slow
@@ -308,7 +308,7 @@ def test_at_the_end_of_an_open_path(load_exact_scenario, end):
     ]
     station, result, _, log = go_on(settings, 1.0)
     assert result.fault is None
-    eta = log["manifold_point"][:, station.task.place.layout.eta]
+    eta = log["manifold_point"][:, station.task.projected_manifold.layout.eta]
     beyond = (eta - station.path.length if end else -eta)[300:, 0]
     assert beyond[-1] > -1e-3 and beyond.max() < 1e-3
     drive = log["law"][:, station.law.layout.drive]

@@ -1,4 +1,4 @@
-"""What a station warns of."""
+"""Warnings of a station."""
 
 from pathlib import Path
 
@@ -127,15 +127,15 @@ def with_gains(scenario, **kinds):
 
 
 @pytest.mark.slow
-def test_gains_that_do_not_bear_an_error_of_the_model():
+def test_gains_that_are_not_robust_to_model_errors():
     """Four equal poles on six axes: unstable with masses 5 % off, by simulation as well."""
     scenario = shipped_scenario("pfc_elastic_6r")
     assert warnings(scenario) == []
     equal = {"poles": [-55.0] * 4}
     (warning,) = warnings(with_gains(scenario, eta=equal, xi=equal, phi=equal))
-    assert "do not bear 5 %" in warning
-    assert "joint stiffnesses believed 5 % too high" in warning
-    assert "about 1.9 % is borne" in warning
+    assert "do not tolerate 5 %" in warning
+    assert "nominal joint stiffnesses 5 % too high" in warning
+    assert "about 1.9 % is tolerated" in warning
     assert "poles: auto" in warning
 
 
@@ -145,7 +145,7 @@ def test_gains_too_fast_for_the_sampling(scenario):
     assert "unstable at the start even on a perfect model" in warning
 
 
-def test_chosen_poles_bear_what_they_shall_and_are_written_down():
+def test_chosen_poles_are_robust_and_saved():
     scenario = shipped_scenario("pfc_elastic_6r")
     slow, quick = {"bandwidth": 40.0}, {"bandwidth": 60.0, "bears": 0.08}
     given = with_gains(scenario, eta=slow, xi=quick, phi={"poles": [-50.0, -50.0, -200.0, -300.0]})
@@ -187,7 +187,7 @@ def test_refused_ways_to_choose_poles(wrong, key):
 
 
 @pytest.mark.slow
-def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
+def test_observed_forces_tolerate_less_than_the_error_of_the_masses():
     """From 3.5 % (still) to 4 % (swings at 13 Hz) on, simulated with all masses too high."""
     scenario = shipped_scenario("vf_soft_circle")
     scenario.friction, scenario.controller.friction.source = type(scenario.friction)(), "none"
@@ -195,7 +195,7 @@ def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
     assert warnings(scenario) == []
     scenario.compliance.source = "observed"
     (warning,) = warnings(scenario)
-    assert "bears masses believed 3.9 % too high" in warning
+    assert "tolerates nominal masses 3.9 % too high" in warning
     scenario.compliance.observed.rate = 20.0
     assert warnings(scenario) == []
 

@@ -57,20 +57,20 @@ def test_the_seam_is_followed_while_the_table_turns(late):
     assert np.abs(log["y_t"].values[-1] - seen).max() < 1e-12
 
 
-def test_what_drives_are_asked_for_counts_the_table(late):
+def test_the_demand_on_the_drives_includes_the_table(late):
     station, _, log = late
     plan = station.task.drive_plan
     at = np.flatnonzero((plan.times > BEGIN) & (plan.times < END))
     ticks = np.rint(plan.times[at] / 1e-3).astype(int)
-    told, true = plan.demand[at, :5], log["tau_d"].values[ticks, :5]
-    assert np.all(np.abs(told - true) < 0.03 * np.abs(true).max(axis=0) + 0.05)
+    planned, true = plan.demand[at, :5], log["tau_d"].values[ticks, :5]
+    assert np.all(np.abs(planned - true) < 0.03 * np.abs(true).max(axis=0) + 0.05)
 
 
 @pytest.mark.slow(but="table0-0.0001")
 @pytest.mark.parametrize(
     ("table", "least"), [({"believed_delay": 0.0}, 0.1e-3), ({"derivatives": "none"}, 0.1e-3)]
 )
-def test_a_delay_that_is_not_made_up_for_costs(late, table, least):
+def test_an_uncompensated_delay_costs_accuracy(late, table, least):
     _, _, log = run(exact(**table), like=late[0])
     assert off(log) > least
 
@@ -113,7 +113,7 @@ WRONG = {
     "turntable.delay = 0.0035": lambda s: setattr(s.turntable, "delay", 0.0035),
     "turntable.believed_delay = 1.0": lambda s: setattr(s.turntable, "believed_delay", 1.0),
     "turntable = given": two_carriers,
-    "driver = given; allowed: left out where a turntable": lambda s: setattr(
+    "driver = given; allowed: left out with a turntable": lambda s: setattr(
         s.driver, "delay", 1e-3
     ),
 }
@@ -125,7 +125,7 @@ WRONG = {
         "turntable.stops_deg[1] = [0.0, 180.0]",
         "turntable.delay = 0.0035",
         "turntable = given",
-        "driver = given; allowed: left out where a turntable",
+        "driver = given; allowed: left out with a turntable",
     ]
 )
 @pytest.mark.parametrize("said", WRONG)
@@ -139,7 +139,7 @@ def test_wrong_input_is_refused_by_its_key(said):
 
 
 def test_margins_know_no_turntable(late):
-    with pytest.raises(InputError, match="turntable = given; allowed: null where margins"):
+    with pytest.raises(InputError, match="turntable = given; allowed: null for margins"):
         build_station(exact(), SCENARIO_DIRECTORY, like=late[0], with_slope=True)
 
 

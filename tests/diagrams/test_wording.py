@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.builder import build_station
 from experiments.scenario_file import find_scenario
-from pfsc_drake.robot.coordinate_text import coordinate_text, listed, posture_text
+from pfsc_drake.robot.coordinate_text import coordinate_text, enumeration, eta_text, posture_text
 
 
 def test_coordinates_with_units():
@@ -14,10 +14,18 @@ def test_coordinates_with_units():
     assert coordinate_text(0.12345, revolute=False) == "0.1235 m"
 
 
+def test_rounding_errors_read_zero():
+    assert coordinate_text(-1.3e-17, revolute=False) == "0 m"
+    assert coordinate_text(2e-16, revolute=True) == "0 deg"
+    assert coordinate_text(-3e-9, revolute=False) == "-3e-09 m"
+    assert eta_text(np.array([0.43214, -1.919e-16])) == "eta = 0.4321, 0 m"
+    assert eta_text([0.43214], digits=3) == "eta = 0.432 m"
+
+
 def test_lists():
-    assert listed(["a"]) == "a"
-    assert listed(["a", "b"]) == "a and b"
-    assert listed(["a", "b", "c"]) == "a, b and c"
+    assert enumeration(["a"]) == "a"
+    assert enumeration(["a", "b"]) == "a and b"
+    assert enumeration(["a", "b", "c"]) == "a, b and c"
 
 
 def test_postures_of_arms_and_slides(load_scenario):

@@ -35,6 +35,7 @@ _JOINTS = [
 _MASSES = {"base": 4.0, "shoulder": 3.7, "upper": 8.4, "fore": 2.3} | dict.fromkeys(
     ["first", "second"], 1.2
 )
+NO_FINGER = "no_finger"  # folder with an arm without a gripper
 _POSTURE = np.deg2rad([-37, -80, 89, -94, -93, -126])  # that of the README
 
 
@@ -63,13 +64,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _write_arm(folder: Path) -> None:
     """Write a robot, and what a hand taught it: 0.6 m from the README's posture on."""
-    links = [link for joint in _JOINTS for link in joint[2:4]]
-    text = "".join(
-        _LINK.format(link, _MASSES.get(link, 0.2), 0.01 * _MASSES.get(link, 0.2))
-        for link in dict.fromkeys(links)
-    )
-    text += "".join(_JOINT.format(*joint) for joint in _JOINTS)
-    (folder / "my_arm.urdf").write_text(f'<robot name="mine">{text}</robot>', encoding="utf-8")
+    (folder / "my_arm.urdf").write_text(_urdf(_JOINTS), encoding="utf-8")
     plant = MultibodyPlant(time_step=0.0)
     read_model(plant, folder / "my_arm.urdf", ModelOptions(fixed_joints={"finger": 0.02}))
     context = plant.CreateDefaultContext()
@@ -81,6 +76,21 @@ def _write_arm(folder: Path) -> None:
     quaternions = np.array([turn.ToQuaternion().wxyz() for turn in turns])
     table = np.hstack([X_WE.translation() + way, quaternions])
     _write(folder / "teach_in.csv", "x,y,z,qw,qx,qy,qz", table)
+    # the README's arm has no finger
+    (folder / NO_FINGER).mkdir()
+    joints = [joint for joint in _JOINTS if joint[0] != "finger"]
+    (folder / NO_FINGER / "my_arm.urdf").write_text(_urdf(joints), encoding="utf-8")
+    shutil.copy(folder / "teach_in.csv", folder / NO_FINGER)
+
+
+def _urdf(joints: list[tuple]) -> str:
+    """Return a model file."""
+    links = dict.fromkeys(link for joint in joints for link in joint[2:4])
+    text = "".join(
+        _LINK.format(link, _MASSES.get(link, 0.2), 0.01 * _MASSES.get(link, 0.2)) for link in links
+    )
+    text += "".join(_JOINT.format(*joint) for joint in joints)
+    return f'<robot name="mine">{text}</robot>'
 
 
 def _write(file: Path, columns: str, values: np.ndarray) -> None:

@@ -21,9 +21,17 @@ DOCUMENTS = [ROOT / "README.md", *PAGES]
 ONE_OF = "# one of\n"
 
 _FENCED = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-_IN_TEXT = re.compile(r"`([^`\n]*python -m [^`\n]*)`")
-_INDENTED = re.compile(r"^    (python -m .*)$", re.MULTILINE)
-_PROGRAM = re.compile(r"(\S*/)?python -m (experiments|identification)\b ?(.*)")
+_IN_TEXT = re.compile(r"`([^`\n]*(?:python -m|pfsc) [^`\n]*)`")
+_INDENTED = re.compile(r"^    ((?:python -m|pfsc) .*)$", re.MULTILINE)
+_PROGRAM = re.compile(
+    r"(?:\S*/)?(python -m experiments|python -m identification|pfsc identify|pfsc)\b ?(.*)"
+)
+_PACKAGES = {
+    "python -m experiments": "experiments",
+    "python -m identification": "identification",
+    "pfsc": "experiments",
+    "pfsc identify": "identification",
+}
 _COMMANDS = ("", "sh", "bash")
 
 
@@ -91,7 +99,9 @@ def commands() -> list[Command]:
 def _parsed(lines: list[tuple[str, str]]) -> Iterator[Command]:
     for place, line in lines:
         match = _PROGRAM.match(line)
-        if match and match[3]:
-            said = re.sub(r"\[(--[^\[\]]*)\]", r"\1", match[3])
-            words = [word for word in shlex.split(said, comments=True) if word != ".."]
-            yield Command(place, match[2], tuple(words))
+        if match is None:
+            continue
+        arguments = re.sub(r"\[(--[^\[\]]*)\]", r"\1", match[2])
+        words = [word for word in shlex.split(arguments, comments=True) if word != ".."]
+        if words:
+            yield Command(place, _PACKAGES[match[1]], tuple(words))

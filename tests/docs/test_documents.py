@@ -22,6 +22,7 @@ from experiments.sweep.sweep import define_sweep
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml
 from pfsc_drake.yaml.typed import load_typed
+from tests.docs.conftest import NO_FINGER
 from tests.docs.documents import DOCUMENTS, ONE_OF, ROOT, Block, Command, blocks, commands
 
 APPS = {"experiments": experiments.cli.app, "identification": identification.cli.app}
@@ -63,10 +64,11 @@ def test_yaml(block: Block) -> None:
 @pytest.mark.parametrize("block", blocks("yaml"), ids=_named)
 def test_yaml_is_built(block: Block, desk: Path) -> None:
     """A station is built; of alternatives, which stand elsewhere than the robot, the surface."""
+    folder = desk / NO_FINGER if block.place.startswith("README") else desk
     for text in _alternatives(block):
         settings = _settings(block, text)
         if text is block.text:
-            build_station(settings, desk)
+            build_station(settings, folder)
         else:
             assert settings.surface is not None
             make_surface(settings.surface.shape, settings.controller.law, desk)

@@ -1,4 +1,4 @@
-"""Pages that are made of the code: nothing of it is left out, units stand where they belong."""
+"""Generated pages: nothing is missing, units are in their column."""
 
 import dataclasses as dc
 import re
@@ -29,7 +29,7 @@ def _classes(kind: object) -> set[type]:
     return set().union(*map(_classes, typing.get_args(kind)))
 
 
-def test_every_key_of_a_scenario_is_told() -> None:
+def test_every_key_of_a_scenario_is_documented() -> None:
     page = scenario_keys()
     owners = _classes(Scenario)
     assert len(owners) > 80
@@ -46,7 +46,7 @@ def test_every_key_of_a_scenario_is_told() -> None:
     [
         "| `velocity` | number or `null` | m/s | `null` | Largest velocity, 1e-6 to 1e3;",
         "| `radius` | number | m | `0.15` | Radius, 1e-4 to 1e4. |",
-        "| `mass` | [block](#keys-profile) | kg or kg m^2 | *must be given* | `m`, positive. |",
+        "| `mass` | [block](#keys-profile) | kg or kg m^2 | *required* | `m`, positive. |",
         "| `stiffness` | number, or list of numbers |",
         "| `file` | file |  | empty |",
         "| `source` | `none` or `model` or `observer` |",
@@ -84,18 +84,18 @@ def test_text_of_docstrings() -> None:
     assert cell("``|x|`` or\n    more") == r"`\|x\|` or more"
 
 
-def test_an_attribute_without_a_word_is_an_error() -> None:
+def test_an_attribute_without_a_docstring_is_an_error() -> None:
     @dc.dataclass
     class Silent:
-        """Nothing is said."""
+        """Class without attribute docstrings."""
 
         key: float = 0.0
 
-    with pytest.raises(ValueError, match=r"Silent\.key: no docstring says what it is"):
+    with pytest.raises(ValueError, match=r"Silent\.key: has no docstring"):
         attribute(Silent, "key")
 
 
-def test_every_command_and_option_is_told() -> None:
+def test_every_command_and_option_is_documented() -> None:
     page = command_line()
     for program, app in (
         ("experiments", experiments.cli.app),
@@ -120,7 +120,7 @@ def test_the_gallery_has_every_scenario() -> None:
     assert first_sentence("Six axes") == "Six axes"
 
 
-def test_every_name_of_the_doors_is_told() -> None:
+def test_every_public_name_is_documented() -> None:
     page = interface()
     for module in (pfsc_drake, experiments):
         for name in getattr(module, "__all__", []):

@@ -1,4 +1,4 @@
-"""The table of what shipped scenarios give, shrunk to two of them."""
+"""The table of the results of shipped scenarios, reduced to two of them."""
 
 import pytest
 
@@ -29,22 +29,22 @@ def test_every_scenario_has_its_laws():
 
 
 def test_rows_of_the_table():
-    kept, missed, stopped, left = cases(["pfc_elastic_3r", "pfc_comau_6r"])
+    passed, missed, stopped, left = cases(["pfc_elastic_3r", "pfc_comau_6r"])
     outcomes = {
-        kept: _outcome(),
+        passed: _outcome(),
         missed: _outcome(deviation=3e-5),
         stopped: _outcome(FAULT, "singular at eta = 0.4 m"),
     }
-    lines = table([kept, missed, stopped, left], outcomes).splitlines()[2:]
+    lines = table([passed, missed, stopped, left], outcomes).splitlines()[2:]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     assert {len(row) for row in rows} == {8}
-    assert rows[0][:2] == [f"`{kept.scenario}`", f"`{kept.law}`"]
+    assert rows[0][:2] == [f"`{passed.scenario}`", f"`{passed.law}`"]
     assert rows[0][3:] == [
         "7\u202fµm",
         "< 20\u202fµm",
         "`max_orientation_error` 40\u202fµrad (< 1\u202fmrad)",
         "160\u202fms",  # 8 times real time, in 20 ms
-        "kept",
+        "passed",
     ]
     assert rows[1][-1] == "missed: max_path_deviation"
     assert rows[2][-1] == "fault: singular at eta = 0.4 m"
@@ -61,26 +61,26 @@ def test_the_rest_of_the_page_stays():
         page("Before.\n", [case], {})
 
 
-def test_what_was_run_is_kept_for_its_revision(tmp_path, monkeypatch):
-    monkeypatch.setattr(docs.results, "KEPT", tmp_path)
+def test_outcomes_are_stored_for_their_revision(tmp_path, monkeypatch):
+    monkeypatch.setattr(docs.results, "STORE", tmp_path)
     monkeypatch.setattr(docs.results, "git_revision", lambda: "a" * 40)
     case = cases(["pfc_comau_6r"])[0]
-    docs.results._keep(case, _outcome())
+    docs.results._store(case, _outcome())
     outcome = run_all([case])[case]
     assert outcome.work == 0.02
     assert outcome.row.metrics["max_path_deviation"].value == 7.04e-6
-    assert docs.results._kept(case, "b" * 40) is None
-    assert docs.results._kept(case, "a" * 40 + "+dirty") is None
+    assert docs.results._stored(case, "b" * 40) is None
+    assert docs.results._stored(case, "a" * 40 + "+dirty") is None
 
 
 @pytest.mark.slow
 def test_two_scenarios(tmp_path, monkeypatch):
-    monkeypatch.setattr(docs.results, "KEPT", tmp_path)
+    monkeypatch.setattr(docs.results, "STORE", tmp_path)
     monkeypatch.setattr(docs.results, "count_cores", lambda: 1)
     two: list[Case] = cases(["pfc_elastic_3r", "pfc_comau_6r"])[:2]
     outcomes = run_all(two, duration=0.1)
-    assert list(tmp_path.iterdir()) == []  # cut short, which nobody is to take for the whole
+    assert list(tmp_path.iterdir()) == []  # cut short, so not stored
     for outcome in outcomes.values():
         assert outcome.row.status == COMPLETED
-        assert 0.0 < outcome.work < 1.0 and outcome.pace > 0.0
+        assert 0.0 < outcome.work < 1.0 and outcome.speed > 0.0
     assert "not run" not in table(two, outcomes)

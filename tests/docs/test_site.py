@@ -33,7 +33,7 @@ def test_every_document_is_a_page(site: Path) -> None:
     for file in PAGES:
         page = site / file.relative_to(ROOT / "docs").with_suffix(".html")
         assert page.is_file(), file
-        assert "<!-- made:" not in page.read_text(encoding="utf-8"), file
+        assert "<!-- generated:" not in page.read_text(encoding="utf-8"), file
 
 
 @pytest.mark.slow
@@ -52,7 +52,7 @@ def test_nothing_that_links_lead_to_is_missed(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     assert broken_links(tmp_path) == [
-        "index.html: other.html#nowhere: no such place on the page",
+        "index.html: other.html#nowhere: no such anchor on the page",
         "index.html: none.html: no such file",
         "index.html: https://cdn.example/x.js: is loaded from the network",
         "index.html: //cdn.example/x.png: is loaded from the network",

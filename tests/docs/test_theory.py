@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from pfsc_drake import jets
 from pfsc_drake.control.compliance.impedance import transition
 from pfsc_drake.control.compliance.impedance_parameters import SlowEnds
-from pfsc_drake.control.compliance.tuned_impedance import bearable_inertia_error
+from pfsc_drake.control.compliance.tuned_impedance import tolerable_inertia_error
 from pfsc_drake.control.estimation.filters import SignalDerivatives
 from pfsc_drake.control.fixtures.guidance import approach_speed
 from pfsc_drake.control.law import actuation
@@ -163,7 +163,7 @@ def test_force_along_a_surface():
     assert tau[2] == pytest.approx(axes[:, 2] @ f)
 
 
-@of("law", "law-motion law-wanted-torque law-elastic-hold law-visco-hold law-visco-implicit")
+@of("law", "law-motion law-desired-torque law-elastic-hold law-visco-hold law-visco-implicit")
 @pytest.mark.parametrize("law", ["rigid", "singular_perturbation", "visco_elastic", "elastic"])
 def test_drive_torques(law, arm):
     robot, n, T = arm.chain, arm.n, 1e-3
@@ -249,7 +249,7 @@ def test_impedance_over_a_tick():
 def test_inertia_that_an_observer_believes():
     m, d, k, L = 3.0, 90.0, 5000.0, 100.0
     border = m + d / L - m * k / (k + d * L)
-    assert bearable_inertia_error(m, d, k, L) == pytest.approx(border)
+    assert tolerable_inertia_error(m, d, k, L) == pytest.approx(border)
     poles = np.roots([m, d + m * L - border * L, k + d * L, k * L])
     assert np.max(poles.imag) == pytest.approx(math.sqrt((k + d * L) / m))
     assert np.max(poles.real) == pytest.approx(0.0, abs=1e-9)

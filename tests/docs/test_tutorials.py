@@ -29,7 +29,7 @@ def nodes(notebook: Path) -> list[ast.AST]:
 
 
 def test_there_are_notebooks():
-    assert (len(TUTORIALS), len(STUDIES)) == (8, 6)
+    assert (len(TUTORIALS), len(STUDIES)) == (9, 6)
     index = (DOCS / "studies" / "index.md").read_text(encoding="utf-8")
     for study in STUDIES:
         assert f"({study.name})" in index

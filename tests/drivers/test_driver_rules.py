@@ -1,4 +1,4 @@
-"""What drivers make of commands."""
+"""Command handling of drivers."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ STILL = np.zeros(2)
 
 
 def rules(mode=ControlMode.TORQUE, **options):
-    given = DriverOptions(**({"low_pass": 0.0} | options))
-    return DriverRules(np.array([1.0, 2.0]), np.array([80.0, 10.0]), mode, given, PERIOD)
+    driver_options = DriverOptions(**({"low_pass": 0.0} | options))
+    return DriverRules(np.array([1.0, 2.0]), np.array([80.0, 10.0]), mode, driver_options, PERIOD)
 
 
 def torque(utime, *values, mode=ControlMode.TORQUE):
@@ -28,7 +28,7 @@ def test_a_torque_comes_up_no_faster_than_it_may():
         np.testing.assert_allclose(acting, [expected, -0.5], atol=1e-12)
 
 
-def test_strong_joints_may_be_told_more_at_once():
+def test_strong_joints_have_a_larger_torque_rate():
     rates = torque_rates(1000.0, np.array([87.0, 12.0, 600.0, np.inf]))
     np.testing.assert_array_equal(rates, [1000.0, 1000.0, 6000.0, 1000.0])
 
@@ -68,23 +68,23 @@ def test_velocities_end_with_the_commands():
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "reason"),
     [
         (torque(0, 1.0, 1.0, mode=ControlMode.VELOCITY), "for VELOCITY, the driver is in TORQUE"),
         (torque(0, 1.0, 1.0, 1.0), "for 3 joints, the robot has 2"),
         (torque(0, 1.0, np.nan), "not a finite number"),
     ],
 )
-def test_what_ends_a_driver(command, said):
+def test_what_ends_a_driver(command, reason):
     driver, v = rules(torque_rate=1e9), np.array([1.0, 0.0])
     assert driver.robot_mode is RobotMode.MOVE
     np.testing.assert_array_equal(driver.advance(0, command, v), [-10.0, 0.0])
-    assert said in driver.ended
+    assert reason in driver.ended
     assert driver.robot_mode is RobotMode.REFLEX
     # nothing is taken any more, and the first reason stays
     for later in (torque(1000, 3.0, 3.0), torque(1000, *np.ones(5))):
         np.testing.assert_array_equal(driver.advance(1000, later, v), [-10.0, 0.0])
-    assert said in driver.ended
+    assert reason in driver.ended
 
 
 @pytest.mark.parametrize("options", [{"expiry": 0.0}, {"low_pass": -1.0}, {"torque_rate": np.nan}])

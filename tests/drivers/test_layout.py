@@ -1,4 +1,4 @@
-"""Where messages have what: other numbers put there are those that Drake's types read."""
+"""Layout of messages: numbers written there are those that Drake's types read."""
 
 import struct
 
@@ -40,8 +40,8 @@ def test_a_status(kind, joints):
     assert data[:8] == layout.fingerprint
     q, v, torque = RANDOM.normal(size=(3, joints))
     data[8:16] = struct.pack(">q", 77)
-    for place, values in ((layout.q, q), (layout.v, v), (layout.torque, torque)):
-        data[place : place + 8 * joints] = doubles(values)
+    for offset, values in ((layout.q, q), (layout.v, v), (layout.torque, torque)):
+        data[offset : offset + 8 * joints] = doubles(values)
     found = spoken.decode_status(bytes(data))
     assert found.utime == 77
     np.testing.assert_array_equal([found.q, found.v], [q, v])

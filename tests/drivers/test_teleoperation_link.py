@@ -1,4 +1,4 @@
-"""Both ends of a teleoperation on one bus: the newest counts, and nobody jumps."""
+"""Both ends of a teleoperation on one bus: the newest message counts, and no device jumps."""
 
 import numpy as np
 import pytest
@@ -6,20 +6,20 @@ from pydrake.lcm import DrakeLcm
 
 from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
 from pfsc_drake.drivers.remote_values import encode_values
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd, channel_of
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEndpoint, channel_of
 
 
 def message(count, signal=0.0, energy=0.0):
-    told = np.zeros(MESSAGE)
-    told[FIELDS["count"]], told[FIELDS["signal"]] = count, signal
-    told[FIELDS["felt"]], told[FIELDS["energy"]] = np.arange(1.0, 7.0), energy
-    return told
+    sums = np.zeros(MESSAGE)
+    sums[FIELDS["count"]], sums[FIELDS["signal"]] = count, signal
+    sums[FIELDS["felt"]], sums[FIELDS["energy"]] = np.arange(1.0, 7.0), energy
+    return sums
 
 
 @pytest.fixture(name="ends")
 def fixture_ends():
     lcm = DrakeLcm("memq://")
-    return TeleoperationEnd(lcm, "leader"), TeleoperationEnd(lcm, "follower")
+    return TeleoperationEndpoint(lcm, "leader"), TeleoperationEndpoint(lcm, "follower")
 
 
 def test_nothing_is_zero(ends):
@@ -36,7 +36,7 @@ def test_the_newest_is_heard_by_the_other_side_alone(ends):
 
 
 def test_who_comes_late_does_not_jump(ends):
-    """What had been summed up before counts as nothing; what comes then, in full."""
+    """Earlier sums count as zero, later ones in full."""
     leader, follower = ends
     leader.send(message(500, 7.0, 3.0))
     np.testing.assert_allclose(follower.newest(), message(500, 0.0, 0.0))
@@ -59,23 +59,23 @@ def test_who_begins_anew_goes_on_from_there(ends, monkeypatch):
 
 def test_what_is_old_wrong_or_takes_energy_back_is_lost(ends):
     leader, follower = ends
-    for told in (message(5, 0.0), message(6, 1.0, 0.4)):
-        leader.send(told)
-    kept = follower.newest()
+    for sums in (message(5, 0.0), message(6, 1.0, 0.4)):
+        leader.send(sums)
+    newest_message = follower.newest()
     leader.send(message(4, 9.0, 0.5))
     leader.send(message(7, 9.0, 0.3))
     leader.send(message(8, np.nan, 0.5))
     leader.lcm.Publish(channel_of("leader"), b"nothing of the kind")
     leader.lcm.Publish(channel_of("leader"), encode_values(1, {"count": 9.0}))
-    np.testing.assert_array_equal(follower.newest(), kept)
+    np.testing.assert_array_equal(follower.newest(), newest_message)
     leader.send(message(9, 2.0, 0.6))
     assert follower.newest()[0] == 9.0
 
 
 def test_who_was_there_and_is_silent_is_lost():
     now, lcm = [100.0], DrakeLcm("memq://")
-    leader = TeleoperationEnd(lcm, "leader")
-    follower = TeleoperationEnd(lcm, "follower", 0.5, lambda: now[0])
+    leader = TeleoperationEndpoint(lcm, "leader")
+    follower = TeleoperationEndpoint(lcm, "follower", 0.5, lambda: now[0])
     now[0] += 10.0
     assert not follower.is_lost  # nobody has been there yet
     leader.send(message(1))

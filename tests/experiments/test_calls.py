@@ -279,8 +279,8 @@ def test_margins():
     assert told.is_robust
     assert told.metrics["slowest_rate"].value == told.analysis.nominal.worst.rate < 0.0
     assert {str(case.error) for case in told.analysis.singles} == {
-        "masses believed 5 % too low",
-        "masses believed 5 % too high",
+        "nominal masses 5 % too low",
+        "nominal masses 5 % too high",
     }
     assert told.figures["modes"].png.startswith(b"\x89PNG")
     assert told.sentences[0] in html.unescape(told._repr_html_())

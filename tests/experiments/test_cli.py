@@ -128,7 +128,7 @@ def test_fault(fake_run, scenario, tmp_path, capsys):
     fake_run.outcome.stop = "still moving at t = 1.000 s, joint 2 at 0.3 rad/s"
     assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 3
     assert "; still moving at t = 1.000 s, joint 2 at 0.3 rad/s, " in error_line(capsys)
-    assert f"kept in {tmp_path / 'out'}" in line
+    assert f"log written to {tmp_path / 'out'}" in line
 
 
 def test_input_error_of_the_run(fake_run, scenario, capsys):
@@ -156,7 +156,7 @@ def test_interrupted_run_that_is_kept(fake_run, scenario, tmp_path, capsys):
     fake_run.outcome.interrupted = True
     assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 130
     line = error_line(capsys)
-    assert line.startswith("interrupted at t = 1.000 s, everything logged so far is kept in")
+    assert line.startswith("interrupted at t = 1.000 s, log written to")
 
 
 @pytest.mark.parametrize("fault", [None, "singular"])
@@ -169,7 +169,7 @@ def test_results_that_could_not_be_written(fake_run, scenario, capsys, fault):
     assert captured.err.count("\n") == 1
     assert "error: cannot write log.h5 into out: No space left on device; lost" in captured.err
     assert ("fault: singular" in captured.err) == (fault is not None)
-    assert "everything logged so far is kept" not in captured.err
+    assert "log written to" not in captured.err
 
 
 def test_home_is_found(fake_run, scenario, tmp_path, monkeypatch):
@@ -216,6 +216,16 @@ def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, argume
     assert line.startswith("error: ")
     assert message in line
     assert fake_run.calls == []
+
+
+def test_every_command_has_an_example_that_it_accepts():
+    group = typer.main.get_command(cli.app)
+    commands = {n: c for n, c in group.commands.items() if not hasattr(c, "commands")}
+    assert len(commands) > 10
+    for name, command in commands.items():
+        program, word, *words = command.epilog.removeprefix("Example: ").strip("`").split()
+        assert (program, word) == ("pfsc", name)
+        command.make_context(name, words)  # reads them, and runs nothing
 
 
 def _with_out(group, words=()):

@@ -40,12 +40,12 @@ def test_the_log_of_a_run(exported, tmp_path):
     log.add("tau_d", recorded[:, 4 * N : 5 * N] + [0.0, 0.5, -2.0], "Nm")
     log.write(tmp_path / "log.h5")
     commands = replay_log(folder, tmp_path / "log.h5", quiet)
-    np.testing.assert_array_equal(commands.told, recorded[:, 4 * N : 5 * N])
+    np.testing.assert_array_equal(commands.values, recorded[:, 4 * N : 5 * N])
     np.testing.assert_allclose(commands.difference, [0.0, 0.5, 2.0], atol=1e-12)
     assert (commands.fault, commands.port, commands.unit) == (0, "drive_torque", "Nm")
     table = np.genfromtxt(commands.file, delimiter=",", names=True)
     np.testing.assert_allclose(table["t"], log.time, atol=1e-12)
-    np.testing.assert_allclose(table["drive_torque_3"], commands.told[:, 2], rtol=1e-11)
+    np.testing.assert_allclose(table["drive_torque_3"], commands.values[:, 2], rtol=1e-11)
 
 
 @needs_gcc
@@ -59,7 +59,9 @@ def test_a_log_without_motors_is_one_of_rigid_joints(exported, tmp_path):
     log.write(tmp_path / "log.h5")
     commands = replay_log(folder, tmp_path / "log.h5", quiet)
     table = write_csv(tmp_path / "same.csv", log.time, np.hstack([inputs, inputs]))
-    np.testing.assert_array_equal(commands.told, replay_log(folder, tmp_path / table, quiet).told)
+    np.testing.assert_array_equal(
+        commands.values, replay_log(folder, tmp_path / table, quiet).values
+    )
     assert commands.difference is None
 
 
@@ -75,7 +77,7 @@ def test_a_table_of_a_robot_at_its_own_rate(exported, tmp_path):
     folder, recorded = exported
     times, inputs = 5.0 + 1e-3 * np.arange(TICKS), recorded[:, : 4 * N]
     commands = replay_log(folder, tmp_path / write_csv(tmp_path / "all.csv", times, inputs), quiet)
-    np.testing.assert_array_equal(commands.told, recorded[:, 4 * N : 5 * N])
+    np.testing.assert_array_equal(commands.values, recorded[:, 4 * N : 5 * N])
     slow = replay_log(
         folder, tmp_path / write_csv(tmp_path / "slow.csv", times[::2], inputs[::2]), quiet
     )
@@ -83,7 +85,7 @@ def test_a_table_of_a_robot_at_its_own_rate(exported, tmp_path):
     same = replay_log(
         folder, tmp_path / write_csv(tmp_path / "held.csv", times[: len(held)], held), quiet
     )
-    np.testing.assert_array_equal(slow.told, same.told)
+    np.testing.assert_array_equal(slow.values, same.values)
 
 
 @needs_gcc
@@ -147,7 +149,7 @@ def test_another_interface_is_refused(tmp_path, change, said):
     (tmp_path / "interface.json").write_text(json.dumps(content))
     with pytest.raises(InputError, match=f"interface.json: {said}") as error:
         replay_log(tmp_path, tmp_path / "a.csv", quiet)
-    assert str(error.value).endswith("allowed: what export has written")
+    assert str(error.value).endswith("allowed: a file written by export")
 
 
 @needs_gcc

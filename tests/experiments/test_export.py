@@ -86,7 +86,7 @@ def assert_torques_are_fed_from_a_log(folder, recorded):
     for k, name in enumerate(names):
         log.add(name, recorded[:, 6 * k : 6 * k + 6])
     log.write(folder / "log.h5")
-    told = replay_log(folder, folder / "log.h5", quiet).told
+    told = replay_log(folder, folder / "log.h5", quiet).values
     np.testing.assert_array_equal(told, recorded[:, 30:36])
 
 

@@ -44,9 +44,9 @@ def test_what_it_would_have_told_the_drives(controller, monkeypatch):
         quiet=True,
     )
     commands = controller.replay(simulated, quiet=True)
-    np.testing.assert_array_equal(commands.told, simulated.log["tau_d"].values)
+    np.testing.assert_array_equal(commands.values, simulated.log["tau_d"].values)
     same = controller.replay(simulated.folder / "log.h5", quiet=True)
-    np.testing.assert_array_equal(commands.told, same.told)
+    np.testing.assert_array_equal(commands.values, same.values)
     assert commands.difference.max() == 0.0
 
 

@@ -1,5 +1,6 @@
-"""Recording at the end of a run."""
+"""Recording and further commands at the end of a run."""
 
+from pathlib import Path
 from unittest.mock import MagicMock
 
 import pytest
@@ -28,3 +29,11 @@ def test_a_meshcat_that_is_ended_from_outside_is_replaced(monkeypatch):
     with pytest.raises(RuntimeError, match="has ended"):
         finished_run._recording(prepared, motion)
     assert len(meshcats) == 3
+
+
+def test_commands_after_a_run_can_be_pasted():
+    again, compare = finished_run._further_commands(Path("my out/a"), simulated=True).values()
+    assert again == "pfsc run 'my out/a/scenario.yaml' --out OTHER"
+    assert compare == "pfsc compare 'my out/a' OTHER"
+    (only,) = finished_run._further_commands(Path("a"), simulated=False).values()
+    assert only == "pfsc compare a OTHER"

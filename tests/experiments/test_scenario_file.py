@@ -234,3 +234,49 @@ def test_wrong_changes(scenario, key, value, message):
         apply_change(load_scenario_data(scenario, []), key, value)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def locations_of(scenario, *overrides):
+    return read_scenario(str(scenario), list(overrides)).locations
+
+
+def test_keys_have_the_lines_of_their_file(scenario):
+    locations = locations_of(scenario)
+    lines = {"name": 2, "path": 4, "path.size": 4, "controller.law": 6, "points[1][0]": 9}
+    assert {key: locations[key] for key in lines} == lines
+    # an alias is written at its anchor
+    assert (locations["controller.second"], locations["controller.second.b[1]"]) == (8, 1)
+
+
+def test_overrides_replace_lines(scenario):
+    locations = locations_of(scenario, "points.1.0=-7", "controller.second=3", "plant.tool.mass=1")
+    assert locations["points[1][0]"] == "--set points.1.0=-7"
+    assert locations["points[1][1]"] == locations["points[1]"] == 9
+    assert locations["controller.second"] == "--set controller.second=3"
+    assert "controller.second.b" not in locations
+    assert locations["controller.first.b"] == 1
+    assert locations["plant"] == locations["plant.tool.mass"] == "--set plant.tool.mass=1"
+
+
+def test_a_long_override_is_shortened(scenario):
+    found = locations_of(scenario, f"points=[{', '.join(['[0, 1]'] * 100)}]")["points"]
+    assert len(found) <= 70
+    assert found.startswith("--set points=[[0, 1], ")
+
+
+def test_changes_of_python_are_named(scenario):
+    loaded = read_scenario(str(scenario), [])
+    loaded.change("points.0.1", 5)
+    assert loaded.data["points"][0] == [1, 5]
+    assert loaded.locations["points[0][1]"] == "change points.0.1 = 5"
+
+
+def test_messages_name_the_file_and_the_line(scenario):
+    source = read_scenario(str(scenario), ["path.file=points.csv"]).source
+    assert str(source.refusal(["controller.law = magic"])) == (
+        f"{scenario}:6: controller.law = magic"
+    )
+    missing = scenario.parent / "points.csv"
+    assert str(source.refusal([f"{missing}: no such file"])) == (
+        f"{scenario}: --set path.file=points.csv: path.file: {missing}: no such file"
+    )

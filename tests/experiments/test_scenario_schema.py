@@ -12,7 +12,10 @@ from diagrams.scenario import Scenario
 from experiments.cli import main
 from experiments.scenario_file import SCENARIO_DIRECTORY, apply_change, scenario_names
 from pfsc_drake.checks import NUMBER
+from pfsc_drake.yaml.dumping import changed_data, dump_typed
 from pfsc_drake.yaml.json_schema import json_schema, tags_of
+from pfsc_drake.yaml.reading import dump_yaml
+from pfsc_drake.yaml.typed import load_file, load_typed
 
 SCHEMA = SCENARIO_DIRECTORY / "scenario.schema.json"
 VALIDATOR = Draft7Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
@@ -35,6 +38,14 @@ def scenario(name: str, *changes: str) -> Any:
         key, _, value = change.partition("=")
         apply_change(data, key, yaml.load(value, EditorLoader))
     return data
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_the_changed_keys_of_a_shipped_scenario_load_as_the_whole(name: str) -> None:
+    settings = load_file(Scenario, SCENARIO_DIRECTORY / f"{name}.yaml")
+    changed = changed_data(settings)
+    assert dump_typed(load_typed(Scenario, changed, name)) == dump_typed(settings)
+    assert len(dump_yaml(changed)) < 0.7 * len(dump_typed(settings))
 
 
 def test_the_file_is_current(capsys: pytest.CaptureFixture[str]) -> None:

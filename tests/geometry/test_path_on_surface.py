@@ -82,7 +82,7 @@ def test_torsion_of_a_helix():
 @pytest.mark.slow(but=["2-closed", "2-open"])
 @pytest.mark.parametrize("name", CURVES)
 @pytest.mark.parametrize("order", [2, 4])
-def test_what_the_law_is_told_is_the_frame_of_the_surface(name, order):
+def test_the_law_receives_the_frame_of_the_surface(name, order):
     path = path_on_surface(*CURVES[name])
     evaluator = path.evaluator(order)
     layout = evaluator.layout
@@ -99,11 +99,13 @@ def test_what_the_law_is_told_is_the_frame_of_the_surface(name, order):
         assert np.allclose(point[layout.position].reshape(-1, 3), derivatives, rtol=1e-9, atol=1e-8)
 
 
-def test_a_lap_leads_back_to_the_same_frame():
+def test_a_revolution_leads_back_to_the_same_frame():
     path = path_on_surface(*CURVES["closed"])
     evaluator = path.evaluator(2)
     layout = evaluator.layout
-    first, second = (evaluator.evaluate_at(0.4 + lap * path.position.period) for lap in (0, 3))
+    first, second = (
+        evaluator.evaluate_at(0.4 + revolution * path.position.period) for revolution in (0, 3)
+    )
     assert np.allclose(first[layout.normal], second[layout.normal], atol=1e-12)
     assert second[layout.eta] - first[layout.eta] == pytest.approx([3 * path.length], abs=1e-9)
 

@@ -53,7 +53,7 @@ def test_degenerate_segments(ends, expected):
     assert float(to_point(*map(ca.DM, (a, b, c)))) == pytest.approx(least, abs=1e-4)
 
 
-def test_vectors_lead_from_the_nearest_place():
+def test_vectors_lead_from_the_closest_point():
     rng = np.random.default_rng(2)
     for _ in range(20):
         a, b, c, d = (ca.DM(end) for end in rng.normal(size=(4, 3)))

@@ -48,7 +48,7 @@ def test_length_is_the_integral_of_the_slope(degree, points):
 
 
 @pytest.mark.parametrize("degree", DEGREES)
-def test_sharpened_control_points_lead_by_the_way_points(degree):
+def test_sharpened_control_points_pass_near_the_waypoints(degree):
     """Beside a circle of radius R the error is of the fourth order of the distance over R."""
     own, radius = UniformSpline(degree), 0.1
 

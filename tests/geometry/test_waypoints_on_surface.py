@@ -28,7 +28,7 @@ def on_tube(angle, height):
 
 
 def test_two_waypoints_on_a_cylinder_make_a_helix():
-    """Two laps and a half; their length is a helix's."""
+    """Two and a half revolutions; their length is a helix's."""
     curve = curve_through(TUBE, [[0.3, -0.2], [1.3, -0.1], [15.3, 0.3]][::2], smoothness=5)
     path = path_on_surface(TUBE, curve)
     assert path.length == pytest.approx(math.hypot(15.0 * RADIUS, 0.5), rel=1e-9)
@@ -58,9 +58,11 @@ def test_points_near_the_surface_are_put_on_it():
     height = 0.02 * angle
     beside = on_tube(angle, height) * [1.002, 1.002, 1.0]
     thetas = project_waypoints(TUBE, beside, 1e-3, closed=False)
-    lap = thetas[0, 0] - angle[0]
-    assert abs(lap / (2.0 * math.pi) - round(lap / (2.0 * math.pi))) < 1e-12
-    np.testing.assert_allclose(thetas - [lap, 0.0], np.stack([angle, height], axis=1), atol=1e-9)
+    revolution = thetas[0, 0] - angle[0]
+    assert abs(revolution / (2.0 * math.pi) - round(revolution / (2.0 * math.pi))) < 1e-12
+    np.testing.assert_allclose(
+        thetas - [revolution, 0.0], np.stack([angle, height], axis=1), atol=1e-9
+    )
     with pytest.raises(InputError, match=r"waypoint 1:.* 0\.4 mm .* at most 0\.3 mm"):
         project_waypoints(TUBE, beside, 0.3e-3, closed=False)
     ring = on_tube(np.arange(12) * math.pi / 6, np.zeros(12))
@@ -86,9 +88,9 @@ def test_the_orientation_is_that_of_the_frame(smoothness):
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     frame = np.stack([first, np.cross(normal, first), normal], axis=2)
-    expected, made = frame @ offset, orientation.rotation_matrix(theta)
+    expected, result = frame @ offset, orientation.rotation_matrix(theta)
     for k in range(3):
-        assert angle_between(made[:, :, k], expected[:, :, k]).max() < 2e-6
+        assert angle_between(result[:, :, k], expected[:, :, k]).max() < 2e-6
 
 
 def test_wrong_waypoints():

@@ -10,7 +10,7 @@ from identification.measurement.record import Record
 
 @dataclass
 class TwoJoints:
-    """What records are checked against."""
+    """References for records."""
 
     name: str = "crane"
     joint_names: tuple = ("swing", "lift")

@@ -68,14 +68,14 @@ def test_friction_that_data_ask_for_is_chosen_and_predicts(delta):
         return 4.0 * np.sign(v) * np.exp(-np.abs(v) / 0.1)
 
     other = measured(delta, 9, slower(delta.trajectory), stribeck)
-    told = []
+    reports = []
     found = find_parameters(
         delta.regressor,
         delta.base,
         [measured(delta, 1, further=stribeck)],
         other,
         truth=delta.truth,
-        progress=lambda fraction, phase: told.append((fraction, phase)),
+        progress=lambda fraction, phase: reports.append((fraction, phase)),
     )
     assert {term.joint for term in found.estimate.friction.terms} == {0, 1, 2}
     plain = find_parameters(
@@ -84,8 +84,8 @@ def test_friction_that_data_ask_for_is_chosen_and_predicts(delta):
     assert np.all(found.prediction.rms < plain.prediction.rms)
     # (0, ..) of what the robot does not have
     assert found.truth.size == found.estimate.base.rank > delta.base.rank
-    assert told[0] == (0.0, "choosing friction")
-    assert told[-1][0] == 1.0
+    assert reports[0] == (0.0, "choosing friction")
+    assert reports[-1][0] == 1.0
 
 
 def test_the_consistent_set_is_that_of_all_runs(delta):

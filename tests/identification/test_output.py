@@ -29,7 +29,7 @@ def test_folders(tmp_path):
     [["excite", ROBOT], ["simulate", ROBOT], ["estimate", ROBOT, "a.csv"]],
     ids=lambda command: command[0],
 )
-def test_a_file_in_place_of_the_folder_is_refused_before_the_work(
+def test_a_file_instead_of_the_folder_is_refused_before_the_work(
     tmp_path, monkeypatch, capsys, command
 ):
     for step in ("excitation.search.search", "steps.simulate_runs", "pages.identify"):
@@ -42,27 +42,27 @@ def test_a_file_in_place_of_the_folder_is_refused_before_the_work(
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "reason"),
     [
         (["--periods", "1000000000"], "--periods 1000000000 of 10 s: 1e+10 s; allowed: a run of"),
         (["--period", "nan"], "nan s; allowed: a run of up to 3600 s"),
         (["--starts", "999999999"], "'--starts': Input should be less than or equal to 1000"),
     ],
 )
-def test_a_search_without_end_is_refused(capsys, options, said):
+def test_a_search_without_end_is_refused(capsys, options, reason):
     assert main(["excite", ROBOT, *options]) == 2
-    assert said in capsys.readouterr().err
+    assert reason in capsys.readouterr().err
 
 
 def test_a_full_disk_loses_nothing(tmp_path, record, robot):
     file = tmp_path / "run.h5"
     file.symlink_to("/dev/full")
-    with pytest.raises(WriteError, match="No space left on device; kept in /") as caught:
+    with pytest.raises(WriteError, match="No space left on device; saved in /") as caught:
         write_record(file, record, robot)
-    kept = Path(str(caught.value).rpartition("kept in ")[2])
-    assert (read_record(kept, robot).tau == record.tau).all()
-    kept.unlink()
-    kept.parent.rmdir()
+    saved = Path(str(caught.value).rpartition("saved in ")[2])
+    assert (read_record(saved, robot).tau == record.tau).all()
+    saved.unlink()
+    saved.parent.rmdir()
     # nothing half-written is left in its place
     assert not file.is_symlink()
     with pytest.raises(InputError, match="cannot be written: No such file") as caught:

@@ -96,7 +96,7 @@ def test_what_a_sender_had_before_it_was_initialized_is_never_delivered():
 
 
 def test_no_direct_feedthrough():
-    """But at the start, when it delivers what is sent then."""
+    """Except at the start, when the output is the present input."""
     program = Program(Network.of(BusDelay(3, 2e-3, 1e-3)))
     for port in ("delivered", "silence"):
         stage, _ = program.output(port)
@@ -137,7 +137,7 @@ def test_period_must_be_positive():
 
 
 def test_lost_frames():
-    """What was sent from 3 ms to 6 ms never arrives; what arrived last is delivered on."""
+    """Frames from 3 ms to 6 ms never arrive; the output keeps its last value."""
     builder = DiagramBuilder()
     clock = builder.AddSystem(Clock())
     bus = add_bus_delay(builder, clock.get_output_port(), 2 * T, T, lost=(2.5 * T, 5.5 * T))

@@ -29,11 +29,11 @@ def test_the_newest_that_has_arrived_is_delivered():
     parameters = ChannelParameters(0.004, 0.006, 0.3, seed=5)
     random = np.random.default_rng(5)
     delays = np.maximum(1, 4 + random.integers(0, 6, 8192, endpoint=True))
-    kept = random.uniform(size=8192) >= 0.3
+    arrives = random.uniform(size=8192) >= 0.3
     ticks = 300
     expected = []
     for now in range(ticks):
-        here = [s for s in range(now + 1) if kept[s] and s + delays[s] <= now]
+        here = [s for s in range(now + 1) if arrives[s] and s + delays[s] <= now]
         expected.append(max(here) + 1 if here else 0)
     assert arrivals(parameters, ticks) == expected
     assert (np.diff(expected) >= 0).all()

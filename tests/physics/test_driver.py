@@ -11,14 +11,14 @@ from pfsc_drake.physics.driver import DriveLowPass, low_pass_share
 PERIOD = 1e-3
 
 
-def test_it_begins_with_what_is_told_and_follows_a_step():
-    """What holds the weight at the start is not taken away from the drives first."""
+def test_it_begins_with_the_command_and_follows_a_step():
+    """The torque that carries the weight at the start is not removed first."""
     weight, step = np.array([100.0, -40.0]), np.array([8.0, 5.0])
     driver, w = Stepper(DriveLowPass(2, 30.0, PERIOD)), 2.0 * math.pi * 30.0 * PERIOD
     for _ in range(3):
-        np.testing.assert_array_equal(driver.step(told=weight)["passed"], weight)
+        np.testing.assert_array_equal(driver.step(command=weight)["passed"], weight)
     for k in range(1, 20):
-        passed = driver.step(told=weight + step)["passed"]
+        passed = driver.step(command=weight + step)["passed"]
         np.testing.assert_allclose(passed, weight + step * (1.0 - (1.0 + w) ** -k), rtol=1e-12)
 
 

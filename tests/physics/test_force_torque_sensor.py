@@ -247,7 +247,7 @@ BIAS = np.array([0.5, -0.5, 0.0, 0.1, 0.0, -0.1])
 
 
 class Sensor:
-    """A sensor under loads that are told, beside its filter in numpy."""
+    """A sensor under known loads, against its filter in numpy."""
 
     def __init__(self):
         self.parameters = quiet(bandwidth=150.0, bias=BIAS, measurement_range=RANGE)

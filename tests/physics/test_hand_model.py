@@ -51,7 +51,7 @@ def test_the_target_rests_at_every_waypoint():
 
 
 def test_the_target_has_the_profile_of_minimum_jerk():
-    """Peak velocity 1.875 and peak acceleration 5.774 of way / time and way / time^2."""
+    """Peak velocity 1.875 distance / time and peak acceleration 5.774 distance / time^2."""
     model = hand()
     time = np.linspace(1.0, 3.0, 20001)
     p, v = (values[:, 0] for values in over_time(model.target, time))
@@ -67,22 +67,22 @@ def test_the_target_has_the_profile_of_minimum_jerk():
 def test_it_pulls_like_a_spring_and_a_damper():
     model = hand(stiffness=200.0, damping=20.0, rotational_damping=0.5)
     twist = np.array([0.1, 0.0, -0.2, 1.0, 2.0, -3.0])
-    wanted = numbers(model.wanted(0.0, np.array([0.05, -0.02, 0.0]), twist))
-    assert wanted == pytest.approx([-10 - 2, 4, 4, -0.5, -1.0, 1.5])
+    desired_wrench = numbers(model.desired_wrench(0.0, np.array([0.05, -0.02, 0.0]), twist))
+    assert desired_wrench == pytest.approx([-10 - 2, 4, 4, -0.5, -1.0, 1.5])
     # at full grip, within the limits
-    assert numbers(model.delivered(2.0, wanted)) == pytest.approx(wanted)
+    assert numbers(model.output_wrench(2.0, desired_wrench)) == pytest.approx(desired_wrench)
 
 
 def test_force_and_torque_have_limits():
     model = hand(force_limit=30.0, torque_limit=2.0, tremor=5.0)
     random = np.random.default_rng(0)
     for time in np.linspace(0.0, 6.0, 200):
-        wanted = random.normal(scale=50.0, size=6)
-        delivered = numbers(model.delivered(time, wanted))
+        desired_wrench = random.normal(scale=50.0, size=6)
+        delivered = numbers(model.output_wrench(time, desired_wrench))
         assert np.linalg.norm(delivered[:3]) <= 30.0 * (1.0 + 1e-12)
         assert np.linalg.norm(delivered[3:]) <= 2.0 * (1.0 + 1e-12)
     large = np.array([300.0, 400.0, 0.0, 0.0, 0.0, -9.0])
-    delivered = numbers(hand(force_limit=30.0, torque_limit=2.0).delivered(2.0, large))
+    delivered = numbers(hand(force_limit=30.0, torque_limit=2.0).output_wrench(2.0, large))
     assert delivered == pytest.approx([18.0, 24.0, 0.0, 0.0, 0.0, -2.0])
 
 
@@ -90,7 +90,7 @@ def test_it_takes_hold_and_lets_go():
     model = hand(grip_ramp=0.2, release=5.0)
     (grip,) = over_time(model.grip, [0.9, 1.0, 1.1, 1.2, 5.0, 5.1, 5.2, 9.0])
     assert grip.ravel() == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0, 0.5, 0.0, 0.0])
-    assert not np.any(numbers(model.delivered(9.0, np.full(6, 3.0))))
+    assert not np.any(numbers(model.output_wrench(9.0, np.full(6, 3.0))))
 
 
 def test_tremor_lies_in_its_band_with_its_strength():

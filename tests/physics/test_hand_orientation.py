@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint, Wander
-from pfsc_drake.physics.hand_way import OrientationTarget
+from pfsc_drake.physics.hand_path import OrientationTarget
 from pfsc_drake.yaml.typed import load_typed
 
 TIMES = np.array([1.0, 3.0, 4.0])
@@ -26,8 +26,8 @@ def numbers(expression):
 
 
 def turning_hand(*zyx_deg, **changes):
-    way = [HandWaypoint(1.0 + i, np.zeros(3), angles) for i, angles in enumerate(zyx_deg)]
-    options = {"waypoints": way, "rotational_stiffness": 5.0, "torque_limit": 100.0}
+    waypoints = [HandWaypoint(1.0 + i, np.zeros(3), angles) for i, angles in enumerate(zyx_deg)]
+    options = {"waypoints": waypoints, "rotational_stiffness": 5.0, "torque_limit": 100.0}
     return HandModel(HandParameters(**options | changes))
 
 
@@ -39,7 +39,7 @@ def test_the_target_rests_in_every_orientation():
         assert not np.any(w_d)
 
 
-def test_the_target_turns_about_one_axis_the_shorter_way():
+def test_the_target_turns_about_one_axis_by_the_smaller_angle():
     target = OrientationTarget(TIMES, ANGLES)
     whole = (rotation(ANGLES[1]) * rotation(ANGLES[0]).inv()).as_rotvec()
     assert np.linalg.norm(whole) < np.deg2rad(40.0)  # not 340 deg back through zero
@@ -62,9 +62,9 @@ def test_it_turns_like_a_spring_and_a_damper():
     axis, angle = np.array([0.6, 0.0, -0.8]), 0.4
     R_e = (Rotation.from_rotvec(-angle * axis) * rotation([10, 20, 30])).as_matrix()
     twist = np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3])
-    wanted = numbers(hand.wanted(5.0, ca.DM.zeros(3), twist, R_e))
-    assert wanted[3:] == pytest.approx(5.0 * angle * axis - 0.5 * twist[3:])
-    assert not np.any(wanted[:3])
+    desired_wrench = numbers(hand.desired_wrench(5.0, ca.DM.zeros(3), twist, R_e))
+    assert desired_wrench[3:] == pytest.approx(5.0 * angle * axis - 0.5 * twist[3:])
+    assert not np.any(desired_wrench[:3])
 
 
 def test_it_damps_what_is_not_its_own_turning():
@@ -73,9 +73,11 @@ def test_it_damps_what_is_not_its_own_turning():
     w_d = numbers(target.at(1.5)[1])
     R_e = rotation([20.0, 0.0, 0.0]).as_matrix()
     along = np.concatenate([np.zeros(3), w_d])
-    wanted = [numbers(hand.wanted(1.5, ca.DM.zeros(3), twist, R_e)) for twist in (along, STILL)]
-    assert wanted[0] == pytest.approx(STILL, abs=1e-12)
-    assert wanted[1][3:] == pytest.approx(0.5 * w_d)
+    desired_wrench = [
+        numbers(hand.desired_wrench(1.5, ca.DM.zeros(3), twist, R_e)) for twist in (along, STILL)
+    ]
+    assert desired_wrench[0] == pytest.approx(STILL, abs=1e-12)
+    assert desired_wrench[1][3:] == pytest.approx(0.5 * w_d)
 
 
 def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
@@ -85,7 +87,7 @@ def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
     R_e, w, angles = Rotation.identity(), np.zeros(3), []
     times = 2.0 + step * np.arange(2000)  # the grip is firm
     time, rate, R = ca.MX.sym("time"), ca.MX.sym("twist", 6), ca.MX.sym("R_e", 3, 3)
-    wrench = hand.delivered(time, hand.wanted(time, ca.DM.zeros(3), rate, R))
+    wrench = hand.output_wrench(time, hand.desired_wrench(time, ca.DM.zeros(3), rate, R))
     torque = ca.Function("torque", [time, rate, R], [wrench[3:]])
     for time in times:
         angles.append(R_e.as_rotvec()[0])
@@ -105,8 +107,8 @@ def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
 
 
 def test_an_orientation_that_is_left_out_stays():
-    way = [HandWaypoint(0.0, np.zeros(3), [0.0, 0.0, 20.0]), HandWaypoint(1.0, np.ones(3))]
-    target = HandParameters(waypoints=way, rotational_stiffness=1.0).orientation()
+    waypoints = [HandWaypoint(0.0, np.zeros(3), [0.0, 0.0, 20.0]), HandWaypoint(1.0, np.ones(3))]
+    target = HandParameters(waypoints=waypoints, rotational_stiffness=1.0).orientation()
     R_d = numbers(target.at(2.0)[0])
     assert R_d == pytest.approx(rotation([0.0, 0.0, 20.0]).as_matrix())
 
@@ -114,7 +116,7 @@ def test_an_orientation_that_is_left_out_stays():
 def test_a_hand_without_stiffness_does_not_turn():
     assert HandParameters().orientation() is None
     hand, turned = HandModel(HandParameters()), np.diag([-1.0, -1, 1])
-    assert not np.any(numbers(hand.wanted(0.0, ca.DM.zeros(3), STILL, turned)))
+    assert not np.any(numbers(hand.desired_wrench(0.0, ca.DM.zeros(3), STILL, turned)))
 
 
 @pytest.mark.parametrize(

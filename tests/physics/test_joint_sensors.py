@@ -108,7 +108,7 @@ def test_filter():
     assert np.isclose(measured[-1, 3], 0.2, rtol=0, atol=1e-9)
 
 
-def test_velocity_is_held_between_ticks():
+def test_velocity_is_constant_between_ticks():
     _, _, simulator, encoders = measure(EncoderOptions(difference_quotient=True), 0.01)
     context = encoders.GetMyContextFromRoot(simulator.get_context())
     velocities = []

@@ -19,11 +19,11 @@ def test_a_clutch_scales_and_lets_loose():
     handle = np.concatenate([np.linspace(0, 0.011, 12), np.linspace(0.01, 0.002, 9)])
     handle = np.append(handle, 0.002 + 0.001 * np.arange(1, 10))
     rows = [clutch.step(handle=[x, 0.0, 0.0]) for x in handle]
-    place = np.array([row["position"] for row in rows]) - START
-    np.testing.assert_allclose(place[:11, 0], 2.0 * handle[:11], atol=1e-12)
-    np.testing.assert_allclose(place[11:21, 0], 2.0 * handle[10], atol=1e-12)
+    displacement = np.array([row["position"] for row in rows]) - START
+    np.testing.assert_allclose(displacement[:11, 0], 2.0 * handle[:11], atol=1e-12)
+    np.testing.assert_allclose(displacement[11:21, 0], 2.0 * handle[10], atol=1e-12)
     further = handle[21:] - handle[20]
-    np.testing.assert_allclose(place[21:, 0], 2.0 * (handle[10] + further), atol=1e-12)
+    np.testing.assert_allclose(displacement[21:, 0], 2.0 * (handle[10] + further), atol=1e-12)
     grip = np.array([row["grip"][0] for row in rows])
     assert (grip[:10] == 1.0).all()
     assert (grip[10:20] == 0.0).all()
@@ -31,7 +31,7 @@ def test_a_clutch_scales_and_lets_loose():
 
 
 def test_a_hand_at_an_open_clutch_goes_back_to_the_middle():
-    """What it sees is beside its target by the way of the handle."""
+    """The observed position deviates from the target by the displacement of the handle."""
     clutch = Stepper(Clutch(1.0, START, [ClutchParameters(0.0, 1.0)], T))
     for _ in range(300):
         row = clutch.step(handle=[0.03, 0.0, -0.01])
@@ -66,8 +66,8 @@ def test_turns_are_scaled_and_let_loose():
     clutch = Stepper(TurningClutch(0.5, TURNED.as_matrix(), [ClutchParameters(0.01, 0.02)], T))
     axis = np.array([0.6, 0.0, 0.8])
     angle = np.concatenate([np.linspace(0, 0.11, 12), np.linspace(0.1, 0.02, 9), [0.12, 0.32]])
-    led, _ = turns(clutch, angle[:, None] * axis)
-    turned = [(R * TURNED.inv()).as_rotvec() @ axis for R in led]
+    follower, _ = turns(clutch, angle[:, None] * axis)
+    turned = [(R * TURNED.inv()).as_rotvec() @ axis for R in follower]
     np.testing.assert_allclose(turned[:11], 0.5 * angle[:11], atol=1e-12)
     np.testing.assert_allclose(turned[11:21], 0.5 * angle[10], atol=1e-12)
     np.testing.assert_allclose(turned[21:], 0.5 * (angle[10] + np.array([0.1, 0.3])), atol=1e-12)
@@ -76,10 +76,10 @@ def test_turns_are_scaled_and_let_loose():
 def test_with_a_scale_of_one_the_follower_turns_as_the_handle():
     """Whatever the way: R_x = R_p R_x0."""
     random = np.random.default_rng(3)
-    way = np.cumsum(random.normal(0.0, 0.2, (40, 3)), axis=0) * 0.3
-    way -= way[0]
-    led, seen = turns(Stepper(TurningClutch(1.0, TURNED.as_matrix(), [], T)), way)
-    for R, S, vector in zip(led, seen, way, strict=True):
+    rotations = np.cumsum(random.normal(0.0, 0.2, (40, 3)), axis=0) * 0.3
+    rotations -= rotations[0]
+    follower, target = turns(Stepper(TurningClutch(1.0, TURNED.as_matrix(), [], T)), rotations)
+    for R, S, vector in zip(follower, target, rotations, strict=True):
         expected = (Rotation.from_rotvec(vector) * TURNED).as_matrix()
         np.testing.assert_allclose(R.as_matrix(), expected, atol=1e-12)
         np.testing.assert_allclose(S.as_matrix(), expected, atol=1e-12)
@@ -87,9 +87,11 @@ def test_with_a_scale_of_one_the_follower_turns_as_the_handle():
 
 def test_a_hand_at_an_open_clutch_turns_back():
     clutch = Stepper(TurningClutch(1.0, TURNED.as_matrix(), [ClutchParameters(0.0, 1.0)], T))
-    led, seen = turns(clutch, [[0.2, -0.1, 0.0]] * 300)
-    np.testing.assert_allclose((seen[-1] * led[-1].inv()).as_rotvec(), [0.2, -0.1, 0.0], atol=1e-9)
-    np.testing.assert_allclose(led[-1].as_matrix(), TURNED.as_matrix(), atol=1e-12)
+    follower, target = turns(clutch, [[0.2, -0.1, 0.0]] * 300)
+    np.testing.assert_allclose(
+        (target[-1] * follower[-1].inv()).as_rotvec(), [0.2, -0.1, 0.0], atol=1e-9
+    )
+    np.testing.assert_allclose(follower[-1].as_matrix(), TURNED.as_matrix(), atol=1e-12)
 
 
 def test_the_pose_that_a_hand_goes_by_has_the_orientation():

@@ -1,4 +1,4 @@
-"""What wrenches on links mean in the joints, and where they act, against Drake's kinematics."""
+"""Joint torques and points of action of wrenches on links, against Drake's kinematics."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pfsc_drake.physics.link_forces import LinkForces
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.serial.link_places import place_on_link
+from pfsc_drake.robot.serial.link_points import point_on_link
 from pfsc_drake.systems.block_system import BlockSystem
 
 # links and points in the axes of their bodies [m]
@@ -37,8 +37,8 @@ def chain(plant):
 def put_out(plant, chain):
     """Return a function that evaluates the block's outputs."""
     robot, coordinates = chain
-    found = [place_on_link(plant, coordinates, name, point) for name, point in POINTS]
-    block = LinkForces(robot, [(place.link, place.p_LQ) for place in found])
+    found = [point_on_link(plant, coordinates, name, point) for name, point in POINTS]
+    block = LinkForces(robot, [(one.link, one.p_LQ) for one in found])
     system = BlockSystem(block, 1e-3)
 
     def evaluate(joint_state, wrenches):
@@ -58,17 +58,17 @@ def test_points_and_torques_match_drake(plant, chain, put_out):
     coordinates = chain[1]
     context = plant.CreateDefaultContext()
     plant.SetPositionsAndVelocities(context, coordinates.plant_state(joint_state))
-    world, expected, places = plant.world_frame(), np.zeros(6), []
+    world, expected, positions = plant.world_frame(), np.zeros(6), []
     for (link, point), wrench in zip(POINTS, wrenches.reshape(-1, 6), strict=True):
         frame = plant.GetFrameByName(link)
         jacobian = plant.CalcJacobianSpatialVelocity(
             context, JacobianWrtVariable.kV, frame, point, world, world
         )
         expected += jacobian.T @ np.concatenate([wrench[3:], wrench[:3]])
-        places.append(frame.CalcPoseInWorld(context) @ point)
+        positions.append(frame.CalcPoseInWorld(context) @ point)
     rows = coordinates.link_rows[6:, plant.num_positions() :]
     points, tau_ext = put_out(joint_state, wrenches)
-    assert np.allclose(points, np.concatenate(places), rtol=0, atol=1e-12)
+    assert np.allclose(points, np.concatenate(positions), rtol=0, atol=1e-12)
     assert np.allclose(tau_ext, np.linalg.solve(rows.T, expected), rtol=0, atol=1e-11 * 30.0)
     assert np.abs(tau_ext[:5]).min() > 0.1
     # no point is beyond the fifth joint

@@ -19,7 +19,7 @@ def force(time, point=START, velocity=REST, **changes):
 
 
 def test_spring_and_damper_towards_the_hand():
-    """At the end of the way 300 N/m times what is left of 15 cm, less 30 N s/m times speed."""
+    """Finally 300 N/m times the remaining deflection of 15 cm, less 30 N s/m times speed."""
     moved = START + np.array([0.0, 0.1, 0.02])
     assert force(1.6, moved, np.array([0.1, 0.0, -0.2])) == pytest.approx(
         [-3.0, 300 * 0.05, -300 * 0.02 + 6.0]
@@ -66,18 +66,18 @@ def test_wrong_properties_are_refused(changes, message):
         LinkHandParameters(**PUSH | changes)
 
 
-def pushed(place):
+def pushed(position_at):
     """Return the forces [N] on a point that is somewhere at each time, and the times."""
     block = LinkHand(
         LinkHandParameters("link_4", way=[0, 0.1, 0], begin=0.2, duration=0.3, hold=0.2), 1e-3
     )
     stepper, times = Stepper(block), 1e-3 * np.arange(1001)
-    wrenches = np.array([stepper.step(point=place(time))["wrench"] for time in times])
+    wrenches = np.array([stepper.step(point=position_at(time))["wrench"] for time in times])
     assert not wrenches[:, 3:].any()
     return times, wrenches[:, :3]
 
 
-def test_the_way_begins_where_the_point_was_then():
+def test_the_motion_begins_at_the_grasped_position():
     time, found = pushed(lambda t: [0.5 * t, 0.0, 0.0])
     assert not found[time <= 0.2].any()
     k = np.flatnonzero(np.isclose(time, 0.6))[0]

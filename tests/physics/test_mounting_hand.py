@@ -31,17 +31,17 @@ class Operator:
         parts = ca.vertsplit(state, np.cumsum([0, *self._sizes]).tolist())
         x = Values(**dict(zip(block.states, parts, strict=True)))
         time, pose, twist, held = (ca.MX.sym(name, n) for name, n in SIZES.items())
-        after = ca.vertcat(*(vars(x) | block.following(x, time, pose, held)).values())
+        after = ca.vertcat(*(vars(x) | block.next_states(x, time, pose, held)).values())
         vacuum = block.output(x, Values(), 0.0)["vacuum"]
-        wanted = block.wanted(x, time, pose, twist)
+        desired_wrench = block.desired_wrench(x, time, pose, twist)
         self._step = ca.Function("step", [state, time, pose, held], [after])
-        self._wanted = ca.Function("wanted", [state, time, pose, twist], [wanted])
+        self._wanted = ca.Function("wanted", [state, time, pose, twist], [desired_wrench])
         self._shown = ca.Function("shown", [state], [x.phase, vacuum])
 
     def start(self, **changes):
-        begun = self.block.initial(Values(), 0.0) | changes
+        initial = self.block.initial(Values(), 0.0) | changes
         return ca.vertcat(
-            *[ca.DM(begun.get(name, np.zeros(n))) for name, n in self.block.states.items()]
+            *[ca.DM(initial.get(name, np.zeros(n))) for name, n in self.block.states.items()]
         )
 
     def go(self, state, time, ticks, where, held):
@@ -49,7 +49,7 @@ class Operator:
         poses, helds = np.tile(where[:, None], ticks), np.full((1, ticks), held)
         return self._step.fold(ticks)(state, times[None], poses, helds)
 
-    def wanted(self, state, time, where, twist):
+    def desired_wrench(self, state, time, where, twist):
         return self._wanted(state, time, where, twist).full().ravel()
 
     def phase(self, state):
@@ -101,7 +101,7 @@ def test_it_mounts_phase_by_phase():
     assert vacuum == [True] * 5 + [False] * 3
 
 
-def test_on_the_way_back_it_lets_go_first_and_grips_last():
+def test_on_return_it_releases_first_and_grasps_last():
     operator = hand(task="return", **SURE)
     state, time = operator.start(), 0.0
     assert operator.vacuum(state)
@@ -128,7 +128,7 @@ def test_the_hand_that_leads_waits_for_the_tool():
     stuck = np.concatenate([[0.7, -0.4, 0.5], GOAL_R.as_matrix().ravel()])
     state, time = go(operator, state, time, 5.0, stuck)
     assert operator.phase(state) is MountingPhase.LEAD
-    force = operator.wanted(state, time, stuck, np.zeros(6))[:3]
+    force = operator.desired_wrench(state, time, stuck, np.zeros(6))[:3]
     assert np.linalg.norm(force) == pytest.approx(250.0 * 0.1, rel=0.01)
 
 
@@ -144,7 +144,7 @@ def test_it_pushes_beside_the_axis_towards_what_it_sees():
     operator, state, time = inserting(persistence=0.0, turning_persistence=0.0)
     p = MountingHandParameters()
     error, turn = np.array([6e-4, -8e-4]), np.array([0.004, -0.002, 0.006])
-    wrench = operator.wanted(state, time, pose(-PINS, error, turn), np.zeros(6))
+    wrench = operator.desired_wrench(state, time, pose(-PINS, error, turn), np.zeros(6))
     force = GOAL_R.inv().apply(wrench[:3])
     np.testing.assert_allclose(force, [*(-p.stiffness * error), p.insert], rtol=1e-6)
     torque = GOAL_R.inv().apply(wrench[3:])
@@ -171,31 +171,31 @@ def test_it_pushes_more_as_long_as_nothing_moves_up_to_a_limit():
         (12.0, p.side_limit),
     ):
         operator, state, time = aligned(where, duration)
-        force = GOAL_R.inv().apply(operator.wanted(state, time, where, np.zeros(6))[:3])
+        force = GOAL_R.inv().apply(operator.desired_wrench(state, time, where, np.zeros(6))[:3])
         np.testing.assert_allclose(force[:2], [-expected, 0.0], atol=2e-3 * expected)
 
 
 def test_nobody_pushes_more_and_more_against_what_is_touched():
     operator, state, time = inserting(stiffness=0.0)
     where = pose(-PINS, [5e-4, 0.0])
-    before = operator.wanted(state, time, where, np.zeros(6))
+    before = operator.desired_wrench(state, time, where, np.zeros(6))
     state, time = go(operator, state, time, 2.0, where)
     assert operator.phase(state) is MountingPhase.INSERT
-    np.testing.assert_allclose(operator.wanted(state, time, where, np.zeros(6)), before)
+    np.testing.assert_allclose(operator.desired_wrench(state, time, where, np.zeros(6)), before)
 
 
 @pytest.mark.slow
 def test_it_feels_for_the_bores_in_a_spiral():
     operator, state, time = inserting(persistence=0.0)
-    p, where, places = MountingHandParameters(), pose(-PINS), []
+    p, where, offsets = MountingHandParameters(), pose(-PINS), []
     for _ in range(600):
         state, time = go(operator, state, time, 0.01, where)
-        force = operator.wanted(state, time, where, np.zeros(6))[:3]
-        places.append(GOAL_R.inv().apply(force)[:2] / p.stiffness)
-    sizes = np.linalg.norm(places, axis=1)
+        force = operator.desired_wrench(state, time, where, np.zeros(6))[:3]
+        offsets.append(GOAL_R.inv().apply(force)[:2] / p.stiffness)
+    sizes = np.linalg.norm(offsets, axis=1)
     assert sizes.max() == pytest.approx(p.search_radius, rel=1e-6)
     assert np.all(np.diff(sizes) > -1e-12)
-    turned = np.unwrap(np.arctan2(*np.array(places)[100:].T[::-1]))
+    turned = np.unwrap(np.arctan2(*np.array(offsets)[100:].T[::-1]))
     assert turned[-1] - turned[0] == pytest.approx(2.0 * np.pi * 4.99 / p.search_period, rel=1e-3)
 
 
@@ -204,26 +204,26 @@ def test_once_the_pins_are_in_the_hands_follow():
     operator, state, time = aligned(pose(HOVERING, [1e-3, 0.0]), 2.0, wobble=0.0)
     state, time = go(operator, state, time, 0.1, pose(HOVERING, [1e-3, 0.0]))
     deep = pose(-PINS + 6e-3, [1e-3, 0.0])
-    before = GOAL_R.inv().apply(operator.wanted(state, time, deep, np.zeros(6))[:3])
+    before = GOAL_R.inv().apply(operator.desired_wrench(state, time, deep, np.zeros(6))[:3])
     # what persistence led to, without the push of what is seen
     assert -before[0] == pytest.approx(p.persistence * 1e-3 * 2.0, rel=0.02)
     state, time = go(operator, state, time, p.relaxation, deep)
-    after = GOAL_R.inv().apply(operator.wanted(state, time, deep, np.zeros(6))[:3])
+    after = GOAL_R.inv().apply(operator.desired_wrench(state, time, deep, np.zeros(6))[:3])
     assert after[0] / before[0] == pytest.approx(np.exp(-1.0), rel=1e-2)
 
 
 @pytest.mark.slow
 def test_the_eye_errs_by_what_the_seed_says_and_never_much():
     """Seen from the push on a tool that is in place: the same for a seed, within two deviations."""
-    p, seen = MountingHandParameters(), []
+    p, observed = MountingHandParameters(), []
     for seed in range(40):
         operator = hand(seed=seed, eye_angle=0.0)
         state = operator.start(phase=float(MountingPhase.INSERT), since=0.0)
-        force = operator.wanted(state, 0.1, pose(-PINS), np.zeros(6))[:3]
-        seen.append(GOAL_R.inv().apply(force)[:2] / p.stiffness)
-    assert np.abs(seen).max() <= 2.0 * p.eye_error * (1.0 + 1e-9)
-    assert np.std(seen) == pytest.approx(p.eye_error, rel=0.3)
-    assert len(np.unique(np.round(seen, 9), axis=0)) == 40
+        force = operator.desired_wrench(state, 0.1, pose(-PINS), np.zeros(6))[:3]
+        observed.append(GOAL_R.inv().apply(force)[:2] / p.stiffness)
+    assert np.abs(observed).max() <= 2.0 * p.eye_error * (1.0 + 1e-9)
+    assert np.std(observed) == pytest.approx(p.eye_error, rel=0.3)
+    assert len(np.unique(np.round(observed, 9), axis=0)) == 40
 
 
 @pytest.mark.parametrize(
@@ -248,7 +248,7 @@ def test_the_eye_errs_about_the_axes_of_the_goal():
         persistence=0.0, turning_persistence=0.0, eye_error=0.0, **changes
     )
     draws = np.random.default_rng(3).standard_normal(5)
-    torque = operator.wanted(state, time, pose(-PINS), np.zeros(6))[3:]
+    torque = operator.desired_wrench(state, time, pose(-PINS), np.zeros(6))[3:]
     error = 0.02 * np.clip(draws[2:], -2.0, 2.0)
     expected = MountingHandParameters().turning_stiffness * error
     np.testing.assert_allclose(GOAL_R.inv().apply(torque), expected, rtol=1e-2)
@@ -260,10 +260,10 @@ def test_once_the_pins_are_in_the_moment_relaxes_too():
     operator, state, time = aligned(where, 2.0, wobble=0.0)
     state, time = go(operator, state, time, 0.1, where)
     deep = pose(-PINS + 6e-3, turn=turn)
-    before = GOAL_R.inv().apply(operator.wanted(state, time, deep, np.zeros(6))[3:])
+    before = GOAL_R.inv().apply(operator.desired_wrench(state, time, deep, np.zeros(6))[3:])
     assert -before[2] == pytest.approx(p.turning_persistence * 0.01 * 2.0, rel=0.02)
     state, time = go(operator, state, time, p.relaxation, deep)
-    after = GOAL_R.inv().apply(operator.wanted(state, time, deep, np.zeros(6))[3:])
+    after = GOAL_R.inv().apply(operator.desired_wrench(state, time, deep, np.zeros(6))[3:])
     assert after[2] / before[2] == pytest.approx(np.exp(-1.0), rel=1e-2)
 
 

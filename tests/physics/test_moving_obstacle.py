@@ -1,4 +1,4 @@
-"""Obstacles on their ways, and what a sensor tells of them."""
+"""Obstacles on their trajectories, and the sensor that measures them."""
 
 import numpy as np
 import pytest
@@ -12,15 +12,15 @@ from pfsc_drake.physics.moving_obstacle import (
     ObstacleParameters,
     ObstacleSensor,
     ObstacleSensorParameters,
-    Stride,
+    ObstacleWaypoint,
 )
 
 PERIOD = 1e-3
 WAY = [
-    Stride(0.1, [0.0, 0.0, 0.0]),
-    Stride(0.6, [0.5, 0.2, 0.0]),
-    Stride(0.9, [0.5, 0.2, 0.0]),
-    Stride(1.3, [1.0, -0.4, 0.0]),
+    ObstacleWaypoint(0.1, [0.0, 0.0, 0.0]),
+    ObstacleWaypoint(0.6, [0.5, 0.2, 0.0]),
+    ObstacleWaypoint(0.9, [0.5, 0.2, 0.0]),
+    ObstacleWaypoint(1.3, [1.0, -0.4, 0.0]),
 ]
 
 
@@ -31,11 +31,11 @@ def _run(count=1600):
 
 def test_it_is_where_it_should_be_and_its_velocity_belongs_to_it():
     states = _run()
-    for stride in WAY:
-        place = states[round(stride.time / PERIOD), :3]
-        np.testing.assert_allclose(place, stride.position, atol=1e-12)
-    way = cumulative_trapezoid(states[:, 3:], dx=PERIOD, axis=0, initial=0.0)
-    np.testing.assert_allclose(states[:, :3], way, atol=2e-3)
+    for waypoint in WAY:
+        position = states[round(waypoint.time / PERIOD), :3]
+        np.testing.assert_allclose(position, waypoint.position, atol=1e-12)
+    travelled = cumulative_trapezoid(states[:, 3:], dx=PERIOD, axis=0, initial=0.0)
+    np.testing.assert_allclose(states[:, :3], travelled, atol=2e-3)
     standing = states[round(0.65 / PERIOD) : round(0.85 / PERIOD)]
     np.testing.assert_allclose(standing[:, 3:], 0.0, atol=1e-9)
     # before the first place and after the last it rests
@@ -44,8 +44,8 @@ def test_it_is_where_it_should_be_and_its_velocity_belongs_to_it():
 
 
 def test_its_largest_acceleration_is_that_of_its_velocity():
-    stands = [*WAY, Stride(2.0, WAY[-1].position)]
-    soft = [Stride(-0.5, [-0.2, 0.0, 0.0]), *stands[1:]]
+    stands = [*WAY, ObstacleWaypoint(2.0, WAY[-1].position)]
+    soft = [ObstacleWaypoint(-0.5, [-0.2, 0.0, 0.0]), *stands[1:]]
     obstacle = ObstacleParameters(way=soft)
     times = np.linspace(0.0, 2.0, 20001)
     change = np.gradient(obstacle.curve(times, 1), times, axis=0)
@@ -58,12 +58,12 @@ def test_its_largest_acceleration_is_that_of_its_velocity():
 
 def test_accelerations_before_the_start_of_time_do_not_count():
     """It runs at 3 m/s before, in part within a piece that goes on after 0."""
-    way = [
-        Stride(-2.0, [-3.0, 0.0, 0.0]), Stride(-1.0, [0.0, 0.0, 0.0]),
-        Stride(-0.5, [0.8, 0.1, 0.0]), Stride(0.5, [1.0, 0.2, 0.0]),
-        Stride(3.5, [1.4, 0.5, 0.0]), Stride(5.5, [1.4, 0.5, 0.0]),
+    waypoints = [
+        ObstacleWaypoint(-2.0, [-3.0, 0.0, 0.0]), ObstacleWaypoint(-1.0, [0.0, 0.0, 0.0]),
+        ObstacleWaypoint(-0.5, [0.8, 0.1, 0.0]), ObstacleWaypoint(0.5, [1.0, 0.2, 0.0]),
+        ObstacleWaypoint(3.5, [1.4, 0.5, 0.0]), ObstacleWaypoint(5.5, [1.4, 0.5, 0.0]),
     ]  # fmt: skip
-    obstacle = ObstacleParameters(way=way)
+    obstacle = ObstacleParameters(way=waypoints)
     times = np.linspace(0.0, 5.5, 50001)
     change = np.linalg.norm(np.gradient(obstacle.curve(times, 1), times, axis=0), axis=1)
     before = np.linspace(-2.0, 0.0, 5001)
@@ -84,12 +84,12 @@ def test_the_sensor_is_late_and_measures_now_and_then(late):
     rng = np.random.default_rng(1)
     noise = 0.1 * rng.normal(size=6 * NOISE_TICKS)
     states = np.array([[k, 0, 0, 1, 0, 0] for k in range(60)], dtype=float)
-    told = np.array([sensor.step(state=x, noise=noise)["obstacles"] for x in states])
-    np.testing.assert_array_equal(told[0], states[0])
+    outputs = np.array([sensor.step(state=x, noise=noise)["obstacles"] for x in states])
+    np.testing.assert_array_equal(outputs[0], states[0])
     for k in range(late + every + 1, 60):
         then = (k - 1 - late) // every * every
         cut = np.clip(noise.reshape(-1, 6)[then], -0.3, 0.3)
-        np.testing.assert_allclose(told[k], states[then] + cut, atol=1e-12)
+        np.testing.assert_allclose(outputs[k], states[then] + cut, atol=1e-12)
 
 
 def test_the_noise_of_several_obstacles():

@@ -99,7 +99,7 @@ def moving(t):
 
 
 @pytest.mark.parametrize("samples", [0, 1, 25])
-def test_the_delay_is_the_given_number_of_samples(samples):
+def test_the_delay_is_a_number_of_samples(samples):
     prompt = watch(moving, hand(), 0.2)
     late = watch(moving, hand(reaction_delay=samples * PERIOD), 0.2)
     assert np.array_equal(late[samples + 2 :], prompt[2 : len(prompt) - samples])
@@ -115,12 +115,12 @@ def test_a_delay_between_samples_is_refused():
         OperatorHand(hand(reaction_delay=0.0105), PERIOD)
 
 
-def test_spring_and_damper_of_a_seen_motion():
+def test_spring_and_damper_of_an_observed_motion():
     wrench = watch(lambda t: np.array([0.1 * t, 0.0, -0.02]), hand(damping=25.0), 0.1)
     k = np.arange(5, 100)
     # the log at k T shows what the tick before decided
-    seen = (k - 1) * PERIOD
-    assert np.allclose(wrench[k, 0], -300.0 * 0.1 * seen - 25.0 * 0.1, rtol=0, atol=1e-9)
+    observed = (k - 1) * PERIOD
+    assert np.allclose(wrench[k, 0], -300.0 * 0.1 * observed - 25.0 * 0.1, rtol=0, atol=1e-9)
     assert np.allclose(wrench[k, 2], 300.0 * 0.02, rtol=0, atol=1e-9)
 
 
@@ -173,7 +173,7 @@ def test_it_does_not_feed_through():
 
 
 @pytest.mark.slow
-def test_a_robot_with_soft_joints_gives_way_to_the_target():
+def test_a_compliant_robot_moves_to_the_target():
     """The hand moves a damped, weightless robot to where it wants the tool point to be."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
@@ -218,13 +218,13 @@ def test_a_robot_with_soft_joints_gives_way_to_the_target():
 
 
 def test_it_turns_the_tool_as_it_sees_it():
-    """The tool is upright; the torque is that of the whole turn, about its axis."""
-    way = [HandWaypoint(0.0, np.zeros(3), [0.0, 0.0, 30.0])]
+    """The tool is upright; the torque is proportional to the whole rotation, about its axis."""
+    waypoints = [HandWaypoint(0.0, np.zeros(3), [0.0, 0.0, 30.0])]
     changes = {"rotational_stiffness": 4.0, "torque_limit": 1.5}
-    wrench = watch(lambda t: np.zeros(3), hand(**changes | {"waypoints": way}), 0.01)
+    wrench = watch(lambda t: np.zeros(3), hand(**changes | {"waypoints": waypoints}), 0.01)
     assert wrench[-1] == pytest.approx([0, 0, 0, 1.5, 0, 0])
-    way = [HandWaypoint(0.0, np.zeros(3), [15.0, 0.0, 0.0])]
-    wrench = watch(lambda t: np.zeros(3), hand(**changes | {"waypoints": way}), 0.01)
+    waypoints = [HandWaypoint(0.0, np.zeros(3), [15.0, 0.0, 0.0])]
+    wrench = watch(lambda t: np.zeros(3), hand(**changes | {"waypoints": waypoints}), 0.01)
     assert wrench[-1] == pytest.approx([0, 0, 0, 0, 0, 4.0 * np.deg2rad(15.0)])
 
 
@@ -240,11 +240,11 @@ def person():
     return Stepper(LiveHand(HAND, PERIOD))
 
 
-def follow(stepper, asked, poses):
+def follow(stepper, request, poses):
     """Return the wrenches that answer poses."""
     wrenches = []
     for pose in poses:
-        stepper.step(asked=asked, tool_pose=pose)
+        stepper.step(request=request, tool_pose=pose)
         wrenches.append(stepper.states["wrench"])
     return np.array(wrenches)
 
@@ -260,15 +260,15 @@ def test_a_push_comes_as_two_lags_let_it():
 
 def test_a_holding_hand_is_a_spring_and_a_damper():
     stepper, target = person(), AT_HOME[:3] + np.array([0.03, 0.0, -0.02])
-    asked = ask(hold=1.0, target=target)
-    wrenches = follow(stepper, asked, [AT_HOME] * 1500)
+    request = ask(hold=1.0, target=target)
+    wrenches = follow(stepper, request, [AT_HOME] * 1500)
     assert wrenches[-1][:3] == pytest.approx(400.0 * np.array([0.03, 0.0, -0.02]), abs=1e-6)
     velocity, spin = np.array([0.1, -0.2, 0.05]), 0.4
     c, s = np.cos(spin * PERIOD), np.sin(spin * PERIOD)
     before = AT_HOME.copy()
     before[:3] -= PERIOD * velocity
     before[3:] = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).ravel()
-    moving = follow(stepper, asked, [before, AT_HOME])
+    moving = follow(stepper, request, [before, AT_HOME])
     assert moving[1][:3] - wrenches[-1][:3] == pytest.approx(-30.0 * velocity, abs=1e-6)
     assert moving[1][3:] == pytest.approx([0.0, 0.0, -0.3 * spin], abs=1e-6)
 
@@ -281,7 +281,7 @@ def test_it_is_no_stronger_than_its_limit():
     assert wrenches[-1][:3] == pytest.approx(45.0 * np.array([1200, 1600, 40]) / 2000.4, rel=1e-3)
 
 
-def test_an_open_hand_closes_where_it_is_asked_to_hold():
+def test_an_open_hand_closes_at_the_requested_target():
     """Not on the way from where it held before; and nothing pulls while it closes."""
     stepper = person()
     follow(stepper, ask(hold=1.0, target=(5.0, 5.0, 5.0)), [AT_HOME] * 500)
@@ -291,7 +291,7 @@ def test_an_open_hand_closes_where_it_is_asked_to_hold():
 
 
 def test_a_hand_that_opens_draws_nothing_elsewhere():
-    """What it is asked to hold at while it is not to hold at all does not count."""
+    """A target without a request to hold is ignored."""
     stepper = person()
     follow(stepper, ask(hold=1.0, target=AT_HOME[:3]), [AT_HOME] * 500)
     assert np.abs(follow(stepper, ask(), [AT_HOME] * 500)).max() < 1e-9
@@ -300,14 +300,14 @@ def test_a_hand_that_opens_draws_nothing_elsewhere():
 def test_it_holds_its_wrench_until_the_next_look():
     stepper = person()
     before = [np.zeros(6), *follow(stepper, ask(push=(5.0, 0.0, 0.0)), [AT_HOME] * 20)]
-    shown = stepper.step(asked=ask(), tool_pose=AT_HOME)["wrench"]
+    shown = stepper.step(request=ask(), tool_pose=AT_HOME)["wrench"]
     assert np.array_equal(shown, before[-1])
 
 
 def test_it_does_nothing_to_a_tool_that_is_nowhere_and_goes_on_after():
     poses = [AT_HOME] * 50 + [AT_HOME * np.nan] + [AT_HOME] * 2
-    asked = ask(push=(5.0, 0.0, 0.0), hold=1.0, target=(0.9, 0.1, 0.8))
-    forces = np.linalg.norm(follow(person(), asked, poses), axis=1)
+    request = ask(push=(5.0, 0.0, 0.0), hold=1.0, target=(0.9, 0.1, 0.8))
+    forces = np.linalg.norm(follow(person(), request, poses), axis=1)
     assert forces[49] > 1.0
     assert forces[50] == 0.0
     assert forces[52] > forces[49]

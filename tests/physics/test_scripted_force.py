@@ -26,10 +26,10 @@ def scripted(pulses):
 def simulate(path, pulses, tool, duration):
     """Return times, wrenches and path points with the tool on a straight way."""
     builder = DiagramBuilder()
-    way = builder.AddSystem(TrajectorySource(tool))
+    trajectory = builder.AddSystem(TrajectorySource(tool))
     projector = builder.AddSystem(BlockSystem(Projector(path.evaluator(2)), PERIOD))
     script = builder.AddSystem(scripted(pulses))
-    builder.Connect(way.get_output_port(), projector.get_input_port())
+    builder.Connect(trajectory.get_output_port(), projector.get_input_port())
     builder.Connect(projector.get_output_port(), script.GetInputPort("manifold_point"))
     logs = [LogVectorOutput(s.get_output_port(), builder, PERIOD) for s in (script, projector)]
     simulator = Simulator(builder.Build())

@@ -1,4 +1,4 @@
-"""Sensors that fail: no number, at rest, or off."""
+"""Sensor failures: NaN, frozen, or in error."""
 
 import numpy as np
 import pytest

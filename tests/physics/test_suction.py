@@ -86,7 +86,7 @@ def test_taking_hold_changes_no_force():
     np.testing.assert_allclose(evaluate(after.ravel(), tool(), state)[0], before, atol=1e-9)
 
 
-def held_and_moved():
+def moving_gripper():
     """Return cups that hold a plate which is then moved and moves, with its true displacement."""
     R, p = DOWN, np.array([0.5, 0.1, 0.6])
     state = holding_cups(CUPS, 0, np.eye(3), np.zeros(3), np.zeros(3))
@@ -96,9 +96,9 @@ def held_and_moved():
     return state, plates(moved, rates=[rate]), moved, rate
 
 
-def test_held_plates_hang_on_springs_and_dampers():
+def test_grasped_plates_hang_on_springs_and_dampers():
     """Against a sum over the cups in world axes."""
-    state, plate_state, (R, p), rate = held_and_moved()
+    state, plate_state, (R, p), rate = moving_gripper()
     motion = tool(v=(0.001, 0.0, 0.002), w=(0.01, 0.0, -0.02))
     wrench, pushes, _ = evaluate(state, motion, plate_state)
     force, torque, on_plate = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -126,7 +126,7 @@ def test_they_may_bear_a_load_from_the_start():
 
 
 def test_action_is_reaction_about_any_point():
-    state, plate_state, (_, p), _ = held_and_moved()
+    state, plate_state, (_, p), _ = moving_gripper()
     wrench, pushes, _ = evaluate(state, tool(), plate_state)
     about_origin = wrench[3:] + np.cross([0.5, 0.1, 0.6], wrench[:3])
     np.testing.assert_allclose(wrench[:3] + pushes[0, :3], 0.0, atol=1e-10)
@@ -136,7 +136,7 @@ def test_action_is_reaction_about_any_point():
 
 
 def test_they_let_go_without_vacuum():
-    state, plate_state, _, _ = held_and_moved()
+    state, plate_state, _, _ = moving_gripper()
     assert (evaluate(state, tool(), plate_state)[2][:, 0] == 0.0).all()
     assert (evaluate(state, tool(), plate_state, OFF)[2][:, 0] == FREE).all()
 
@@ -184,7 +184,7 @@ def test_wrong_numbers_are_refused(changes, part):
 
 def test_a_quaternion_of_any_length_is_an_orientation():
     """An integrator does not keep its length."""
-    state, plate_state, _, _ = held_and_moved()
+    state, plate_state, _, _ = moving_gripper()
     longer = plate_state.copy()
     longer[:4] *= 1.3
     for one, other in zip(

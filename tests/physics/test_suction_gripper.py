@@ -54,8 +54,8 @@ def fixture_log():
     plate = plant.AddRigidBody("plate", inertia.Shift([0, 0, -SIZE[2] / 2.0]))
     friction = CoulombFriction(0.2, 0.2)
     for i, (x, y) in enumerate([(0.1, 0.07), (0.1, -0.07), (-0.1, 0.07), (-0.1, -0.07)]):
-        foot = RigidTransform([x, y, SIZE[2] - 2e-3])
-        plant.RegisterCollisionGeometry(plate, foot, Sphere(2e-3), f"foot_{i}", friction)
+        support = RigidTransform([x, y, SIZE[2] - 2e-3])
+        plant.RegisterCollisionGeometry(plate, support, Sphere(2e-3), f"foot_{i}", friction)
     shelf = RigidTransform([0, 0, SHELF - 0.05])
     plant.RegisterCollisionGeometry(
         plant.world_body(), shelf, Box(1.0, 1.0, 0.1), "shelf", friction
@@ -91,12 +91,12 @@ def at(time):
 
 
 def test_it_takes_hold_when_pressed_and_lets_go_with_the_vacuum(log):
-    held = log["held"][:, 0]
-    change = log["t"][np.flatnonzero(np.diff(held)) + 1]
+    share = log["held"][:, 0]
+    change = log["t"][np.flatnonzero(np.diff(share)) + 1]
     assert len(change) == 2
     assert 0.1 < change[0] < 0.2  # on the way down, before the tool stops
     assert change[1] == pytest.approx(END, abs=2.0 * PERIOD)
-    assert held[at(0.5)] == 1.0
+    assert share[at(0.5)] == 1.0
 
 
 def test_the_plate_moves_with_the_tool(log):
@@ -107,7 +107,7 @@ def test_the_plate_moves_with_the_tool(log):
     assert height[at(0.79)] == pytest.approx(FACE + 0.05 - lowered, abs=2e-5)
 
 
-def test_it_bears_the_weight(log):
+def test_it_carries_the_weight(log):
     wrench = log["wrench"][at(0.79)]
     np.testing.assert_allclose(wrench[:3], [0, 0, -MASS * 9.81], atol=0.02)
     # the plate's middle is 1 cm in front of the tool

@@ -11,8 +11,8 @@ from pfsc_drake.physics.turntable import TurntableDrive
 def test_angles_come_late_and_the_truth_does_not(ticks):
     drive = Stepper(TurntableDrive(2, 0.0, ticks))
     sent = [np.array([0.1 * k, -0.2 * k, 1.0, 2.0]) for k in range(6)]
-    told = [drive.step(followed=row) for row in sent]
-    for k, row in enumerate(told):
+    measured = [drive.step(followed=row) for row in sent]
+    for k, row in enumerate(measured):
         assert np.array_equal(row["motion"], sent[k])
         assert np.array_equal(row["measured"], sent[max(k - ticks, 0)][:2])
 

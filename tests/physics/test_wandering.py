@@ -10,25 +10,25 @@ from pfsc_drake.physics.hand_model import HandModel, HandParameters, Wander
 BOX = {"low": [0.1, -0.2, 0.5], "high": [0.3, 0.2, 0.9]}
 
 
-def test_places_are_within_the_box_and_the_times_as_far_apart_as_said():
+def test_targets_are_within_the_box_and_times_within_their_bounds():
     wander = Wander(**BOX, begin=0.5, end=20.0, shortest=0.3, longest=0.8)
-    times, places = wander.places(3)
+    times, targets = wander.target_points(3)
     assert times[0] == 0.5
     assert 18.0 < times[-1] < 20.0
     gaps = np.diff(times)
     assert gaps.min() >= 0.3
     assert gaps.max() <= 0.8
-    assert np.all((places >= BOX["low"]) & (places <= BOX["high"]))
-    assert np.ptp(places, axis=0) == pytest.approx([0.2, 0.4, 0.4], rel=0.2)
+    assert np.all((targets >= BOX["low"]) & (targets <= BOX["high"]))
+    assert np.ptp(targets, axis=0) == pytest.approx([0.2, 0.4, 0.4], rel=0.2)
 
 
 def test_a_hand_goes_there_as_its_seed_says():
     wander = Wander(**BOX, begin=0.5, end=5.0)
     hands = [HandModel(HandParameters(wander=wander, seed=seed)) for seed in (1, 1, 2)]
-    times, places = wander.places(1)
-    for time, place in zip(times, places, strict=True):
+    times, targets = wander.target_points(1)
+    for time, target in zip(times, targets, strict=True):
         first, again = (ca.evalf(hand.target(time)[0]).full().ravel() for hand in hands[:2])
-        np.testing.assert_allclose(first, place, atol=1e-12)
+        np.testing.assert_allclose(first, target, atol=1e-12)
         np.testing.assert_array_equal(first, again)
     first, other = (ca.evalf(hands[i].target(3.0)[0]).full() for i in (0, 2))
     assert not np.array_equal(first, other)

@@ -1,4 +1,4 @@
-"""Messages of way points, against those of a sender."""
+"""Messages of waypoints, against those of a sender."""
 
 import numpy as np
 import pytest

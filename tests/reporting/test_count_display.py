@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from reporting.progress import CountDisplay, spoken_time
+from reporting.progress import CountDisplay, format_time
 
 
 def lines_of(total, done, statuses, terminal=False):
@@ -40,7 +40,7 @@ def test_a_bar_on_a_terminal():
     [(0.4, "0 s"), (59.0, "59 s"), (61.0, "1 min 1 s"), (4800.0, "1 h 20 min"), (2e5, "2 d 7 h")],
 )
 def test_times(seconds, spoken):
-    assert spoken_time(seconds) == spoken
+    assert format_time(seconds) == spoken
 
 
 def test_the_time_left_counts_runs_since_processes_started(monkeypatch):

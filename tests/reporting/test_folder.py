@@ -35,7 +35,7 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 def visible(folder: Path) -> dict[str, bytes]:
-    """The same without what is being written."""
+    """The same without unfinished files."""
     hidden = (".next", ".ready", ".unfinished")
     return {name: text for name, text in content(folder).items() if not name.startswith(hidden)}
 
@@ -68,7 +68,7 @@ def test_results_of_an_earlier_run_are_replaced_and_all_else_stays(out):
 
 @pytest.mark.parametrize("name", [*RESULTS, MANIFEST, ".unfinished", ".next", ".ready", "figures"])
 @pytest.mark.parametrize("kind_of_file", ["file", "link", "dead link", "folder"])
-def test_what_no_run_has_written_is_in_the_way(tmp_path, name, kind_of_file):
+def test_foreign_files_are_obstacles(tmp_path, name, kind_of_file):
     folder, target = tmp_path / "out", tmp_path / "target"
     folder.mkdir()
     target.write_text("mine")
@@ -92,18 +92,18 @@ def test_what_no_run_has_written_is_in_the_way(tmp_path, name, kind_of_file):
 DRAWN = ("figures", "folder")
 
 
-def test_what_was_replaced_by_a_link_is_in_the_way(out, tmp_path):
+def test_a_result_replaced_by_a_link_is_an_obstacle(out, tmp_path):
     (out / "log.h5").rename(tmp_path / "moved.h5")
     (out / "log.h5").symlink_to(tmp_path / "moved.h5")  # the same content
     assert_refused(out, "it holds log.h5, which no run has written")
 
 
-def test_pictures_of_the_user_among_the_figures_are_in_the_way(out):
+def test_images_of_the_user_among_the_figures_are_obstacles(out):
     (out / "figures" / "mine.png").write_text("mine")
     assert_refused(out, "it holds figures/mine.png, which no run has written")
 
 
-def test_inputs_are_in_the_way_by_any_name(out, tmp_path):
+def test_inputs_are_obstacles_by_any_name(out, tmp_path):
     (tmp_path / "link.yaml").symlink_to(out / "scenario.yaml")
     for source in (out / "scenario.yaml", out / ".." / "out" / "scenario.yaml", "link.yaml"):
         assert_refused(out, "its scenario.yaml is an input of this run", inputs=[tmp_path / source])
@@ -111,7 +111,7 @@ def test_inputs_are_in_the_way_by_any_name(out, tmp_path):
     check_folder(out, "run", nowhere)
 
 
-def test_results_of_another_kind_are_in_the_way(out):
+def test_results_of_another_kind_are_obstacles(out):
     assert_refused(out, "it holds the results of a run", kind="comparison")
 
 
@@ -209,7 +209,7 @@ def test_a_process_that_ends_amid_the_exchange_leaves_one_of_both_whole(out, mon
     (out / "notes.txt").write_text("mine")
     old = content(out) | {MANIFEST: b""}
     new = {name: f"second {name}".encode() for name in ("log.h5", "sweep.csv", "figures/a.png")}
-    wanted = new | {"notes.txt": b"mine", MANIFEST: b""}
+    expected_files = new | {"notes.txt": b"mine", MANIFEST: b""}
     steps = {
         name: getattr(Path, name) for name in ("rename", "replace", "unlink", "rmdir", "mkdir")
     }
@@ -234,8 +234,8 @@ def test_a_process_that_ends_amid_the_exchange_leaves_one_of_both_whole(out, mon
     check_folder(out, "run")
     end_exchange(out)
     found = visible(out) | {MANIFEST: b""}
-    assert found in (old, wanted)
-    assert (found == wanted) == (step >= 2)  # behind the one change of a name that decides
+    assert found in (old, expected_files)
+    assert (found == expected_files) == (step >= 2)  # behind the one change of a name that decides
     with open_results(out, "run"):
         pass
     assert set(content(out)) == {MANIFEST, "notes.txt"}
@@ -255,22 +255,22 @@ def test_a_failure_before_there_is_a_result_leaves_the_earlier_ones(out):
     assert (out / "log.h5").read_text() == "second"
 
 
-def test_what_cannot_be_exchanged_is_kept_elsewhere(out, temporary):
-    """Of a folder that is removed, or replaced, when all has been written."""
+def test_what_cannot_be_exchanged_is_saved_elsewhere(out, temporary):
+    """A folder is removed, or replaced, after all has been written."""
     with open_results(out, "run") as results:
         results.write("log.h5", b"the log")
         moved = out.rename(out.with_name("moved"))
         out.mkdir()
         reason = results.explain_problems()
-    (kept,) = temporary.iterdir()
+    (saved,) = temporary.iterdir()
     assert reason == (
-        f"cannot write log.h5 into {out}: another folder has taken its place; kept in {kept}"
+        f"cannot write log.h5 into {out}: another folder has taken its place; saved in {saved}"
     )
-    assert (kept / "log.h5").read_text() == "the log"
+    assert (saved / "log.h5").read_text() == "the log"
     assert content(out) == {} and (moved / "log.h5").read_text() == "first log.h5"
 
 
-def test_what_is_removed_before_the_exchange_is_said_to_be_lost(out, temporary):
+def test_results_removed_before_the_exchange_are_reported_as_lost(out, temporary):
     with open_results(out, "run") as results:
         results.write("log.h5", b"the log")
         shutil.rmtree(out)
@@ -284,7 +284,9 @@ def test_a_result_that_the_user_changes_meanwhile_stays(out, temporary):
         results.write("log.h5", b"second")
         (out / "log.h5").write_text("my own, of another length")
         (out / "report.html").write_text("with my notes")
-        assert "somebody else has made log.h5 meanwhile; kept in" in results.explain_problems()
+        assert (
+            "another process has created log.h5 meanwhile; saved in" in results.explain_problems()
+        )
     assert (out / "log.h5").read_text() == "my own, of another length"
     assert (out / "report.html").read_text() == "with my notes"
     assert set(content(out)) == {MANIFEST, "metrics.json", "log.h5", "report.html"}
@@ -304,36 +306,36 @@ def test_a_removed_folder(out, temporary):
     with open_results(out, "run") as results:
         results.write("scenario.yaml", "x")
         shutil.rmtree(out)
-        kept = results.write("log.h5", b"the log")
+        saved = results.write("log.h5", b"the log")
         picture = results.write("figures/path.png", b"a picture")
-    assert kept.read_bytes() == b"the log"
-    assert picture == kept.parent / "figures" / "path.png"
-    assert kept.is_relative_to(temporary)
+    assert saved.read_bytes() == b"the log"
+    assert picture == saved.parent / "figures" / "path.png"
+    assert saved.is_relative_to(temporary)
     assert results.explain_problems() == (
-        f"cannot write log.h5, figures, scenario.yaml into {out}: No such file or directory; kept "
-        f"in {kept.parent}"
+        f"cannot write log.h5, figures, scenario.yaml into {out}: No such file or directory; saved "
+        f"in {saved.parent}"
     )
-    assert (kept.parent / "scenario.yaml").read_text() == "x"
+    assert (saved.parent / "scenario.yaml").read_text() == "x"
     assert not out.exists()
 
 
-def test_a_folder_that_somebody_else_has_made_in_its_place(out, temporary):
+def test_a_folder_replaced_by_another_process(out, temporary):
     with open_results(out, "run") as results:
         shutil.rmtree(out)
         out.mkdir()
-        kept = results.write("log.h5", b"the log")
-    assert kept.is_relative_to(temporary)
+        saved = results.write("log.h5", b"the log")
+    assert saved.is_relative_to(temporary)
     assert "another folder has taken its place" in results.explain_problems()
     assert content(out) == {}
 
 
-def test_a_file_that_somebody_else_has_made_meanwhile(out, temporary):
+def test_a_file_created_by_another_process_meanwhile(out, temporary):
     with open_results(out, "run") as results:
         (out / "log.h5").write_text("mine")
-        kept = results.write("log.h5", b"the log")
+        saved = results.write("log.h5", b"the log")
     assert (out / "log.h5").read_text() == "mine"
-    assert kept.is_relative_to(temporary)
-    assert "somebody else has made log.h5 meanwhile" in results.explain_problems()
+    assert saved.is_relative_to(temporary)
+    assert "another process has created log.h5 meanwhile" in results.explain_problems()
 
 
 def test_files_that_grow_too_large_are_whole_or_not_there(out, temporary):
@@ -343,10 +345,10 @@ def test_files_that_grow_too_large_are_whole_or_not_there(out, temporary):
         resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
         try:
             lost = results.write("log.h5", b"x" * 10_001)
-            kept = results.write("metrics.json", b"x" * 10_000)
+            saved = results.write("metrics.json", b"x" * 10_000)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert (lost, kept) == (None, out / "metrics.json")
+    assert (lost, saved) == (None, out / "metrics.json")
     assert set(content(out)) == {MANIFEST, "metrics.json"}
     assert content(temporary) == {}
     reason = os.strerror(errno.EFBIG)
@@ -381,7 +383,7 @@ def test_a_file_that_is_written_again_is_there_at_every_moment(tmp_path):
                 check_folder(out, "sweep")
 
 
-def test_how_it_ended_is_told_in_the_manifest(out):
+def test_the_manifest_contains_the_outcome(out):
     assert read_outcome(out, "run") == {}
     with open_results(out, "run") as results:
         results.tell({"fault": None, "warnings": ["slow"]})

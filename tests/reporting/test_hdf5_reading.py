@@ -8,7 +8,7 @@ from experiments.results.run_log import RunLog
 from identification.estimation.results import load_estimate
 from identification.measurement.files import read_record
 from pfsc_drake import InputError
-from reporting.hdf5_reading import opened
+from reporting.hdf5_reading import open_hdf5
 
 
 def test_numbers_are_read_and_groups_left_out(tmp_path):
@@ -19,12 +19,12 @@ def test_numbers_are_read_and_groups_left_out(tmp_path):
         file.create_dataset("zeros", data=zeros, compression="gzip", shuffle=True)
         file.create_group("more")
     assert path.stat().st_size < zeros.nbytes / 200
-    with opened(path, "log") as content:
+    with open_hdf5(path, "log") as content:
         assert {name: dataset.shape for name, dataset in content.datasets()} == {
             "x": (3,),
             "zeros": (2_000_000, 2),
         }
-    with opened(path, "log") as content:
+    with open_hdf5(path, "log") as content:
         content.check()
 
 
@@ -70,8 +70,8 @@ def compound(file, _folder):
     ("make", "reason"),
     [
         (external_link, "'xi' is a link"),
-        (external_storage, "'xi' is kept in another file"),
-        (virtual, "'xi' is kept in another file"),
+        (external_storage, "'xi' is stored in another file"),
+        (virtual, "'xi' is stored in another file"),
         (huge, "'xi' takes 8 GB; allowed: 0.1"),
         (many_large, "'xi_c' takes 0.04 GB; allowed: 0.0"),
         (endless, "'xi' takes"),

@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from reporting.interruption import noticed_interruption, raised_interruption
+from reporting.interruption import raise_on_interruption, watch_interruption
 from reporting.provenance import PROJECT_ROOT
 
 _ENDING = (signal.SIGHUP, signal.SIGTERM)
@@ -31,7 +31,7 @@ def press():
 
 def test_the_first_is_noticed_and_the_second_raised():
     before = signal.getsignal(signal.SIGINT)
-    with noticed_interruption() as interrupted:
+    with watch_interruption() as interrupted:
         assert not interrupted()
         press()
         assert interrupted()
@@ -41,21 +41,21 @@ def test_the_first_is_noticed_and_the_second_raised():
 
 
 def test_one_that_a_library_swallows_is_raised_later():
-    with raised_interruption():
+    with raise_on_interruption():
         with pytest.raises(KeyboardInterrupt):
             press()
-        with pytest.raises(KeyboardInterrupt), noticed_interruption():
+        with pytest.raises(KeyboardInterrupt), watch_interruption():
             pass
         with pytest.raises(KeyboardInterrupt):
             press()
-    with raised_interruption(), noticed_interruption() as interrupted:
+    with raise_on_interruption(), watch_interruption() as interrupted:
         assert not interrupted()
 
 
 def test_jobs_in_the_background_go_on_ignoring_it():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with raised_interruption(), noticed_interruption() as interrupted:
+        with raise_on_interruption(), watch_interruption() as interrupted:
             press()
             assert not interrupted()
     finally:
@@ -63,16 +63,16 @@ def test_jobs_in_the_background_go_on_ignoring_it():
 
 
 def test_other_threads_have_no_signals():
-    seen = []
+    results = []
 
     def work():
-        with raised_interruption(), noticed_interruption() as interrupted:
-            seen.append(interrupted())
+        with raise_on_interruption(), watch_interruption() as interrupted:
+            results.append(interrupted())
 
     thread = threading.Thread(target=work)
     thread.start()
     thread.join()
-    assert seen == [False]
+    assert results == [False]
 
 
 @pytest.mark.parametrize("library", ["numpy", "pydrake.all", "experiments.simulated_run"])
@@ -95,8 +95,8 @@ def test_imports_end_with_one_line(library):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_requests_to_end_are_noticed_and_handed_on_at_the_end(number):
     received = []
-    with raised_interruption():
-        with noticed_interruption() as interrupted:
+    with raise_on_interruption():
+        with watch_interruption() as interrupted:
             signal.raise_signal(number)
             signal.raise_signal(number)  # as `timeout` and terminals do
             assert interrupted()
@@ -104,7 +104,7 @@ def test_requests_to_end_are_noticed_and_handed_on_at_the_end(number):
             signal.raise_signal(number)
     # one that the program handles itself is its own business, and one that it does not ends it
     before = signal.signal(number, lambda *_: received.append(number))
-    with noticed_interruption() as interrupted:
+    with watch_interruption() as interrupted:
         signal.raise_signal(number)
         assert interrupted()
     signal.raise_signal(number)
@@ -114,8 +114,8 @@ def test_requests_to_end_are_noticed_and_handed_on_at_the_end(number):
 
 def test_a_script_ends_after_what_it_saves():
     code = (
-        "import signal\nfrom reporting.interruption import noticed_interruption\n"
-        "with noticed_interruption() as interrupted:\n"
+        "import signal\nfrom reporting.interruption import watch_interruption\n"
+        "with watch_interruption() as interrupted:\n"
         "    signal.raise_signal(signal.SIGTERM)\n    print('saved', interrupted(), flush=True)\n"
         "print('next')"
     )
@@ -130,7 +130,7 @@ def test_what_is_ignored_at_the_beginning_stays_ignored_and_the_others_count(ign
         f"import signal\nsignal.signal(signal.{ignored}, signal.SIG_IGN)\n"
         "from reporting.interruption import *\nleave_when_interrupted()\n"
         f"signal.raise_signal(signal.{ignored})\n"
-        "with raised_interruption(), noticed_interruption() as interrupted:\n"
+        "with raise_on_interruption(), watch_interruption() as interrupted:\n"
         f"    signal.raise_signal(signal.{ignored})\n    print(interrupted())\n"
         f"    signal.raise_signal(signal.{other})\n    print(interrupted(), flush=True)\n"
         f"signal.raise_signal(signal.{other})\n"
@@ -142,8 +142,8 @@ def test_what_is_ignored_at_the_beginning_stays_ignored_and_the_others_count(ign
 
 def test_a_terminal_that_has_closed_is_written_to_no_more(tmp_path):
     code = (
-        "import pathlib, sys, time\nfrom reporting.interruption import noticed_interruption\n"
-        "with noticed_interruption() as interrupted:\n    print('ready', flush=True)\n"
+        "import pathlib, sys, time\nfrom reporting.interruption import watch_interruption\n"
+        "with watch_interruption() as interrupted:\n    print('ready', flush=True)\n"
         "    while not interrupted():\n        time.sleep(0.01)\n"
         "    print('to nobody', flush=True)\n    pathlib.Path(sys.argv[1]).write_text('saved')\n"
     )

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from pfsc_drake import InputError
-from reporting.metrics import NARROW_SPACE, Metric, Metrics, format_quantity
+from reporting.metrics import NARROW_SPACE, Metric, Metrics, format_cell, format_quantity
 
 
 @pytest.mark.parametrize(
@@ -93,8 +93,15 @@ def test_set_target():
         (7.3128, "1", "7.313"),
         (0.0, "m", "0 m"),
         (3.2e-7, "1", "3.20·10⁻⁷"),
+        (-1.3e-17, "1", "0"),
+        (4e-16, "kg", "0 kg"),
+        (-5e-14, "N m", "0 N\u2009m"),
         (math.nan, "m", "\u2013"),
     ],
 )
 def test_format_quantity(value, unit, text):
     assert format_quantity(value, unit).replace(NARROW_SPACE, " ") == text
+
+
+def test_numbers_of_tables_are_without_rounding_errors():
+    assert [format_cell(x) for x in (1.23456, -2e-7, -1.3e-17, 0)] == ["1.235", "-2e-07", "0", "0"]

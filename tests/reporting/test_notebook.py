@@ -1,4 +1,4 @@
-"""What a notebook shows: nothing of a user's text is taken for HTML, and long pages stay files."""
+"""Display in a notebook: no user text is taken for HTML, and long pages stay files."""
 
 import math
 

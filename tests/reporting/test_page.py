@@ -7,7 +7,7 @@ import pytest
 
 from reporting import page as pages
 from reporting.metrics import Metrics
-from reporting.page import Table
+from reporting.page import Fact, Table
 from reporting.style import Figure
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -162,7 +162,7 @@ def test_works_without_metrics_and_figures(run):
 
 
 def test_commands_and_cards_of_many_runs(run):
-    command = "python -m experiments run a --set 'b=<1>'"
+    command = "pfsc run a --set 'b=<1>'"
     page = Page(
         report_page(**run, kind="Sweep", commands={"Worst <run>": command}, cards=["peak_torque_1"])
     )
@@ -197,3 +197,43 @@ def test_a_metric_keeps_its_heads_where_the_table_is_stacked(run):
     heads = page.values("td", "data-head")
     assert heads == ["Target", "Source"] * 3
     assert "content: attr(data-head)" in html
+
+
+def test_a_brief_page_folds_metrics_and_further_figures(run):
+    """Unfolded remain the key results and four figures; the scenario is reduced to its changes."""
+    run["figures"] = [Figure(f"f{i}", f"Figure <{i}>", "c", PNG) for i in range(6)]
+    html = report_page(**run, brief=True, changed_yaml_text="law: <rigid>\n")
+    page = Page(html)
+    folds = html.split("<details")[1:]
+    assert [fold.partition("</details>")[0].count("<img") for fold in folds] == [2, 0, 0]
+    assert "2 more: Figure <4>; Figure <5>" in page.text
+    assert "3 metrics" in folds[1]
+    assert "peak_torque_1" not in html.split("<details")[0]
+    assert " open" not in "".join(fold.partition(">")[0] for fold in folds)
+    assert "law: <rigid>" in page.text.split("Scenario as resolved")[0]
+    assert html.count("<img") == 6
+    open_page = report_page(**run)
+    assert open_page.count("<details") == open_page.count(" open>") + 1 == 2
+
+
+def test_facts_are_cards_beside_those_of_metrics(run):
+    page, html = read(report_page(**run, facts=[Fact("Duration", "4.03 s", "of <5> s")]))
+    assert html.count('class="card"') == 3
+    assert "of <5> s" in page.text
+    assert "required: <\u202f50\u202fµm" in page.text
+    page, html = read(report_page(title="x", facts=[Fact("Duration", "0 s")]))
+    assert html.count('class="card"') == 1
+
+
+def test_legend_of_the_recording_has_colours(run):
+    legend = {"path <1>": "#2666d9"}
+    page, html = read(report_page(**run, legend=legend, recording="recording.html"))
+    assert "path <1>" in page.text
+    assert 'style="background: #2666d9"' in html
+    assert "swatch" not in report_page(**run, legend=legend).partition("</head>")[2]
+
+
+def test_commands_have_a_title(run):
+    page = Page(report_page(**run, commands={"again": "pfsc run x"}, commands_title="Go on"))
+    assert "Go on" in page.text
+    assert "Runs to look at" not in page.text

@@ -1,4 +1,4 @@
-"""Processes of this machine, which take work from nobody else."""
+"""Processes of this machine, which accept work from each other only."""
 
 import pytest
 

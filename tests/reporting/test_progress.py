@@ -45,7 +45,7 @@ def test_terminal_shows_a_bar_with_the_title_as_it_is():
     assert "drawing figures" in stream.getvalue()
 
 
-def test_where_work_is_has_no_pace():
+def test_a_position_of_work_has_no_rate():
     """Each phase begins anew, and jumps in it are no speed."""
     stream = io.StringIO()
     with ProgressDisplay(Console(file=stream, width=200), "x", 4.0, paced=False) as progress:
@@ -57,8 +57,8 @@ def test_where_work_is_has_no_pace():
     assert "x: linearizing, masses +5 %, t = 2.00 of 4.00 s" in lines
 
 
-def test_a_phase_that_goes_back_has_its_own_pace(monkeypatch):
-    """A run of 4 s is repeated in 2 s: at twice its pace, and from its begin on."""
+def test_a_phase_that_goes_back_has_its_own_rate(monkeypatch):
+    """A run of 4 s is repeated in 2 s: at twice its rate, and from its start on."""
     clock = iter([*[0.0] * 3, *[4.0] * 2, *[5.0] * 2, *[6.0] * 2])
     monkeypatch.setattr("reporting.progress.time.monotonic", lambda: next(clock))
     stream = io.StringIO()
@@ -90,9 +90,9 @@ def test_a_line_for_each_phase():
 
 
 def test_a_line_for_each_tenth_of_a_phase():
-    told = lines([(k / 1000.0, "looking") for k in range(1001)])
-    assert 10 <= len(told) <= 12
-    assert told[0] == "search: looking, 0%"
+    printed = lines([(k / 1000.0, "looking") for k in range(1001)])
+    assert 10 <= len(printed) <= 12
+    assert printed[0] == "search: looking, 0%"
 
 
 def test_words_are_not_markup():

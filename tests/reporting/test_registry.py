@@ -15,7 +15,7 @@ from reporting.registry import (
     as_data,
     as_markdown,
     as_text,
-    known_metric,
+    find_metric,
     possible_metrics,
 )
 
@@ -83,9 +83,9 @@ def test_labels(labels, count, expected):
 
 
 def test_metrics_of_each_drive():
-    assert known_metric("peak_torque_12") is METRICS["peak_torque_{}"]
-    assert known_metric("controller_tick_us_p99") is METRICS["controller_tick_us_p99"]
-    assert known_metric("peak_torque") is None
+    assert find_metric("peak_torque_12") is METRICS["peak_torque_{}"]
+    assert find_metric("controller_tick_us_p99") is METRICS["controller_tick_us_p99"]
+    assert find_metric("peak_torque") is None
     names = possible_metrics({"tau_d", "path_length"}, 2)
     assert names[:4] == ["peak_torque_1", "peak_torque_2", "saturated_samples", "saturated_share"]
     assert "path_length" in names

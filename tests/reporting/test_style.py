@@ -8,11 +8,12 @@ from matplotlib.text import Text
 
 from reporting.style import (
     STYLE,
+    add_legend,
     fitting_unit,
+    flatten_rounding_errors,
     is_dwarfed,
     largest,
     make_panels,
-    place_legend,
     shade,
 )
 from tests.shades import shades, spans
@@ -25,7 +26,7 @@ def overlap(labels, title):
         for label in labels:
             panel.plot([0.0, 1.0], [0.0, 1.0], label=label)
         panel.set_title(title)
-        place_legend(panel)
+        add_legend(panel)
         renderer = FigureCanvasAgg(canvas).get_renderer()
         canvas.draw(renderer)
         box = panel.get_legend().get_window_extent(renderer)
@@ -78,6 +79,17 @@ def test_units_that_fit():
     assert fitting_unit(np.array([2e-3, np.nan]), "m") == (1e3, "mm")
     assert fitting_unit(np.array([-2e-5]), "rad") == (1e6, "µrad")
     assert fitting_unit(np.zeros(3), "m") == (1e3, "mm")
+    assert fitting_unit(np.array([-2e-16]), "m") == (1e3, "mm")
+
+
+@pytest.mark.parametrize(("size", "flat"), [(2e-13, True), (2e-6, False), (0.0, False)])
+def test_rounding_errors_are_drawn_as_zero(size, flat):
+    """The labels of the axis read -1 to 1, not a ten-thousandth of a nanometre."""
+    _, (panel,) = make_panels(1)
+    panel.plot([0.0, 1.0, 2.0], [0.0, size, -size])
+    before = panel.get_ylim()
+    flatten_rounding_errors(panel)
+    assert panel.get_ylim() == ((-1.0, 1.0) if flat else before)
 
 
 def test_largest_skips_what_is_not_finite():

@@ -85,7 +85,7 @@ def test_starts_follow_the_wires_whatever_the_order():
     np.testing.assert_array_equal(log.FindLog(simulator.get_context()).data(), 7.0)
 
 
-def test_a_state_that_was_set_is_kept_at_the_start_and_forgotten_at_the_next():
+def test_a_state_that_was_set_survives_the_start_but_not_the_next():
     system = BlockSystem(Lag(), PERIOD)
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
@@ -165,19 +165,19 @@ def test_a_state_that_is_put_out_as_it_is():
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
     system.GetInputPort("u").FixValue(context, [1.0, 2.0])
-    held, twice = (system.GetOutputPort(name) for name in ("held", "twice"))
+    delayed, twice = (system.GetOutputPort(name) for name in ("held", "twice"))
     assert context.num_discrete_state_groups() == 2
     assert context.get_discrete_state(1).size() == 2
-    np.testing.assert_array_equal(held.Eval(context), [0.0, 0.0])
+    np.testing.assert_array_equal(delayed.Eval(context), [0.0, 0.0])
     system.set_state(context, "held", np.array([5.0, 6.0]))
-    np.testing.assert_array_equal(held.Eval(context), [5.0, 6.0])
+    np.testing.assert_array_equal(delayed.Eval(context), [5.0, 6.0])
     np.testing.assert_array_equal(twice.Eval(context), [10.0, 12.0])
     assert system.is_set(context, "held") and not system.is_set(context, "begun")
     np.testing.assert_array_equal(system.GetOutputPort("begun").Eval(context), [1.0, 2.0])
     for k in range(1, 4):
         simulator.AdvanceTo((k - 0.5) * PERIOD)
         expected = np.array([5.0, 6.0]) + k * np.array([1.0, 2.0])
-        np.testing.assert_array_equal(held.Eval(context), expected)
+        np.testing.assert_array_equal(delayed.Eval(context), expected)
         np.testing.assert_array_equal(twice.Eval(context), 2.0 * expected)
         np.testing.assert_array_equal(system.wire(context, "held"), expected)
         np.testing.assert_array_equal(system.state(context, "held"), expected)

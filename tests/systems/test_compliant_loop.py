@@ -82,14 +82,14 @@ def test_the_rotational_forces_may_depend_on_the_reference(path):
         return R_d * Rotation.from_euler("ZYX", angles)
 
     for i, step in enumerate(1e-6 * np.eye(3)):
-        way = (turn(phi + step) * turn(phi - step).inv()).as_rotvec()
-        assert stiffness * phi[i] * 2e-6 == pytest.approx(moment @ way, rel=1e-5)
+        rotation = (turn(phi + step) * turn(phi - step).inv()).as_rotvec()
+        assert stiffness * phi[i] * 2e-6 == pytest.approx(moment @ rotation, rel=1e-5)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("start", ["reference", "actual"])
 def test_a_robot_yields_to_a_force(arm, path, request, start):
-    """In the intended wiring, with a sensor that measures a constant force: it yields by f / k."""
+    """In the intended wiring, with a constant measured force: the deflection is f / k."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
     Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_3r")))

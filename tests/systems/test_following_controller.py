@@ -172,7 +172,7 @@ def test_a_fault_shows_at_once_and_holds(bench, arm):
     assert np.isfinite(bench.output("drive_torque")).all()
 
 
-def test_a_fault_without_measurement_bears_the_weight(bench, arm):
+def test_a_fault_without_measurement_supports_the_weight(bench, arm):
     """Nothing is measured of an arm at rest: the drives hold what it weighs."""
     resting = np.concatenate([bench.state[:3], np.zeros(3), bench.state[:3], np.zeros(3)])
     bench.fix(state=resting)
@@ -257,14 +257,14 @@ def test_the_last_ticks_drive_is_extrapolated(path):
     system.GetInputPort("manifold_point").FixValue(context, point)
     system.GetInputPort("reference").FixValue(context, reference)
     simulator = Simulator(system, context)
-    last_held = None
+    last_varying_input = None
     for i, state in enumerate(states):
         system.GetInputPort("joint_state").FixValue(context, state)
-        expected = law.evaluate(state, point, reference, np.zeros(3), last_held)
+        expected = law.evaluate(state, point, reference, np.zeros(3), last_varying_input)
         assert expected[law.layout.status][0] == Fault.NONE
         assert np.array_equal(system.GetOutputPort("law").Eval(context), expected)
         simulator.AdvanceTo((i + 1) * PERIOD)
-        last_held = expected[law.layout.held]
+        last_varying_input = expected[law.layout.varying_input]
     assert np.abs(law.evaluate(state, point, reference, np.zeros(3)) - expected).max() > 1.0
 
 
@@ -329,7 +329,7 @@ def test_the_loop_over_a_plant_is_not_algebraic_and_converges(arm, path, make_la
 
 
 def test_a_loop_from_the_drives_to_the_measurement_is_refused(bench):
-    """The torque acts at once; Drake sees a loop that has no solution in time."""
+    """The torque acts immediately; Drake sees a loop that has no solution in time."""
     builder = DiagramBuilder()
     controller = builder.AddSystem(bench.system)
     gain = builder.AddSystem(MatrixGain(np.ones((12, 3))))
@@ -380,8 +380,8 @@ def test_what_is_found_is_read_by_name_fused_or_not(fused, arm, path, make_law):
     diagram = builder.Build()
     blocks, simulator = BlockAccess(diagram), Simulator(diagram)
     root = simulator.get_mutable_context()
-    told = diagram.GetInputPort("joint_state")
-    told.FixValue(root, bench.state)
+    inputs = diagram.GetInputPort("joint_state")
+    inputs.FixValue(root, bench.state)
     simulator.Initialize()
     assert access.fault(blocks, root) == Fault.NONE
     torque = access.drive(blocks, root)
@@ -389,17 +389,17 @@ def test_what_is_found_is_read_by_name_fused_or_not(fused, arm, path, make_law):
     simulator.AdvanceTo(2 * PERIOD)
     access.set_last_state(blocks, root, bench.state)
     jumped = bench.state + 0.01 * np.eye(12)[7]
-    told.FixValue(root, jumped)
+    inputs.FixValue(root, jumped)
     assert access.fault(blocks, root) == Fault.MEASUREMENT_IMPLAUSIBLE
     assert np.flatnonzero(access.suspects(blocks, root)).tolist() == [7]
     simulator.AdvanceTo(2.5 * PERIOD)
-    told.FixValue(root, bench.state)
+    inputs.FixValue(root, bench.state)
     # between ticks nothing is known but what is remembered
     assert access.fault(blocks, root) == Fault.MEASUREMENT_IMPLAUSIBLE
     assert np.flatnonzero(access.suspects(blocks, root)).tolist() == [7]
 
 
-def test_whatever_is_told_drives_get_finite_torques_within_their_limits(arm, path, make_law):
+def test_any_input_leads_to_finite_torques_within_limits(arm, path, make_law):
     bench = Bench(arm, path, make_law(integral=500.0, limit=900.0), SupervisionParameters())
     network = fuse(FollowingController(bench.law, PERIOD, SupervisionParameters())).network
     good = {name: np.zeros(port.size) for name, port in network.inputs.items()}
@@ -410,11 +410,11 @@ def test_whatever_is_told_drives_get_finite_torques_within_their_limits(arm, pat
     for _ in range(150):
         controller.start(**good)
         for k in range(4):
-            told = {name: value.copy() for name, value in good.items()}
-            for value in told.values():
+            inputs = {name: value.copy() for name, value in good.items()}
+            for value in inputs.values():
                 spoiled = rng.random(value.size) < (k > 0) * rng.choice([0.0, 0.05, 0.5, 1.0])
                 value[spoiled] = rng.choice(anything, spoiled.sum())
-            found = controller.step(**told)
+            found = controller.step(**inputs)
             assert np.all(np.abs(found["drive_torque"]) <= bench.law.limits)
             faults.add(Fault(int(found["fault"][0])))
     assert {Fault.NONE, Fault.INPUT_NOT_FINITE, Fault.MEASUREMENT_IMPLAUSIBLE} < faults

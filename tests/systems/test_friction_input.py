@@ -1,4 +1,4 @@
-"""Friction that the law is told of: on the drives, within their limits, while nothing is wrong."""
+"""Friction compensation: on the drives, within their limits, while nothing is wrong."""
 
 import numpy as np
 import pytest

@@ -46,7 +46,7 @@ class Ramp(Block):
 
 
 def add_servo(builder, q):
-    """Add ramp, servo and hold, and return what is held and what is to be logged."""
+    """Add ramp, servo and hold, and return the held value and the logged one."""
     ramp = builder.AddNamedSystem("ramp", BlockSystem(Ramp(), PERIOD))
     servo = builder.AddNamedSystem("servo", BlockSystem(Servo(), PERIOD))
     hold = builder.AddNamedSystem("hold", BlockSystem(Hold(1), PERIOD))
@@ -138,7 +138,7 @@ def test_a_diagram_of_blocks_within_a_diagram_is_fused_with_the_others():
     np.testing.assert_array_equal(log.FindLog(simulator.get_context()).data()[0], expected)
 
 
-def test_rows_are_those_asked_for():
+def test_rows_are_the_requested_ones():
     system = BlockSystem(Rows(4, [3, 1]), PERIOD)
     context = system.CreateDefaultContext()
     system.get_input_port().FixValue(context, [5.0, 6.0, 7.0, 8.0])

@@ -1,4 +1,4 @@
-"""What a schedule finds near, as a system: against all distances at every tick."""
+"""Nearest regions of a schedule, as a system: against all distances at every tick."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ PERIOD, PARAMETERS = 1e-3, GuidanceParameters()
 COUNT, MOVING, SPEED = 30, 5, 0.03
 
 
-def way(k):
+def point_at(k):
     angle = 2e-3 * k
     return np.array([0.3 * np.sin(angle), 0.3 * (1.0 - np.cos(angle)), 0.1 * np.sin(3.0 * angle)])
 
@@ -30,7 +30,7 @@ def regions():
     for k in np.linspace(0, 400, COUNT):
         across = random.normal(size=3)
         away = 0.02 + random.uniform(0.005, 0.05)
-        centre = way(k) + away * across / np.linalg.norm(across)
+        centre = point_at(k) + away * across / np.linalg.norm(across)
         balls.append(SphereRegion(centre, 0.02, inside=False))
     for i in range(0, 2 * MOVING, 2):
         balls[i] = ShiftedRegion(balls[i], Swinging(0.01, SPEED / 0.01), random.normal(size=3))
@@ -54,8 +54,8 @@ class Bench:
     def look(self, z):
         """Return rows, limit, and which regions were evaluated at the next tick."""
         clock = self.tick * PERIOD
-        place = [*z, clock, clock + PERIOD]
-        self.system.GetInputPort("place").FixValue(self.context, np.array(place))
+        values = [*z, clock, clock + PERIOD]
+        self.system.GetInputPort("evaluation_point").FixValue(self.context, np.array(values))
         self.simulator.AdvanceTo(clock)
         near = self.system.GetOutputPort("near").Eval(self.context).copy()
         self.simulator.AdvanceTo(clock + PERIOD / 2.0)
@@ -70,8 +70,8 @@ def test_it_finds_what_all_distances_find_and_evaluates_few(regions):
     every = near_rows(regions, reaches(PARAMETERS, PERIOD, speeds(regions)))
     evaluated, found = 0, 0
     for k in range(400):
-        rows, limit, looked_at = bench.look(way(k))
-        expected = every(way(k), k * PERIOD, (k + 1) * PERIOD).full()
+        rows, limit, looked_at = bench.look(point_at(k))
+        expected = every(point_at(k), k * PERIOD, (k + 1) * PERIOD).full()
         np.testing.assert_allclose(rows, expected, atol=1e-12)
         assert limit == np.inf
         evaluated, found = evaluated + looked_at.sum(), found + np.sum(rows[:, 0] >= 0.0)
@@ -79,22 +79,24 @@ def test_it_finds_what_all_distances_find_and_evaluates_few(regions):
     assert evaluated < 3 * 400
 
 
-def test_what_is_off_is_not_told(regions):
+def test_regions_that_are_off_are_not_reported(regions):
     bench = Bench(regions)
     on = np.ones(len(regions))
     bench.system.GetInputPort("active").FixValue(bench.context, on)
     near = next(
-        (z, rows[0, 0]) for z in map(way, range(400)) if (rows := bench.look(z)[0])[0, 0] >= 0.0
+        (z, rows[0, 0])
+        for z in map(point_at, range(400))
+        if (rows := bench.look(z)[0])[0, 0] >= 0.0
     )
     on[int(near[1])] = 0.0
     bench.system.GetInputPort("active").FixValue(bench.context, on)
     assert near[1] not in bench.look(near[0])[0][:, 0]
 
 
-def test_a_place_that_is_no_number_is_near_nothing_and_forgotten(regions):
+def test_a_position_that_is_not_finite_is_near_nothing(regions):
     bench = Bench(regions)
     for k in range(5):
-        bench.look(way(k))
+        bench.look(point_at(k))
     before = bench.context.get_discrete_state_vector().value().copy()
     rows, limit, looked_at = bench.look([np.nan, 0.0, 0.0])
     assert np.all(rows[:, 0] == NOTHING)

@@ -1,4 +1,4 @@
-"""The projector alone: start, memory, laps, branches."""
+"""The projector alone: start, memory, revolutions, branches."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ class Bench:
 
     @property
     def memory(self):
-        return self.system.state(self.context, "place")
+        return self.system.state(self.context, "projection")
 
 
 def test_the_start_is_found_on_the_whole_path(path):
@@ -64,11 +64,11 @@ def test_the_output_is_the_paths_own(path):
 
 def test_the_parameter_is_the_only_memory(path):
     bench = Bench(path)
-    assert list(bench.system.states) == ["place"]
+    assert list(bench.system.states) == ["projection"]
     assert bench.memory.shape == (1,)
 
 
-def test_laps_are_counted():
+def test_revolutions_are_counted():
     circle = FourierCurve.circle([0.0, 0.0, 0.5], 0.3)
     bench = Bench(Path(circle))
     bench.move_to(circle.derivatives(0.1, 0)[0])
@@ -88,13 +88,13 @@ def test_laps_are_counted():
 
 
 @pytest.mark.parametrize("theta", [0.5 * np.pi, 1.5 * np.pi])
-def test_a_given_parameter_chooses_the_branch_at_the_crossing(path, theta):
+def test_a_specified_parameter_chooses_the_branch_at_the_crossing(path, theta):
     """At the crossing the two branches differ in their tangents."""
     bench = Bench(path)
     crossing = path.position.derivatives(0.5 * np.pi, 0)[0]
     assert np.allclose(crossing, path.position.derivatives(1.5 * np.pi, 0)[0], atol=1e-12)
     bench.move_to(crossing)
-    bench.system.set_state(bench.context, "place", np.array([theta + 0.02]))
+    bench.system.set_state(bench.context, "projection", np.array([theta + 0.02]))
     bench.start()
     assert bench.point("theta") == pytest.approx([theta], abs=1e-9)
     tangent = bench.point("position")[3:6]
@@ -102,7 +102,7 @@ def test_a_given_parameter_chooses_the_branch_at_the_crossing(path, theta):
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_the_branch_is_kept_through_the_crossing(path, direction):
+def test_the_branch_is_continued_through_the_crossing(path, direction):
     bench = Bench(path)
     begin = 0.5 * np.pi - 0.3 * direction
     bench.move_to(path.position.derivatives(begin, 0)[0])

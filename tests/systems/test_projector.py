@@ -1,4 +1,4 @@
-"""The projector onto a surface alone: start, memory, laps, what it is not told."""
+"""The projector onto a surface alone: start, memory, revolutions, missing inputs."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ class Bench:
 
     @property
     def memory(self):
-        return self.system.state(self.context, "place")
+        return self.system.state(self.context, "projection")
 
 
 def around(angle, height=0.0, radius=RADIUS):
@@ -64,9 +64,9 @@ def test_the_start_is_found_on_the_whole_surface(pipe):
     assert pipe.point("status") == [ProjectionStatus.OK]
 
 
-def test_a_given_place_is_kept(pipe):
-    """Coordinates start from it, also a lap later."""
-    pipe.system.set_state(pipe.context, "place", np.array([4.0 + 2.0 * np.pi, 0.7, 5.0, -2.0]))
+def test_a_specified_projection_is_used(pipe):
+    """Coordinates start from it, also a revolution later."""
+    pipe.system.set_state(pipe.context, "projection", np.array([4.0 + 2.0 * np.pi, 0.7, 5.0, -2.0]))
     pipe.move_to(around(4.1, 0.7))
     pipe.start()
     np.testing.assert_allclose(pipe.point("theta"), [4.1 + 2.0 * np.pi, 0.7], atol=1e-9)
@@ -84,7 +84,7 @@ def test_the_output_is_the_evaluators_own():
     assert bench.output.shape == (bench.layout.size,)
 
 
-def test_laps_are_counted(pipe):
+def test_revolutions_are_counted(pipe):
     pipe.move_to(around(0.1))
     pipe.start()
     for turned in np.arange(0.1, 13.0, 0.1):
@@ -95,8 +95,8 @@ def test_laps_are_counted(pipe):
     np.testing.assert_allclose(pipe.point("eta"), [12.9 * RADIUS, 0.13], atol=1e-9)
 
 
-def test_the_place_moves_on_with_the_ticks_alone(pipe):
-    """A way asked about within a tick leaves no trace."""
+def test_the_projection_changes_with_the_ticks_alone(pipe):
+    """A motion evaluated within a tick leaves no trace."""
     pipe.move_to(around(0.0))
     pipe.start()
     for angle in (0.3, -0.3, 0.2):
@@ -108,7 +108,7 @@ def test_the_place_moves_on_with_the_ticks_alone(pipe):
     np.testing.assert_allclose(pipe.memory, [0.2, 0.0, 0.2 * RADIUS, 0.0], atol=1e-9)
 
 
-def test_a_tool_that_is_nowhere_does_not_make_the_place_forgotten(pipe):
+def test_a_position_that_is_not_finite_does_not_delete_the_projection(pipe):
     pipe.move_to(around(1.0))
     pipe.start()
     before = pipe.memory.copy()

@@ -1,4 +1,4 @@
-"""The velocity of the joints that a reference asks for, as the controller tells it."""
+"""The joint velocity of a reference, as an output of the controller."""
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -9,9 +9,9 @@ PERIOD = 1e-3
 V = np.array([0.2, -0.3, 0.4])
 
 
-def test_the_velocity_that_the_reference_asks_for(arm, path, make_law):
-    """The joints at that velocity have the reference's rate; told a tick later, zero before."""
-    law = make_law(tells_reference_velocity=True)
+def test_the_velocity_of_the_reference(arm, path, make_law):
+    """The joints at that velocity have the reference's rate; output a tick later, zero before."""
+    law = make_law(has_reference_velocity=True)
     system, theta = FollowingController(law, PERIOD), 0.6
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
@@ -28,15 +28,15 @@ def test_the_velocity_that_the_reference_asks_for(arm, path, make_law):
 
     fix(V)
     simulator.Initialize()
-    told = system.GetOutputPort("reference_velocity")
-    assert not told.Eval(context).any()
+    port = system.GetOutputPort("reference_velocity")
+    assert not port.Eval(context).any()
     simulator.AdvanceTo(PERIOD)
-    wanted = told.Eval(context).copy()
-    fix(wanted)
+    expected_velocity = port.Eval(context).copy()
+    fix(expected_velocity)
     rate = system.GetOutputPort("manifold_state").Eval(context)[3:]
     np.testing.assert_allclose(rate, reference[3:6], rtol=0, atol=1e-12)
-    assert np.abs(wanted - V).min() > 1e-3
+    assert np.abs(expected_velocity - V).min() > 1e-3
 
 
-def test_a_law_that_does_not_tell_velocities_has_no_such_port(make_law):
+def test_a_law_without_reference_velocities_has_no_such_port(make_law):
     assert not FollowingController(make_law(), PERIOD).HasOutputPort("reference_velocity")

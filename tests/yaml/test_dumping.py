@@ -1,4 +1,4 @@
-"""Typed dumping: what is loaded again has equal values, tags included."""
+"""Typed dumping: values loaded again are equal, tags included."""
 
 import dataclasses
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from pfsc_drake.yaml.dumping import dump_typed, typed_data
+from pfsc_drake.yaml.dumping import changed_data, dump_typed, typed_data
 from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml
 from pfsc_drake.yaml.typed import load_typed
 
@@ -41,6 +41,38 @@ class Scene:
 
 def _again(scene: Scene) -> Scene:
     return load_typed(Scene, parse_yaml(dump_typed(scene), "dumped"), "dumped")
+
+
+def test_only_changed_keys_are_left_and_load_as_the_same() -> None:
+    assert changed_data(Scene()) == {}
+    scene = Scene(Bent(1.0, 3.0), [Flat(), Bent(5.0)], {"a": Bent()}, None, matrix=np.eye(3))
+    changed = changed_data(scene)
+    assert changed == {
+        "shape": {"coefficient": 3.0, TAG_KEY: "!Bent"},
+        "others": [{}, {"size": 5.0, TAG_KEY: "!Bent"}],
+        "named": {"a": {}},
+        "choice": None,
+        "matrix": np.eye(3).tolist(),
+    }
+    assert dump_typed(load_typed(Scene, changed, "changed")) == dump_typed(scene)
+
+
+def test_mandatory_keys_stay_and_a_default_block_is_the_base() -> None:
+    @dataclass
+    class Inner:
+        number: int = field(default=1, metadata={"required": True})
+        size: float = 2.0
+
+    @dataclass
+    class Outer:
+        inner: Inner = field(default_factory=lambda: Inner(3, 4.0))
+        named: dict[str, Inner] = field(default_factory=lambda: {"a": Inner(), "b": Inner()})
+
+    outer = Outer(Inner(3, 2.0), {"a": Inner(), "b": Inner(1, 5.0)})
+    changed = changed_data(outer)
+    assert changed["inner"] == {"number": 3, "size": 2.0}  # which is not the default here
+    assert changed["named"]["b"] == {"number": 1, "size": 5.0}
+    assert load_typed(Outer, changed, "changed") == outer
 
 
 def test_a_later_member_of_a_union_keeps_its_tag_and_its_own_keys() -> None:

@@ -59,7 +59,7 @@ class Block(Parent):
     share: float = 0.0
     never: float = math.inf
     lowest: float = -math.inf
-    untold: float = 0.0
+    undescribed: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -89,14 +89,14 @@ class Whole:
         ("share", Range(-1e9, 1e9)),
         ("never", Range(-1e6, 1e6, "s", infinite=True)),
         ("lowest", Range(-math.inf, 1e4, "m")),
-        ("untold", None),
+        ("undescribed", None),
     ],
 )
 def test_bounds(name, bounds):
     assert fields_of(Block)[name].bounds == bounds
 
 
-def said_of(**data):
+def refusal_of(**data):
     with pytest.raises(InputError) as error:
         load_typed(Whole, {"block": data}, "a.yaml")
     return str(error.value)
@@ -104,26 +104,26 @@ def said_of(**data):
 
 def test_what_is_beyond_is_refused_by_its_key():
     key = "a.yaml: key 'block.lengths[1]' is -20000: expected a number from -10000 to 10000 m"
-    assert said_of(lengths=[1.0, -2e4]) == key
-    assert said_of(own=5.1).endswith("key 'block': own = 5.1; allowed: 0 to 5 m")
-    assert said_of(own=-1e-3).endswith("own = -0.001; allowed: 0 to 5 m")
-    assert said_of(never=-math.inf).endswith("expected a number from -1e+06 to 1e+06 s, or .inf")
+    assert refusal_of(lengths=[1.0, -2e4]) == key
+    assert refusal_of(own=5.1).endswith("block.own = 5.1; allowed: 0 to 5 m")
+    assert refusal_of(own=-1e-3).endswith("own = -0.001; allowed: 0 to 5 m")
+    assert refusal_of(never=-math.inf).endswith("expected a number from -1e+06 to 1e+06 s, or .inf")
 
 
-def test_what_a_block_says_itself_is_said():
-    """Of its own numbers; what others lead to is not."""
-    assert said_of(checked=1e300).endswith("checked = 1e+300; allowed: above 0, at most 2 s")
-    assert said_of(share=math.inf).endswith(
+def test_a_block_reports_its_own_values():
+    """Its own numbers only; consequences of others are ignored."""
+    assert refusal_of(checked=1e300).endswith("checked = 1e+300; allowed: above 0, at most 2 s")
+    assert refusal_of(share=math.inf).endswith(
         "'block.share' is inf: expected a number from -1e+09 to 1e+09"
     )
-    both = said_of(checked=3.0, lengths=[1e5])
+    both = refusal_of(checked=3.0, lengths=[1e5])
     assert both.endswith("'block.lengths[0]' is 100000: expected a number from -10000 to 10000 m")
 
 
 def test_what_is_within_is_left_alone():
-    data = {"lengths": [1e4], "stiffness": math.inf, "own": 5.0, "untold": 1e300}
+    data = {"lengths": [1e4], "stiffness": math.inf, "own": 5.0, "undescribed": 1e300}
     block = load_typed(Whole, {"block": data}, "a.yaml").block
-    assert (block.lengths, block.stiffness, block.own, block.untold) == (
+    assert (block.lengths, block.stiffness, block.own, block.undescribed) == (
         [1e4],
         math.inf,
         5.0,

@@ -9,7 +9,7 @@ from pfsc_drake.yaml.reading import resolve_files
 
 @dataclass
 class Part:
-    """What names a file, and text that looks as if it did."""
+    """Names of files, and text that looks like one."""
 
     file: str = field(default="", metadata=FILE)
     model: str = field(default="", metadata=NAME_OR_FILE)

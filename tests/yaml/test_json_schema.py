@@ -1,4 +1,4 @@
-"""JSON schemas: what is said of a key, of choices by tags, of lists that a number may stand for."""
+"""JSON schemas: keys, choices by tags, lists that a number may replace."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -72,7 +72,7 @@ SCHEMA = json_schema(Motion, "Motions")
 KEYS = SCHEMA["properties"]
 
 
-def test_what_is_said_of_keys() -> None:
+def test_the_schema_of_keys() -> None:
     assert SCHEMA["required"] == ["name"]
     assert KEYS["law"] == {
         "description": "elastic or rigid.",

@@ -105,7 +105,7 @@ def test_writing_undoes_reading(data):
     assert repr(dump_yaml(read)) == repr(dump_yaml(data))
 
 
-def test_order_of_keys_is_kept():
+def test_order_of_keys_is_preserved():
     assert list(parse_yaml(dump_yaml({"z": 1, "a": {"y": 1, "b": 2}}), "")["a"]) == ["y", "b"]
     assert list(parse_yaml(dump_yaml({"z": 1, "a": 2}), "")) == ["z", "a"]
 

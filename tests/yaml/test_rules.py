@@ -58,7 +58,7 @@ INF, NAN = math.inf, math.nan
         (Count(2, empty=True, words="pairs, or none"), "pairs, or none", [[], [1, 2]], [[1]]),
     ],
 )
-def test_what_is_allowed_and_how_it_is_said(rule: Rule, words: str, allowed, refused) -> None:
+def test_allowed_values_and_their_words(rule: Rule, words: str, allowed, refused) -> None:
     assert str(rule) == words
     for value in allowed:
         rule.check("key", value)
@@ -114,7 +114,7 @@ class LargeTank(Tank):
         ({"weights": [1.0, 0.0]}, r"weights = \[1.0, 0.0\]; allowed: positive numbers"),
     ],
 )
-def test_what_is_refused_as_it_is_made(changes, message) -> None:
+def test_refused_at_creation(changes, message) -> None:
     with pytest.raises(InputError, match=f"^{message}"):
         LargeTank(**changes)
     if changes != {"capacity": "much"}:
@@ -122,7 +122,7 @@ def test_what_is_refused_as_it_is_made(changes, message) -> None:
             load_typed(LargeTank, changes, "a.yaml")
 
 
-def test_what_is_allowed_is_made() -> None:
+def test_allowed_at_creation() -> None:
     tank = LargeTank(1.0, 1.0, "hard", None, [[0.0, 2.0]], {"one": 1.0}, [0.5, "end"], [2.0])
     assert (tank.limit, tank.points, tank.weights) == (None, [0.5, "end"], [2.0])
 

@@ -207,15 +207,15 @@ def test_defaults_stay_where_keys_are_missing():
         ("{name: x, path: null}", "expected !Lemniscate {...} or !Circle {...}"),
         (
             "{name: x, controller: {law: magic}}",
-            "key 'controller': law = 'magic'; allowed: elastic, rigid",
+            "controller.law = 'magic'; allowed: elastic, rigid",
         ),
         (
             "{name: x, controller: {gains: {eta: [1]}}}",
-            "key 'controller.gains': eta has 1 gains; allowed: order = 2",
+            "controller.gains.eta has 1 gains; allowed: order = 2",
         ),
         (
             "{name: x, controller: {spare: {b: {order: 4}}}}",
-            "key 'controller.spare.b': eta has 2 gains; allowed: order = 4",
+            "controller.spare.b.eta has 2 gains; allowed: order = 4",
         ),
     ],
 )
@@ -293,11 +293,11 @@ PLACES = st.sampled_from(
 
 
 @given(PLACES, VALUES)
-def test_every_value_is_loaded_or_refused_in_one_line(place, value):
+def test_every_value_is_loaded_or_refused_in_one_line(key_path, value):
     data = {"name": "x", "controller": {"gains": {}}}
-    *way, last = place.split(".")
+    *keys, last = key_path.split(".")
     target = data
-    for key in way:
+    for key in keys:
         target = target[key]
     target[last] = value
     try:
@@ -340,7 +340,7 @@ def test_load_file(tmp_path):
     path.write_text("name: x\ncontroller: {law: magic}\n", encoding="utf-8")
     with pytest.raises(InputError) as caught:
         load_file(Scenario, path)
-    assert str(caught.value).startswith(f"{path}: key 'controller': law = 'magic'")
+    assert str(caught.value).startswith(f"{path}:2: controller.law = 'magic'")
     with pytest.raises(InputError, match="cannot be read: No such file"):
         load_file(Scenario, tmp_path / "none.yaml")
 
@@ -389,7 +389,7 @@ def test_one_value_that_is_none_and_lists_that_must_be_lists():
 
 @dataclass
 class Chosen:
-    """A list that may be left to somebody else."""
+    """A list that may be left to the caller."""
 
     poles: list[float] = field(default_factory=list, metadata=AUTO_OR_MANY)
 

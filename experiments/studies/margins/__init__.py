@@ -1,1 +1,1 @@
-"""Margins of a scenario's closed loop, as it is sampled, before the robot moves."""
+"""Stability margins of a scenario's sampled closed loop, before the robot moves."""

@@ -1,4 +1,4 @@
-"""Margins of a scenario's closed loop along its way, nominal and over a box of model errors."""
+"""Margins of a scenario's closed loop along its path, nominal and over a box of model errors."""
 
 import contextlib
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ from experiments.studies.margins.box import (
     without_error,
 )
 from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
-from experiments.studies.margins.result import Case, DriveMargins, MarginAnalysis, Place
+from experiments.studies.margins.result import Case, DriveMargins, MarginAnalysis, OperatingPoint
 from experiments.studies.margins.sticking import stuck_drives
 from experiments.studies.margins.walk import Instant, TouchedSurface, Walk, touched_surface, walk
 from pfsc_drake.control.margins import (
@@ -34,7 +34,7 @@ from pfsc_drake.control.margins import (
 from pfsc_drake.errors import InputError
 from reporting.progress import ProgressListener
 
-# instants at which all corners of the box are tried: the weakest ones
+# number of weakest instants at which all corners of the box are tried
 _CORNER_INSTANTS = 2
 
 
@@ -46,68 +46,68 @@ def analyse(
     *,
     only_start: bool = False,
 ) -> MarginAnalysis:
-    """Linearize a scenario's loop along its way and over a box of model errors.
+    """Linearize a scenario's loop along its path and over a box of model errors.
 
     Args:
         settings: The scenario as read.
-        folder: Where its relative file names start.
-        box: Errors that it is to bear beside the scenario's own.
-        progress: Told how far it is.
-        only_start: Whether to look at the start alone, and at no corner of the box; takes a
-            third of the time.
+        folder: Base folder of relative file names.
+        box: Errors to tolerate in addition to the scenario's own.
+        progress: Progress listener.
+        only_start: Whether to analyse the start only, without corners of the box; takes a third of
+            the time.
 
     Raises:
         InputError: If the scenario cannot be built.
     """
     smoothed, removed = smooth(settings)
     progress(0.0, "building")
-    true_loop = StationLoop(without_error(smoothed), folder)
-    station = true_loop.station
+    exact_loop = StationLoop(without_error(smoothed), folder)
+    station = exact_loop.station
     duration = settings.duration or station.reference_duration
     progress.expect(duration)
     remarks: list[str] = []
-    singles, wrong_together = _believable(box, smoothed, station.part, folder, remarks)
-    way = walk(
-        true_loop,
+    singles, wrong_together = _feasible_errors(box, smoothed, station.part, folder, remarks)
+    run = walk(
+        exact_loop,
         duration,
         lambda time: progress(time, "walking the path"),
         only_start=only_start,
     )
-    if not way.instants:
-        raise InputError("the law gives up before its first tick; run the scenario to see why")
-    study = _Study(smoothed, folder, true_loop, way, progress, duration)
+    if not run.instants:
+        raise InputError("the law has a fault before its first tick; run the scenario for details")
+    study = _Study(smoothed, folder, exact_loop, run, progress, duration)
     errs = smoothed.model_error.is_given or bool(smoothed.controller.model)
     progress(0.0, "differentiating")
-    study.is_parametric = true_loop.parametrize(smoothed, folder)
-    own = study.build(Error()) if errs or study.is_parametric else true_loop
-    looked_at = [way.instants[i] for i in {0, len(way.instants) // 2}]
-    study.chosen = own.variables_in_loop([study.section(own, instant) for instant in looked_at])
-    nominal, loops = study.case(own, Error(), way.instants)
+    study.is_parametric = exact_loop.parametrize(smoothed, folder)
+    own = study.build(Error()) if errs or study.is_parametric else exact_loop
+    sections = [run.instants[i] for i in {0, len(run.instants) // 2}]
+    study.chosen = own.variables_in_loop([study.section(own, instant) for instant in sections])
+    nominal, loops = study.case(own, Error(), run.instants)
     analysis = MarginAnalysis(
         period=own.map.period,
         joints=station.robot.names,
         box=box,
         nominal=nominal,
         drives_are_servos=own.drives_are_servos,
-        remarks=_remarks(removed, way, own) + remarks,
+        remarks=_remarks(removed, run, own) + remarks,
     )
     if not only_start:
         analysis.surface = study.touched_surface(own, nominal)
         joints = station.robot.dimension
         analysis.stuck = stuck_drives(settings, folder, joints, lambda what: progress(0.0, what))
-    for instant, loop in zip(way.instants, loops, strict=True):
+    for instant, loop in zip(run.instants, loops, strict=True):
         progress(instant.time, "margins of the drives")
         if loop is not None:
             analysis.margins.append(_drive_margins(instant, loop, own.map.period))
     unknown = settings.sensor.unknown_mass if settings.compliance.needs_sensor else 0.0
     if unknown > 0.0:
-        with _saying("sensor.unknown_mass", analysis.remarks):
-            case, _ = study.case(own, Error((), unknown), way.instants)
-            analysis.singles.append(Case(case.error, "unknown_mass", case.places))
+        with _reporting("sensor.unknown_mass", analysis.remarks):
+            case, _ = study.case(own, Error((), unknown), run.instants)
+            analysis.singles.append(Case(case.error, "unknown_mass", case.points))
     for key, error in singles:
-        with _saying(f"model_error.{key}", analysis.remarks):
-            case, _ = study.case(study.build(error), error, way.instants)
-            analysis.singles.append(Case(error, key, case.places))
+        with _reporting(f"model_error.{key}", analysis.remarks):
+            case, _ = study.case(study.build(error), error, run.instants)
+            analysis.singles.append(Case(error, key, case.points))
     weak = _weakest_instants(analysis)
     known = {case.key for case in analysis.singles}
     for error in () if only_start else wrong_together:
@@ -117,24 +117,24 @@ def analyse(
     return analysis
 
 
-def _believable(
+def _feasible_errors(
     box: ErrorBox, settings: Scenario, part: RobotPart, folder: Path, remarks: list[str]
 ) -> tuple[list[tuple[str, Error]], list[Error]]:
-    """Return the box's errors, single and together, but what no robot could be.
+    """Return the physically possible errors of the box, single and combined.
 
     Args:
         box: The box.
         settings: The scenario.
-        part: The robot in it.
-        folder: Where relative file names start.
-        remarks: Told what is left out, and why.
+        part: Its robot.
+        folder: Base folder of relative file names.
+        remarks: Receives a sentence about each omitted error.
     """
     elastic, singles = not part.robot.is_rigid, []
     for key, error in single_errors(box, elastic):
         try:
-            _check_belief(part, error.applied_to(settings), folder)
+            _check_nominal_model(part, error.applied_to(settings), folder)
         except InputError as refusal:
-            remarks.append(f"{error}: left out, {refusal}")
+            remarks.append(f"{error}: omitted, {refusal}")
         else:
             singles.append((key, error))
     known = [one for _, error in singles for one in error.parts]
@@ -142,45 +142,45 @@ def _believable(
     for error in corners(box, elastic):
         with contextlib.suppress(InputError):
             if all(one in known for one in error.parts):
-                _check_belief(part, error.applied_to(settings), folder)
+                _check_nominal_model(part, error.applied_to(settings), folder)
                 together.append(error)
     return singles, together
 
 
-def _check_belief(part: RobotPart, settings: Scenario, folder: Path) -> None:
+def _check_nominal_model(part: RobotPart, settings: Scenario, folder: Path) -> None:
     joint = settings.sensor.joint if settings.needs_sensor else None
-    part.check_belief(StationOptions(settings, folder).belief_source, joint)
+    part.check_nominal_model(StationOptions(settings, folder).nominal_model_source, joint)
 
 
 @dataclass
 class _Study:
-    """What all loops of a study share."""
+    """Data shared by all loops of a study."""
 
     settings: Scenario
     folder: Path
-    walked: StationLoop
-    way: Walk
+    exact_loop: StationLoop
+    run: Walk
     progress: ProgressListener
     duration: float
     is_parametric: bool = False
     chosen: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    # what is no block, at the times of instants
+    # slopes of systems other than blocks, by time of the instant
     plants: dict[float, Sequence[RestSlope]] = field(default_factory=dict)
 
     def build(self, error: Error) -> StationLoop:
         self.progress(0.0, f"linearizing, {error}")
         erring = error.applied_to(self.settings)
         if self.is_parametric:
-            return self.walked.believing(erring, self.folder)
-        return StationLoop(erring, self.folder, self.walked)
+            return self.exact_loop.with_nominal_model(erring, self.folder)
+        return StationLoop(erring, self.folder, self.exact_loop)
 
     def section(self, loop: StationLoop, instant: Instant, unknown: float = 0.0) -> Context:
-        """Return an instant as a state of a loop's own station, with a payload [kg]."""
-        if loop.station is self.walked.station and unknown == 0.0:
+        """Return an instant as a state of a loop's own station, with an unknown mass [kg]."""
+        if loop.station is self.exact_loop.station and unknown == 0.0:
             return instant.section
         section, load = (
             loop.map.adopted(instant.section),
-            self.walked.external_load(instant.section),
+            self.exact_loop.external_load(instant.section),
         )
         if unknown > 0.0:
             loop.hang(section, self.settings.sensor.joint, unknown)
@@ -191,7 +191,7 @@ class _Study:
     def case(
         self, loop: StationLoop, error: Error, instants: Sequence[Instant]
     ) -> tuple[Case, list[LinearLoop | None]]:
-        """Return a loop along its way, and what it is at each instant."""
+        """Return the modes of a loop along its path, and the linear loop at each instant."""
         loops = []
         for instant in instants:
             self.progress(instant.time, f"linearizing, {error}")
@@ -201,22 +201,22 @@ class _Study:
             loops.append(linearize(loop, section, self.chosen, plant))
             if is_same and loops[-1] is not None:
                 self.plants[instant.time] = loops[-1].rest
-        places = [
-            Place(instant, None if linear is None else modes(linear.A, loop.map.period))
+        points = [
+            OperatingPoint(instant, None if linear is None else modes(linear.A, loop.map.period))
             for instant, linear in zip(instants, loops, strict=True)
         ]
-        return Case(error, "", places), loops
+        return Case(error, "", points), loops
 
     def touched_surface(self, loop: StationLoop, nominal: Case) -> TouchedSurface | None:
-        """Return how stiff a surface may be where the loop is slowest on it, if there is one."""
+        """Return the stiffness margin of a touched surface at the slowest loop, if there is one."""
         pressed = [
-            place
-            for place in nominal.places
-            if self.walked.pressed_force(place.instant.section) > 0.0
+            point
+            for point in nominal.points
+            if self.exact_loop.pressed_force(point.instant.section) > 0.0
         ]
         if not pressed:
             return None
-        instant = max(pressed, key=lambda place: place.rate).instant
+        instant = max(pressed, key=lambda point: point.rate).instant
         return touched_surface(
             loop,
             instant,
@@ -238,47 +238,46 @@ def _drive_margins(instant: Instant, loop: LinearLoop, period: float) -> DriveMa
 
 
 def _weakest_instants(analysis: MarginAnalysis) -> list[Instant]:
-    """Instants at which some single error hurts most, and the first at rest."""
-    instants = [place.instant for place in analysis.nominal.places]
+    """Return the instants with the worst single errors, and the first at rest."""
+    instants = [point.instant for point in analysis.nominal.points]
     cases = [analysis.nominal, *analysis.singles]
-    rates = np.max([[place.rate for place in case.places] for case in cases], axis=0)
+    rates = np.max([[point.rate for point in case.points] for case in cases], axis=0)
     order = np.argsort(-rates)[:_CORNER_INSTANTS]
     return [instants[i] for i in sorted({0, *order.tolist()})]
 
 
 @contextlib.contextmanager
-def _saying(key: str, remarks: list[str]) -> Iterator[None]:
-    """Leave out a parameter that a robot does not have, and say so."""
+def _reporting(key: str, remarks: list[str]) -> Iterator[None]:
+    """Omit a parameter that a robot does not have, with a remark."""
     try:
         yield
     except InputError as error:
-        remarks.append(f"{key} is left out: {error}")
+        remarks.append(f"{key} is omitted: {error}")
 
 
-def _remarks(removed: Sequence[str], way: Walk, loop: StationLoop) -> list[str]:
+def _remarks(removed: Sequence[str], run: Walk, loop: StationLoop) -> list[str]:
     remarks = []
-    if way.tared:
+    if run.tared:
         remarks.append(
-            "At the start the force sensor would not be tared yet; here it is, at that place."
+            "At the start the force sensor would not be tared yet; the analysis assumes it is."
         )
     if loop.spring is not None:
         remarks.append(
-            "The workpiece is a spring along its normal, without friction and damping, where the "
-            "tool touches it."
+            "The contact with the workpiece is a spring along its normal, without friction and "
+            "damping."
         )
     elif loop.station.workpiece is not None:
         remarks.append(
-            "Contact forces are those of the plant's last step, which it remembers beside its "
-            "state; that lag is left out, so that rates near zero tell little."
+            "Contact forces of the plant lag by one step; this lag is neglected, so that rates "
+            "near "
+            "zero are not reliable."
         )
     if removed:
-        remarks.append(
-            f"Taken off, because it has no slope or acts from outside: {', '.join(removed)}."
-        )
-    if way.fault:
-        time = way.instants[-1].time
+        remarks.append(f"Omitted, as not differentiable or external: {', '.join(removed)}.")
+    if run.fault:
+        time = run.instants[-1].time
         remarks.append(
             f"With a perfect model the run ends with a fault soon after t = {time:.3g} s; "
-            "later places were not looked at."
+            "later instants were not analysed."
         )
     return remarks

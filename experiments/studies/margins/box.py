@@ -1,4 +1,4 @@
-"""The box of model errors that a loop is to bear; what is taken off that has no slope."""
+"""Box of model errors for an analysis of margins, and scenarios without nonlinear effects."""
 
 import itertools
 from collections.abc import Iterator
@@ -21,13 +21,13 @@ _HEAVIEST = 1e4  # kg
 
 @dataclass(frozen=True)
 class ErrorBox:
-    """By how much the model may be off, one way or the other.
+    """Largest errors of the model, of either sign.
 
     Attributes:
-        mass: Relative, of all masses and inertias.
-        stiffness: Relative, of all joint stiffnesses.
-        rotor_inertia: Relative, of all rotor inertias.
-        tool_mass: [kg].
+        mass: Relative error of all masses and inertias.
+        stiffness: Relative error of all joint stiffnesses.
+        rotor_inertia: Relative error of all rotor inertias.
+        tool_mass: Error of the tool's mass [kg].
     """
 
     mass: float = 0.05
@@ -47,18 +47,18 @@ class ErrorBox:
 
 @dataclass(frozen=True)
 class Error:
-    """What is believed wrongly, in units of the scenario's own ``model_error``.
+    """Error of the nominal model, in units of the scenario's own ``model_error``.
 
     Attributes:
-        parts: By key of ``model_error``: relative errors, and the tool's in kg.
-        unknown_mass: What hangs below the force sensor beside what is believed [kg].
+        parts: Relative errors by key of ``model_error``; for the tool in kg.
+        unknown_mass: Unmodelled mass below the force sensor [kg].
     """
 
     parts: tuple[tuple[str, float], ...] = ()
     unknown_mass: float = 0.0
 
     def applied_to(self, settings: Scenario) -> Scenario:
-        """Return a scenario whose controller errs so.
+        """Return a scenario whose controller has this error.
 
         Args:
             settings: The scenario; unchanged.
@@ -73,19 +73,19 @@ class Error:
         return result
 
     def __str__(self) -> str:
-        """In words."""
+        """Return the error in words."""
         if self.unknown_mass > 0.0:
-            return f"{self.unknown_mass:g} kg more below the force sensor than believed"
+            return f"{self.unknown_mass:g} kg unmodelled below the force sensor"
         if len(self.parts) > 1:
-            return f"believed {', '.join(_short(*part) for part in self.parts)}"
+            return f"nominal {', '.join(_short(*part) for part in self.parts)}"
         return "".join(_words(*part) for part in self.parts) or "as the scenario says"
 
 
 def _words(key: str, amount: float) -> str:
     if key == "tool_mass":
-        return f"tool believed {abs(amount):g} kg too {'heavy' if amount > 0.0 else 'light'}"
+        return f"nominal tool {abs(amount):g} kg too {'heavy' if amount > 0.0 else 'light'}"
     side = "high" if amount > 0.0 else "low"
-    return f"{_FACTORS[key]} believed {100.0 * abs(amount):.3g} % too {side}"
+    return f"nominal {_FACTORS[key]} {100.0 * abs(amount):.3g} % too {side}"
 
 
 def _short(key: str, amount: float) -> str:
@@ -95,11 +95,11 @@ def _short(key: str, amount: float) -> str:
 
 
 def single_errors(box: ErrorBox, elastic: bool) -> Iterator[tuple[str, Error]]:
-    """Yield the errors of one parameter at a time, with the parameter.
+    """Iterate over pairs of a parameter and its error, one parameter at a time.
 
     Args:
         box: The box.
-        elastic: Whether there is any stiffness to be wrong.
+        elastic: Whether the robot has joint stiffnesses.
     """
     for key, size in _sizes(box, elastic):
         for sign in (-1.0, 1.0):
@@ -107,11 +107,11 @@ def single_errors(box: ErrorBox, elastic: bool) -> Iterator[tuple[str, Error]]:
 
 
 def corners(box: ErrorBox, elastic: bool) -> Iterator[Error]:
-    """Yield the corners of the box, where all parameters are wrong.
+    """Iterate over the corners of the box, with errors in all parameters.
 
     Args:
         box: The box.
-        elastic: Whether there is any stiffness to be wrong.
+        elastic: Whether the robot has joint stiffnesses.
     """
     sizes = _sizes(box, elastic)
     if len(sizes) > 1:
@@ -126,15 +126,15 @@ def _sizes(box: ErrorBox, elastic: bool) -> list[tuple[str, float]]:
     return [(key, size) for key, size in sizes if size > 0.0]
 
 
-# times the drives' limits, which then nothing reaches
+# factor of the drives' limits, so that they are never reached
 _UNLIMITED = 1e6
 
 
 def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
-    """Return a scenario without what has no slope or acts from outside, and what was taken off.
+    """Return a scenario without non-differentiable or external effects, and the list of these.
 
-    Difference quotients, filters, disturbance observers, delays and the operator's hand stay:
-    they are part of the loop.
+    Difference quotients, filters, disturbance observers, delays and the operator model remain as
+    parts of the loop.
 
     Args:
         settings: The scenario; unchanged.
@@ -155,7 +155,7 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     if compensation.has_coefficients or (
         compensation.watched and compensation.observer == "kalman"
     ):
-        # it answers friction that is not there any more; around rest it would push
+        # it would compensate friction that has been removed, and push at rest
         compensation.source, compensation.watched = "none", False
         removed.append("compensation of friction by its coefficients")
     encoders = settings.encoders
@@ -172,7 +172,7 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     on_tool = any(not pulse.link for pulse in settings.forces) or settings.hold_back.force != 0.0
     result.forces, result.pushes, result.hold_back = [], [], HoldBackParameters()
     removed += ["forces on the tool"] * on_tool + ["forces on links"] * on_links
-    # what presses starts beside the workpiece, which may stand where the surface was taught
+    # a pressing tool starts beside the workpiece, which may be at the taught surface
     beside = any(settings.start.offset) and settings.workpiece is None
     if beside:
         result.start.offset = [0.0, 0.0]
@@ -184,7 +184,7 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
 
 
 def without_error(settings: Scenario) -> Scenario:
-    """Return a scenario whose controller believes the truth.
+    """Return a scenario with an exact model in the controller.
 
     Args:
         settings: The scenario; unchanged.

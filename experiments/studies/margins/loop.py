@@ -1,4 +1,4 @@
-"""A station's closed loop, linearized over one sampling period."""
+"""Closed loop of a station, linearized over one sampling period."""
 
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -15,7 +15,7 @@ from diagrams.integration import continuous_modes
 from diagrams.one_period_map import OnePeriodMap
 from diagrams.period_map import PeriodDerivative, RestSlope
 from diagrams.robots.arm import Arm
-from diagrams.robots.arm_model import believe_arm
+from diagrams.robots.arm_model import nominal_arm
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.station_options import StationOptions
@@ -30,29 +30,29 @@ Kind = TypeVar("Kind", bound=LeafSystem)
 # accurate enough for eigenvalues while no mode turns by more than 1 rad per step; RK3 would damp
 # such a resonance by 30 1/s at 1 ms
 _SCHEME, _MOST_STEPS = "runge_kutta5", 100
-# smaller derivatives are what an iteration leaves of its start
+# smaller derivatives are residuals of iterations
 _ROUNDING = 1e-10
-# times its stiffness, up to which a surface that is touched is looked at
+# largest tried factor of a touched surface's stiffness
 STIFFEST = 64.0
 _SENSOR, _FAULT = "controller.tool_compensation", "fault_latch.fault"
 
 
 class StationLoop:
-    """A station and the map of one of its sampling periods.
+    """Station with the map of one sampling period.
 
     Args:
-        settings: The scenario, without what has no slope.
-        folder: Where its relative file names start.
-        like: The same but for what is believed, if it has been made before.
+        settings: The scenario without non-differentiable effects.
+        folder: Base folder of relative file names.
+        like: Existing loop that differs only in its nominal model, or None.
 
     Attributes:
         station: The station.
         map: The map.
-        derivative: What differentiates it.
-        drives: Variables that hold what the drives are told, shape (N,).
-        drives_are_servos: Whether these are velocities for servos that sample faster, not torques.
-        spring: What the tool presses on, if it does: a spring in place of contact.
-        parameters: What is believed instead of the station's own, by name, see :meth:`believing`.
+        derivative: Derivative of the map.
+        drives: Indices of the variables that hold the drive commands, shape (N,).
+        drives_are_servos: Whether commands are velocities for faster servos, not torques.
+        spring: Spring in place of a contact, if there is one.
+        parameters: Parameters of another nominal model by name, see :meth:`with_nominal_model`.
     """
 
     parameters: Mapping[str, float] | None = None
@@ -71,51 +71,51 @@ class StationLoop:
         self.drives, self.drives_are_servos = self._find_drives()
 
     def parametrize(self, settings: Scenario, folder: Path) -> bool:
-        """Make what the controller does a function of mass and stiffness parameters, if it can be.
+        """Make the controller a function of mass and stiffness parameters, if possible.
 
-        It can where a serial arm is led by torques that depend on these by expressions alone; not
-        where poles, servos or a force sensor's compensation are calculated of them beforehand.
+        It is possible for torque-controlled serial arms whose commands are expressions of these
+        parameters; not if poles, servos or a force sensor's compensation are precomputed from them.
 
         Args:
-            settings: The scenario, with another belief as the case may be.
-            folder: Where its relative file names start.
+            settings: The scenario, possibly with another nominal model.
+            folder: Base folder of relative file names.
 
         Returns:
-            Whether :meth:`believing` can be called.
+            Whether :meth:`with_nominal_model` can be called.
         """
         law = settings.controller.law
         gains = settings.controller.gains.get(law)
-        of_numbers = (
+        precomputed = (
             settings.needs_sensor
             or RELATIVE_DEGREE[law] == 1
             or gains is None
             or gains.is_automatic
             or not isinstance(self.station.part, Arm)
         )
-        if of_numbers or not (self.rest_is_physics and self.derivative.can_be_parametrized):
+        if precomputed or not (self.rest_is_physics and self.derivative.can_be_parametrized):
             return False
         settings = _without_brakes(settings)
         twin = build_station(settings, folder, like=self.station, with_slope=True, parametric=True)
         self.derivative.parametrize(twin.diagram)
         return True
 
-    def believing(self, settings: Scenario, folder: Path) -> "StationLoop":
-        """Return the loop of a controller that believes something else.
+    def with_nominal_model(self, settings: Scenario, folder: Path) -> "StationLoop":
+        """Return the loop of a controller with another nominal model.
 
         Args:
-            settings: The scenario of :meth:`parametrize` but for mass and stiffness parameters.
-            folder: Where its relative file names start.
+            settings: The scenario of :meth:`parametrize` with other mass and stiffness parameters.
+            folder: Base folder of relative file names.
         """
         part = self.station.part
         assert isinstance(part, Arm)  # others are not parametrized
         other = copy(self)
-        other.parameters = believe_arm(part.true, StationOptions(settings, folder).belief_source)[
-            0
-        ].parameters
+        other.parameters = nominal_arm(
+            part.actual, StationOptions(settings, folder).nominal_model_source
+        )[0].parameters
         return other
 
     def configure(self, simulator: Simulator) -> None:
-        """Let a simulator integrate as the map does.
+        """Configure a simulator with the map's integration.
 
         Args:
             simulator: The simulator, not yet initialized.
@@ -124,7 +124,7 @@ class StationLoop:
 
     @property
     def rest_is_physics(self) -> bool:
-        """Whether beside blocks only the plant and a spring remember, which no belief changes."""
+        """Whether plant and spring alone have state beside blocks, independent of the model."""
         physics = [self.map.rows(self.station.part.plant)]
         physics += [] if self.spring is None else [self.map.rows(self.spring)]
         return np.array_equal(self.derivative.rest, np.sort(np.concatenate(physics)))
@@ -133,20 +133,20 @@ class StationLoop:
         """Return whether a system is in its safe state.
 
         Args:
-            root: Context of the diagram at a tick that is not made yet.
+            root: Context of the diagram before the update of a tick.
         """
         accesses = [self.station.controller, self.station.servo]
         faults = [a.fault(self.station.blocks, root) for a in accesses if a is not None]
         return any(fault is not Fault.NONE for fault in faults)
 
     def external_load(self, section: Context) -> np.ndarray | None:
-        """Return what a force sensor feels beside the tool [N, Nm], shape (6,).
+        """Return the external load on a force sensor [N, Nm], shape (6,).
 
         Args:
             section: Context right after a tick.
 
         Returns:
-            In the sensor's frame; None without a sensor, or as long as it is not tared.
+            Load in the sensor's frame; None without a tared sensor.
         """
         if not self._has_sensor:
             return None
@@ -157,14 +157,14 @@ class StationLoop:
         return wires[f"{_SENSOR}.residual"] - bias
 
     def tare(self, section: Context, load: np.ndarray) -> None:
-        """Tare the force sensor at a section, as if nothing but a known load acted on the tool.
+        """Tare the force sensor at a section for a known external load.
 
-        What hangs there and is not known weighs nothing then, as after a taring in a run; its
-        inertia remains.
+        The weight of an unknown mass is then compensated, as after taring in a run; its inertia
+        remains.
 
         Args:
             section: Context right after a tick, whose sensor is tared.
-            load: Torques that act from outside.
+            load: External load.
         """
         blocks = self.station.blocks
         residual = self.derivative.wires(section)[f"{_SENSOR}.residual"]
@@ -172,7 +172,7 @@ class StationLoop:
         blocks.set_state(section, f"{_SENSOR}.tared", np.ones(1))
 
     def needs_taring(self, section: Context) -> bool:
-        """Return whether there is a force sensor that is not tared.
+        """Return whether there is an untared force sensor.
 
         Args:
             section: Context right after a tick.
@@ -180,21 +180,21 @@ class StationLoop:
         return self._has_sensor and self.external_load(section) is None
 
     def hang(self, section: Context, joint: str, mass: float) -> None:
-        """Let more hang below the force sensor than anybody knows of, at a section.
+        """Add an unmodelled mass below the force sensor at a section.
 
         Args:
             section: Context right after a tick.
             joint: Joint of the sensor, see :meth:`~diagrams.robots.part.RobotPart.hang`.
-            mass: [kg].
+            mass: Mass [kg].
 
         Raises:
-            InputError: If the plant does not allow for that.
+            InputError: If the plant does not support it.
         """
         part = self.station.part
         part.hang(part.plant.GetMyMutableContextFromRoot(section), joint, mass)
 
     def pressed_force(self, section: Context) -> float:
-        """Return what the spring bears [N]; zero without one.
+        """Return the force of the spring [N]; zero without one.
 
         Args:
             section: Context right after a tick.
@@ -204,11 +204,11 @@ class StationLoop:
         return self.spring.force(self.spring.GetMyContextFromRoot(section))
 
     def stiffened(self, section: Context, stiffness: float) -> Context:
-        """Return a section at which another spring bears the same force.
+        """Return a section with another spring under the same force.
 
         Args:
             section: Context right after a tick; unchanged.
-            stiffness: Stiffness of the other one [N/m].
+            stiffness: Stiffness of the other spring [N/m].
         """
         assert self.spring is not None
         result = section.Clone()
@@ -217,10 +217,10 @@ class StationLoop:
         return result
 
     def variables_in_loop(self, sections: list[Context]) -> np.ndarray:
-        """Return the variables whose changes come back through plant and controller.
+        """Return the variables that are part of the loop through plant and controller.
 
         Args:
-            sections: Contexts right after a tick; what is in the loop at one of them is.
+            sections: Contexts right after a tick; variables in the loop at any of them count.
         """
         core = np.zeros(self.map.size, dtype=bool)
         core[self.map.rows(self.station.part.plant)] = True
@@ -245,18 +245,18 @@ class StationLoop:
         return period / min(max(int(np.ceil(fastest * period)), 1), _MOST_STEPS)
 
     def _find_drives(self) -> tuple[np.ndarray, bool]:
-        """Find where the loop can be broken at its own sampling time."""
+        """Return the variables at which the loop can be opened at its own sampling time."""
         N, states = self.station.robot.dimension, self.derivative.states
         if "bus_delay.samples" in states:  # the newest
             return states["bus_delay.samples"][:N], True
         is_servo = "velocity_hold.held" in states
-        # the newest of those that are on their way
+        # the newest of the pending commands
         return states["velocity_hold.held" if is_servo else "hold.held"][-N:], is_servo
 
 
 def _without_brakes(settings: Scenario) -> Scenario:
-    """Return a scenario without brakes, which close after faults alone, its blocks fused."""
-    # blocks as one are simulated three times as fast
+    """Return a scenario with fused blocks and without brakes, which close only after faults."""
+    # fused blocks are three times as fast
     simulation = replace(settings.simulation, fused=True)
     return replace(settings, simulation=simulation, faults=replace(settings.faults, brakes=None))
 
@@ -272,8 +272,8 @@ class LinearLoop:
 
     Attributes:
         A: Map of one period for the variables in the loop, shape (n, n).
-        holds: Where the drives' commands stand among them, shape (N,).
-        rest: What of it is no block.
+        holds: Indices of the drives' commands among them, shape (N,).
+        rest: Slopes of systems other than blocks.
     """
 
     A: np.ndarray
@@ -290,12 +290,12 @@ def linearize(
         loop: The loop.
         section: Context right after a tick.
         chosen: The variables in the loop, in increasing order.
-        rest: What of it is no block, if that is known.
+        rest: Slopes of systems other than blocks, if known.
 
     Returns:
         The linear loop; None if the law goes to its safe state there.
     """
     slope = loop.derivative.at(section, chosen, rest, loop.parameters)
-    if any(told.any() for name, told in slope.wires.items() if name.endswith(_FAULT)):
+    if any(fault.any() for name, fault in slope.wires.items() if name.endswith(_FAULT)):
         return None
     return LinearLoop(slope.A, np.searchsorted(chosen, loop.drives), slope.rest)

@@ -1,4 +1,4 @@
-"""From a scenario to its margins in a table, in pictures, on one page, and for scripts."""
+"""Tables, figures and report page of a margin analysis, and its class for scripts."""
 
 import html
 import math
@@ -18,7 +18,7 @@ from experiments.scenario_file import ScenarioFile
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.result import Case, MarginAnalysis
-from experiments.studies.margins.words import (
+from experiments.studies.margins.texts import (
     GOOD_DAMPING,
     GOOD_DISC,
     margins_json,
@@ -41,22 +41,22 @@ from reporting.style import (
     WIDTH,
     Drawing,
     Figure,
-    place_legend,
+    add_legend,
     render,
 )
 
-# 1/s; faster modes are of no interest, and would press the others together
+# 1/s; faster modes are not shown, since they would compress the scale
 _FASTEST = 400.0
 _DAMPING_LINES = (0.1, 0.3, 0.7)
 
 
 @dataclass(frozen=True)
 class Margins:
-    """What a sampled loop bears, in words, numbers and pictures.
+    """Stability margins of a sampled loop: sentences, metrics and figures.
 
     Attributes:
         name: Name of the scenario.
-        analysis: All that is known of the loop: its modes along the way, with each model error.
+        analysis: Modes of the loop along the path, with each model error, and margins.
     """
 
     name: str
@@ -69,33 +69,33 @@ class Margins:
 
     @property
     def is_robust(self) -> bool:
-        """Whether it is stable with all model errors that were asked for, too."""
+        """Whether it is also stable with all requested model errors."""
         return all(case.is_stable for case in self.analysis.cases)
 
     @property
     def sentences(self) -> list[str]:
-        """What a person should know, the most important first."""
+        """Summary in sentences, the most important first."""
         return sentences(self.analysis)
 
     @property
     def metrics(self) -> Metrics:
-        """The same in numbers, by name."""
+        """Metrics by name."""
         return metrics_of(self.analysis)
 
     @property
     def figures(self) -> dict[str, Figure]:
-        """Pictures by name, each with ``png`` and ``caption``; a notebook shows them."""
+        """Figures by name, each with ``png`` and ``caption``; a notebook shows them."""
         return {figure.name: figure for figure in draw_margins(self.analysis)}
 
     def _repr_html_(self) -> str:
-        """Return words and numbers."""
-        said = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in self.sentences)
+        """Return sentences and metrics."""
+        items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in self.sentences)
         title = f"<b>Margins of {html.escape(self.name)}</b>"
-        return f"{title}<ul>{said}</ul>{metrics_table(self.metrics)}"
+        return f"{title}<ul>{items}</ul>{metrics_table(self.metrics)}"
 
 
 def draw_margins(analysis: MarginAnalysis) -> list[Figure]:
-    """Return the pictures of an analysis: modes, rates along the way, margins of the drives.
+    """Return the figures of an analysis: modes, rates along the path, margins of the drives.
 
     Args:
         analysis: The analysis.
@@ -108,16 +108,16 @@ def draw_margins(analysis: MarginAnalysis) -> list[Figure]:
 
 
 def _modes(analysis: MarginAnalysis) -> Drawing:
-    """Eigenvalues in the plane that a control engineer knows."""
+    """Draw the modes in the complex plane."""
     canvas = Canvas(figsize=(WIDTH, 4.8))
     panel = canvas.subplots()
     _scatter(panel, analysis.singles + analysis.corners, COLOURS[4], "with model errors", 10.0)
-    moving = [place for place in analysis.nominal.places if place.instant.speed]
-    resting = [place for place in analysis.nominal.places if not place.instant.speed]
+    moving = [point for point in analysis.nominal.points if point.instant.speed]
+    resting = [point for point in analysis.nominal.points if not point.instant.speed]
     nominal, error = analysis.nominal, analysis.nominal.error
-    _scatter(panel, [Case(error, "", moving)], COLOURS[0], "as the scenario says, moving", 16.0)
-    _scatter(panel, [Case(error, "", resting)], COLOURS[2], "at rest", 16.0)
-    shown = [place.modes for case in analysis.cases for place in case.places if place.modes]
+    _scatter(panel, [Case(error, "", moving)], COLOURS[0], "nominal, moving", 16.0)
+    _scatter(panel, [Case(error, "", resting)], COLOURS[2], "nominal, at rest", 16.0)
+    shown = [point.modes for case in analysis.cases for point in case.points if point.modes]
     rates = np.concatenate([m.rate for m in shown]) if shown else np.zeros(1)
     frequencies = np.concatenate([m.frequency for m in shown]) if shown else np.zeros(1)
     near = rates > -_FASTEST
@@ -132,22 +132,22 @@ def _modes(analysis: MarginAnalysis) -> Drawing:
         end = min(-left, top / slope)
         panel.plot([0.0, -end], [0.0, end * slope], ":", color=REFERENCE, linewidth=1.0, zorder=0)
         panel.annotate(f"{damping:g}", (-0.97 * end, 0.97 * end * slope), color=REFERENCE, size=9)
-    panel.set_xlabel("rate in 1/s: decays to the left, grows to the right")
+    panel.set_xlabel("real part in 1/s")
     panel.set_ylabel("frequency in Hz")
     panel.set_title("Modes of the sampled loop")
-    place_legend(panel)
+    add_legend(panel)
     unstable = sum(not case.is_stable for case in analysis.cases)
-    verdict = "All of them decay" if not unstable else f"{unstable} of the loops grow"
+    verdict = "All are stable" if not unstable else f"{unstable} of the loops are unstable"
     caption = (
-        f"Eigenvalues of the loop as it is sampled, log(lambda) / T_s, of {len(analysis.cases)} "
-        f"loops at {len(nominal.places)} places along the path. {verdict}. Dotted: damping ratios; "
-        f"a fair loop stays below the line {GOOD_DAMPING:g}. Faster modes are left out."
+        f"Eigenvalues of the sampled loop, log(lambda) / T_s, of {len(analysis.cases)} loops at "
+        f"{len(nominal.points)} points of the path. {verdict}. Dotted: damping ratios; a "
+        f"well-damped loop is below the line {GOOD_DAMPING:g}. Faster modes are not shown."
     )
     return Drawing("modes", "Modes", caption, canvas)
 
 
 def _scatter(panel: Axes, cases: list[Case], colour: str, label: str, size: float) -> None:
-    modes = [place.modes for case in cases for place in case.places if place.modes is not None]
+    modes = [point.modes for case in cases for point in case.points if point.modes is not None]
     if not modes:
         return
     rate = np.concatenate([m.rate for m in modes])
@@ -156,78 +156,80 @@ def _scatter(panel: Axes, cases: list[Case], colour: str, label: str, size: floa
 
 
 def _along(analysis: MarginAnalysis) -> Drawing:
-    """Slowest rate along the way, nominal and with one parameter wrong at a time."""
+    """Draw the slowest rate along the path, nominal and with single parameter errors."""
     canvas = Canvas(figsize=(WIDTH, 3.6))
     panel = canvas.subplots()
     corners = analysis.corners
     for number, case in enumerate(corners):
         times, rates = _rates(case)
-        label = "all wrong" if number == 0 else None
+        label = "all errors" if number == 0 else None
         panel.plot(times, rates, "x", color=REFERENCE, markersize=5, label=label)
     for colour, (_, case) in zip(COLOURS[1:], analysis.worst_by_key.items(), strict=False):
         times, rates = _rates(case)
         panel.plot(times, rates, "o-", color=colour, markersize=4, label=str(case.error))
     times, rates = _rates(analysis.nominal)
-    panel.plot(times, rates, "o-", color=COLOURS[0], markersize=5, label="as the scenario says")
+    panel.plot(times, rates, "o-", color=COLOURS[0], markersize=5, label="nominal")
     panel.axhline(0.0, color=ALERT, linewidth=1.2)
     low, high = panel.get_ylim()
     panel.set_ylim(low, max(high, 0.08 * abs(low)))
     panel.axhspan(0.0, panel.get_ylim()[1], color=ALERT, alpha=0.08, linewidth=0.0)
     top = panel.get_ylim()[1]
-    for place in analysis.nominal.places:
-        words = "rest" if not place.instant.speed else f"{abs(place.instant.speed):.2g}"
-        panel.annotate(words, (place.instant.time, top), ha="center", va="bottom", size=8)
-    panel.set_xlabel("time in s; above the picture the speed in m/s")
+    for point in analysis.nominal.points:
+        words = "rest" if not point.instant.speed else f"{abs(point.instant.speed):.2g}"
+        panel.annotate(words, (point.instant.time, top), ha="center", va="bottom", size=8)
+    panel.set_xlabel("time in s; top: speed in m/s")
     panel.set_ylabel("slowest rate in 1/s")
     panel.legend(loc="best", fontsize=9)
     caption = (
-        "Where on the way the loop is slowest, or grows: above zero it is unstable. Of each "
-        "parameter the worse sign is shown; crosses: all parameters wrong at once."
+        "Rate of the slowest mode along the path: unstable above zero. For each parameter error "
+        "the "
+        "worse sign is shown; crosses: errors in all parameters."
     )
     return Drawing("along_the_path", "Along the path", caption, canvas)
 
 
 def _rates(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    times = np.array([place.instant.time for place in case.places])
-    rates = np.array([place.rate for place in case.places])
+    times = np.array([point.instant.time for point in case.points])
+    rates = np.array([point.rate for point in case.points])
     return times, np.where(np.isfinite(rates), rates, np.nan)
 
 
 def _drives(analysis: MarginAnalysis) -> Drawing:
-    """Disc margin of every drive, as bars from the best to the worst place."""
+    """Draw the disc margin of each drive, with its range along the path."""
     canvas = Canvas(figsize=(WIDTH, 3.6))
     panel = canvas.subplots()
     alpha = np.array([[m.alpha for m in margins.drives] for margins in analysis.margins])
     worst = np.argmin(alpha, axis=0)
-    names = [*analysis.joints, "all at once"]
+    names = [*analysis.joints, "all drives"]
     common = np.array([margins.common.alpha for margins in analysis.margins])
     smallest = np.append(alpha.min(axis=0), common.min())
     largest = np.append(alpha.max(axis=0), common.max())
     where = [analysis.margins[i].instant for i in [*worst.tolist(), int(np.argmin(common))]]
-    places = np.arange(len(names))
+    points = np.arange(len(names))
     colours = [COLOURS[0]] * len(analysis.joints) + [COLOURS[2]]
-    panel.bar(places, smallest, width=0.6, color=colours)
-    panel.vlines(places, smallest, largest, color=REFERENCE, linewidth=2.0)
+    panel.bar(points, smallest, width=0.6, color=colours)
+    panel.vlines(points, smallest, largest, color=REFERENCE, linewidth=2.0)
     panel.axhline(GOOD_DISC, color=REFERENCE, linestyle=":", linewidth=1.0)
-    for x, height, instant in zip(places, largest, where, strict=True):
+    for x, height, instant in zip(points, largest, where, strict=True):
         percent = 100.0 * 2.0 * smallest[x] / max(2.0 - smallest[x], 1e-9)
         text = f"+{percent:.3g} %\n{instant.time:.2f} s" if smallest[x] < 2.0 else "any"
         panel.annotate(text, (x, height), ha="center", va="bottom", size=9)
-    panel.set_xticks(places, names, rotation=20, ha="right")
+    panel.set_xticks(points, names, rotation=20, ha="right")
     panel.set_ylim(0.0, 1.3 * max(float(np.max(largest)), 0.1))
     panel.set_ylabel("disc margin")
     panel.margins(x=0.03)
     caption = (
-        "Disc margin of each drive at its weakest place, with the gain error that it bears there "
-        "and when that is; the grey line reaches to the strongest place. "
-        f"{GOOD_DISC:g} (dotted) bears a factor of 2.2 or 41 degrees. An exact law for elastic "
-        "joints has little to spare: it relies on drives that give the torque they are told."
+        "Smallest disc margin of each drive along the path, with the tolerated gain error there "
+        "and "
+        f"the time; grey line: range to the largest one. A disc margin of {GOOD_DISC:g} (dotted) "
+        "tolerates a factor of 2.2 or 41 degrees. Exact linearization of elastic joints has small "
+        "margins: it relies on accurate drive torques."
     )
     return Drawing("drives", "Margins of the drives", caption, canvas)
 
 
-def place_table(analysis: MarginAnalysis) -> Table:
-    """Return a line for every place that was looked at.
+def point_table(analysis: MarginAnalysis) -> Table:
+    """Return a table with a row for each analysed point of the path.
 
     Args:
         analysis: The analysis.
@@ -236,15 +238,15 @@ def place_table(analysis: MarginAnalysis) -> Table:
     table.add_column("of", no_wrap=True)
     table.add_column("delay", justify="right", no_wrap=True)
     margins = {item.instant.time: item for item in analysis.margins}
-    for number, place in enumerate(analysis.nominal.places):
-        instant = place.instant
-        box = max((case.places[number].rate for case in analysis.singles), default=place.rate)
+    for number, point in enumerate(analysis.nominal.points):
+        instant = point.instant
+        box = max((case.points[number].rate for case in analysis.singles), default=point.rate)
         row = [
             f"{instant.time:.3f}",
             " ".join(f"{value:.2f}" for value in instant.eta),
             f"{abs(instant.speed):.2f}",
         ]
-        row += [_rate(place.rate), f"{place.damping:.2f}"]
+        row += [_rate(point.rate), f"{point.damping:.2f}"]
         row.append(_rate(box))
         own = margins.get(instant.time)
         if own is not None:
@@ -255,7 +257,7 @@ def place_table(analysis: MarginAnalysis) -> Table:
 
 
 def case_table(analysis: MarginAnalysis) -> Table:
-    """Return a line for every model error that was tried.
+    """Return a table with a row for each analysed model error.
 
     Args:
         analysis: The analysis.
@@ -265,12 +267,12 @@ def case_table(analysis: MarginAnalysis) -> Table:
     table.add_column("slowest in 1/s", justify="right", no_wrap=True)
     table.add_column("where")
     for case in analysis.cases:
-        table.add_row(str(case.error), _rate(case.worst.rate), case.worst.instant.place)
+        table.add_row(str(case.error), _rate(case.worst.rate), case.worst.instant.location)
     return table
 
 
 def summary(analysis: MarginAnalysis) -> str:
-    """Return what there is to say, one paragraph each.
+    """Return the summary, one paragraph per sentence.
 
     Args:
         analysis: The analysis.
@@ -299,8 +301,8 @@ def write_margins(
     Args:
         scenario: The scenario as read.
         out: Folder for the results.
-        box: Model errors that are to be borne.
-        progress: Told how far it is.
+        box: Model errors to tolerate.
+        progress: Progress listener.
 
     Returns:
         The analysis and the page.
@@ -310,8 +312,8 @@ def write_margins(
     """
     inputs = scenario.inputs()
     check_folder(out, "margins", inputs)
-    settings = load_typed(Scenario, scenario.data, str(scenario.path))
-    with naming(scenario.path):
+    settings = load_typed(Scenario, scenario.data, scenario.source)
+    with naming(scenario.source):
         analysis = analyse(settings, scenario.path.parent, box, progress)
     with open_results(out, "margins", inputs) as results:
         results.write("margins.json", margins_json(analysis))

@@ -1,4 +1,4 @@
-"""What is known of a closed loop before it runs: its modes along the way, and what it bears."""
+"""Results of a margin analysis: modes of a closed loop along its path, and margins."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,12 +13,12 @@ from pfsc_drake.control.margins import DiscMargin, Modes
 
 
 @dataclass(frozen=True)
-class Place:
-    """A loop at one instant.
+class OperatingPoint:
+    """Loop at one instant.
 
     Attributes:
-        instant: When and where.
-        modes: Its modes; None where the law goes to its safe state.
+        instant: Time and position.
+        modes: Its modes; None if the law is in its safe state.
     """
 
     instant: Instant
@@ -26,49 +26,49 @@ class Place:
 
     @property
     def rate(self) -> float:
-        """Rate of the slowest or fastest growing mode [1/s]; infinite where the law gives up."""
+        """Rate of the slowest or most unstable mode [1/s]; infinite after a fault of the law."""
         return np.inf if self.modes is None else self.modes.slowest
 
     @property
     def damping(self) -> float:
-        """The smallest damping ratio of a mode; -1 where the law gives up."""
+        """Smallest damping ratio of a mode; -1 after a fault of the law."""
         return -1.0 if self.modes is None else self.modes.smallest_damping
 
 
 @dataclass(frozen=True)
 class Case:
-    """A loop along its way, with what is believed wrongly.
+    """Loop along its path, with an error of the nominal model.
 
     Attributes:
-        error: What is believed wrongly beside what the scenario says.
-        key: The parameter, if it is one alone.
-        places: Where it was looked at.
+        error: Model error in addition to the scenario's.
+        key: The parameter of a single error, or empty.
+        points: Analysed points.
     """
 
     error: Error
     key: str
-    places: list[Place]
+    points: list[OperatingPoint]
 
     @property
-    def worst(self) -> Place:
-        """Where it is slowest, or grows fastest."""
-        return max(self.places, key=lambda place: place.rate)
+    def worst(self) -> OperatingPoint:
+        """Point with the slowest or most unstable mode."""
+        return max(self.points, key=lambda point: point.rate)
 
     @property
     def is_stable(self) -> bool:
-        """Whether nothing grows anywhere."""
+        """Whether it is stable at all points."""
         return self.worst.rate <= 0.0
 
 
 @dataclass(frozen=True)
 class DriveMargins:
-    """What the drives bear at one instant, the model being as the scenario says.
+    """Margins of the drives at one instant, with the scenario's model.
 
     Attributes:
-        instant: When and where.
-        drives: Drives of each drive alone, N of them.
-        common: What is common of all at once.
-        delay: Further sampling intervals of delay that are borne, -1 for none.
+        instant: Time and position.
+        drives: Disc margins of each drive alone, N of them.
+        common: Disc margin for a common factor in all drives.
+        delay: Tolerated additional delay in sampling intervals, -1 for none.
     """
 
     instant: Instant
@@ -84,20 +84,20 @@ class DriveMargins:
 
 @dataclass
 class MarginAnalysis:
-    """All that is known of a loop before it runs.
+    """Result of a margin analysis.
 
     Attributes:
         period: Sampling time [s].
         joints: Names of the drives.
-        box: Errors that it is to bear.
-        nominal: The loop as the scenario says.
-        singles: One parameter wrong at a time.
-        corners: All wrong, at the weakest instants.
-        margins: What the drives bear, as the scenario says.
+        box: Errors to tolerate.
+        nominal: The scenario's loop.
+        singles: Loops with single parameter errors.
+        corners: Loops with errors in all parameters, at the weakest instants.
+        margins: Margins of the drives in the scenario's loop.
         drives_are_servos: Whether the drives are servos that take velocities.
-        remarks: What was left out of the loop, and why, one sentence each.
-        surface: What of a surface that is pressed on it bears, if that is so and was looked at.
-        stuck: The loop at rest where friction holds the motors, if there is friction.
+        remarks: Omissions and assumptions, one sentence each.
+        surface: Stiffness margin of a touched surface, or None.
+        stuck: The loop at rest with motors held by friction, if there is friction.
     """
 
     period: float
@@ -114,17 +114,17 @@ class MarginAnalysis:
 
     @property
     def cases(self) -> list[Case]:
-        """All loops that were looked at, the scenario's own first."""
+        """All analysed loops, the scenario's own first."""
         return [self.nominal, *self.singles, *self.corners]
 
     @property
     def weakest(self) -> Case:
-        """The slowest of the loops, or the one that grows fastest."""
+        """Loop with the slowest or most unstable mode."""
         return max(self.cases, key=lambda case: case.worst.rate)
 
     @cached_property
     def worst_by_key(self) -> dict[str, Case]:
-        """The worse sign of each parameter, the parameter that hurts most first."""
+        """Worse sign of each parameter error, the worst parameter first."""
         keys = dict.fromkeys(case.key for case in self.singles)
         found = {
             key: max((c for c in self.singles if c.key == key), key=lambda case: case.worst.rate)
@@ -133,17 +133,17 @@ class MarginAnalysis:
         return dict(sorted(found.items(), key=lambda item: -item[1].worst.rate))
 
     @property
-    def least_damped(self) -> Place | None:
-        """Where the loop, as the scenario says, is damped least."""
-        known = [place for place in self.nominal.places if place.modes is not None]
-        return min(known, key=lambda place: place.damping, default=None)
+    def least_damped(self) -> OperatingPoint | None:
+        """Point with the least damping of the scenario's loop, if any."""
+        known = [point for point in self.nominal.points if point.modes is not None]
+        return min(known, key=lambda point: point.damping, default=None)
 
     @property
     def tightest(self) -> DriveMargins | None:
-        """Where a drive bears least."""
+        """Margins at the instant with the smallest disc margin."""
         return min(self.margins, key=lambda margins: margins.smallest, default=None)
 
     @property
     def delay(self) -> int:
-        """Further sampling intervals of delay that are borne everywhere."""
+        """Additional delay tolerated at all instants, in sampling intervals."""
         return min((margins.delay for margins in self.margins), default=-1)

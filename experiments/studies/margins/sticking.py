@@ -1,4 +1,4 @@
-"""A loop at rest whose drives stick: springs between motors and the world."""
+"""Loop at rest with stiction: presliding friction as springs on the motors."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -16,21 +16,21 @@ from pfsc_drake.control.margins import modes
 
 # rad or m, of gears: from stiff to soft
 PRESLIDINGS = (1e-6, 1e-5, 1e-4)
-# of the integration that the bristles are simulated with; the map has steps of its own
+# accuracy of the integration of bristles; the map has its own steps
 _ACCURACY = 1e-6
-# after which all that is sampled has been
+# ticks after which all sampled systems have been updated
 _TICKS = 5
 
 
 @dataclass(frozen=True)
 class StuckDrives:
-    """The law's loop at the start, where friction holds all motors.
+    """Loop at the start, with all motors held by friction.
 
     Attributes:
         presliding: Displacement at which the motors would slide [rad or m].
-        rate: Rate of the mode that grows fastest or decays slowest [1/s].
+        rate: Rate of the slowest or most unstable mode [1/s].
         frequency: Its frequency [rad/s].
-        held: Whether torques are held at rest, so that the loop is not closed there.
+        held: Whether torques are held at rest, so that the loop is open there.
     """
 
     presliding: float
@@ -42,19 +42,19 @@ class StuckDrives:
 def stuck_drives(
     settings: Scenario, folder: Path, joints: int, progress: Callable[[str], None]
 ) -> StuckDrives | None:
-    """Return the worst loop with drives that stick, of several presliding displacements.
+    """Return the worst loop with stiction over several presliding displacements.
 
-    Bristles within their limits are a spring ``f_c / delta`` and a damper, so that friction has a
-    slope at rest. The model is without error.
+    Bristles within their limits are a spring ``f_c / delta`` and a damper, so that friction is
+    differentiable at rest. The nominal model is exact.
 
     Args:
         settings: The scenario as read.
-        folder: Where its relative file names start.
+        folder: Base folder of relative file names.
         joints: Number of drives.
-        progress: Told what is done.
+        progress: Progress listener.
 
     Returns:
-        The loop; None where no friction is simulated, or none compensated.
+        The loop; None without simulated or compensated friction.
 
     Raises:
         InputError: If the scenario cannot be built.
@@ -69,7 +69,7 @@ def stuck_drives(
     smoothed.simulation.accuracy = _ACCURACY
     found = []
     for presliding in PRESLIDINGS:
-        progress(f"drives that stick, presliding {1e6 * presliding:g} urad")
+        progress(f"stiction, presliding {1e6 * presliding:g} urad")
         smoothed.friction.presliding = [presliding] * joints
         loop = StationLoop(smoothed, folder)
         section = _start(loop)
@@ -77,13 +77,16 @@ def stuck_drives(
         if linear is None:
             continue
         worst = modes(linear.A, loop.map.period)
-        held = compensation.hold_at_rest
-        found.append(StuckDrives(presliding, worst.slowest, worst.slowest_frequency, held))
+        found.append(
+            StuckDrives(
+                presliding, worst.slowest, worst.slowest_frequency, compensation.hold_at_rest
+            )
+        )
     return max(found, key=lambda stuck: stuck.rate, default=None)
 
 
 def _start(loop: StationLoop) -> Context:
-    """Return the state right after the first ticks, before anything that grows has grown."""
+    """Return the state right after the first ticks, before instabilities develop."""
     simulator = Simulator(loop.station.diagram)
     loop.configure(simulator)
     root = simulator.get_mutable_context()
@@ -98,14 +101,14 @@ def _start(loop: StationLoop) -> Context:
 
 
 def sticking_sentence(stuck: StuckDrives) -> str:
-    """Return what a person should know of drives that stick.
+    """Return a sentence about the loop with stiction.
 
     Args:
         stuck: The worst loop.
     """
     verb = "decays with" if stuck.rate <= 0.0 else "grows with"
     mode = f"{verb} {abs(stuck.rate):.3g} 1/s at {stuck.frequency / (2.0 * np.pi):.3g} Hz"
-    where = f"where friction holds the motors (presliding {1e6 * stuck.presliding:g} urad)"
+    where = f"with motors held by friction (presliding {1e6 * stuck.presliding:g} urad)"
     if stuck.rate <= 0.0:
         return f"At rest, {where}, the law's loop is stable: it {mode}."
     if stuck.held:

@@ -1,4 +1,4 @@
-"""Where on its way a loop is looked at; how stiff a surface may be that it touches there."""
+"""Analysed instants of a loop along its path, and stiffness margin of a touched surface."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,23 +11,23 @@ from diagrams.station import Station
 from experiments.studies.margins.loop import STIFFEST, StationLoop, linearize
 from pfsc_drake.control.margins import modes
 
-# instants in motion, at equal distances along the way
+# instants in motion, at equal distances along the path
 MOVING = 8
 _SAMPLES = 2000
 _SLOW = 1e-3  # of the fastest reference: slower is rest
-# s, between two looks at progress and faults
+# s, between two checks of progress and faults
 _CHUNK = 0.05
-# ticks after which what waits for a force sensor to be tared has set off
+# ticks after taring until systems that wait for it have started
 _SETTLED = 5
 
 
 @dataclass(frozen=True)
 class Instant:
-    """A state of the station on its way.
+    """State of the station along its path.
 
     Attributes:
-        time: [s].
-        eta: Where the reference is [m], one coordinate of a path, two of a surface.
+        time: Time [s].
+        eta: Position of the reference [m], one coordinate of a path, two of a surface.
         speed: Its speed [m/s], on a path with its sign.
         section: Context right after the tick.
     """
@@ -38,8 +38,8 @@ class Instant:
     section: Context
 
     @property
-    def place(self) -> str:
-        """In words."""
+    def location(self) -> str:
+        """Speed and position in words."""
         motion = f"at {abs(self.speed):.2g} m/s" if self.speed else "at rest"
         eta = ", ".join(f"{value:.3g}" for value in self.eta)
         return f"{motion}, eta = {eta if len(self.eta) == 1 else f'({eta})'} m"
@@ -47,12 +47,12 @@ class Instant:
 
 @dataclass(frozen=True)
 class Walk:
-    """A run without model error.
+    """Simulated run without model error.
 
     Attributes:
         instants: In order of time.
         fault: Whether a fault ended it.
-        tared: Whether a force sensor was tared before it would have been.
+        tared: Whether a force sensor was tared early.
     """
 
     instants: list[Instant]
@@ -67,13 +67,13 @@ def walk(
     *,
     only_start: bool = False,
 ) -> Walk:
-    """Run a station and keep its state at rest and in motion.
+    """Simulate a station and store its state at rest and in motion.
 
     Args:
         loop: Its loop.
         duration: Length of the run [s].
-        progress: Told the simulated time [s].
-        only_start: Whether to keep the first instant alone.
+        progress: Receives the simulated time [s].
+        only_start: Whether to store the first instant only.
     """
     station, simulator = loop.station, Simulator(loop.station.diagram)
     loop.configure(simulator)
@@ -106,7 +106,7 @@ def walk(
 
 
 def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, tuple[float, ...], float]]:
-    """Return ticks with place [m] and speed [m/s] of the reference."""
+    """Return ticks with position [m] and speed [m/s] of the reference."""
     motion, period = station.task.motion, station.controller.period
     assert motion is not None  # of a station's task
     last = max(int(duration / period + 1e-6) - 1, 1)
@@ -117,44 +117,44 @@ def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, tuple[fl
     speed = np.where(times > motion.domain[1], 0.0, speed)
     fastest = np.max(np.abs(speed))
     moving = np.abs(speed) > _SLOW * fastest if fastest > 0.0 else np.zeros(_SAMPLES, dtype=bool)
-    # the end of every rest, where what came before has settled
+    # the end of every rest, where transients have settled
     rests = np.flatnonzero(np.diff(moving.astype(int)) == 1).tolist()
     chosen = {*(rests or [0]), _SAMPLES - 1}
     if moving.any():
-        way = np.cumsum(np.abs(speed))
+        travel = np.cumsum(np.abs(speed))
         quantiles = (np.arange(MOVING) + 0.5) / MOVING
-        chosen |= set(np.searchsorted(way, quantiles * way[-1]).tolist())
-    else:  # led by somebody else
+        chosen |= set(np.searchsorted(travel, quantiles * travel[-1]).tolist())
+    else:  # motion commanded by an operator
         chosen |= set(np.linspace(0, _SAMPLES - 1, MOVING + 2).astype(int).tolist())
     result = {}
     for sample in sorted(chosen):
         tick = min(max(round(times[sample] / period), 1), last)
-        place = tuple(eta[sample].tolist())
-        result[tick] = (tick, place, float(speed[sample] if moving[sample] else 0.0))
+        position = tuple(eta[sample].tolist())
+        result[tick] = (tick, position, float(speed[sample] if moving[sample] else 0.0))
     return list(result.values())
 
 
-# to which factor the stiffest surface that is borne is found
+# resolution of the largest factor
 _FINEST = 1.05
 
 
 @dataclass(frozen=True)
 class TouchedSurface:
-    """What of a surface that is pressed on the loop bears, the model being as the scenario says.
+    """Stiffness margin of a touched surface, with the scenario's model.
 
     Attributes:
-        instant: Where: the place in contact with the slowest loop.
-        force: With which the tool presses there [N].
-        stiffness: Stiffness of the spring along the normal that the surface is there [N/m].
-        borne: The largest multiple of it that keeps the loop stable; infinite if all that were
-            tried do.
-        frequency: Frequency of the mode that grows with a little more [rad/s].
+        instant: Instant in contact with the slowest loop.
+        force: Contact force [N].
+        stiffness: Stiffness of the contact along the normal [N/m].
+        largest_factor: Largest factor of the stiffness with a stable loop; infinite if no limit was
+            found.
+        frequency: Frequency of the unstable mode beyond it [rad/s].
     """
 
     instant: Instant
     force: float
     stiffness: float
-    borne: float
+    largest_factor: float
     frequency: float
 
 
@@ -165,31 +165,29 @@ def touched_surface(
     chosen: np.ndarray,
     progress: Callable[[str], None],
 ) -> TouchedSurface:
-    """Find the stiffest surface that a loop bears, up to a limit.
-
-    The force is the same on all of them.
+    """Find the stiffest surface with a stable loop, up to a limit, at the same contact force.
 
     Args:
         loop: The loop.
-        instant: Where it is in contact.
-        section: The same as a state of its own station.
+        instant: Instant in contact.
+        section: Its state in the loop's own station.
         chosen: The variables in the loop, in increasing order.
-        progress: Told what is done.
+        progress: Progress listener.
     """
     assert loop.spring is not None
     stiffness, force = loop.spring.stiffness, loop.pressed_force(section)
-    borne, frequency, factor, step = 0.0, 0.0, 1.0, 2.0
-    while borne < STIFFEST and step > _FINEST:
+    largest_factor, frequency, factor, step = 0.0, 0.0, 1.0, 2.0
+    while largest_factor < STIFFEST and step > _FINEST:
         progress(f"a surface {factor:.3g} times as stiff")
         linear = linearize(loop, loop.stiffened(section, factor * stiffness), chosen)
         found = None if linear is None else modes(linear.A, loop.map.period)
         if found is not None and found.is_stable:
-            borne = factor
+            largest_factor = factor
         else:
             frequency = 0.0 if found is None else found.slowest_frequency
-            if borne == 0.0:
+            if largest_factor == 0.0:
                 break
             step = float(np.sqrt(step))
-        factor = borne * step
-    borne = np.inf if borne >= STIFFEST else borne
-    return TouchedSurface(instant, force, stiffness, borne, frequency)
+        factor = largest_factor * step
+    largest_factor = np.inf if largest_factor >= STIFFEST else largest_factor
+    return TouchedSurface(instant, force, stiffness, largest_factor, frequency)

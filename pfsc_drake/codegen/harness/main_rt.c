@@ -1,9 +1,10 @@
-/* Step the controller once a sampling time, with deadlines, and print how long it took.
+/* Step the controller once a sampling time, with deadlines, and print the durations.
 
    usage: main_rt [SECONDS [LOG]]     10 s and replay.bin if omitted
 
-   Inputs come from a log here, and outputs go nowhere: put your robot's drivers into read_inputs
-   and write_outputs. Runs with real-time priority where that is allowed. Status: the fault.
+   Inputs come from a log here, and outputs are discarded: put your robot's drivers into
+   read_inputs and write_outputs. Runs with real-time priority where that is allowed. Status: the
+   fault.
 */
 #define _POSIX_C_SOURCE 200112L
 
@@ -22,7 +23,7 @@
 
 static FILE *source;
 
-/* Replace: what is measured at this instant. Returns whether there is anything. */
+/* Replace: read the measurement of this instant. Returns whether there is one. */
 static int read_inputs(controller_inputs *inputs)
 {
     if (fread(inputs, sizeof *inputs, 1, source) != 1) {
@@ -31,7 +32,7 @@ static int read_inputs(controller_inputs *inputs)
     return fseek(source, (long)sizeof(controller_outputs), SEEK_CUR) == 0;
 }
 
-/* Replace: tell the drives. */
+/* Replace: send the command to the drives. */
 static void write_outputs(const controller_outputs *outputs)
 {
     (void)outputs;

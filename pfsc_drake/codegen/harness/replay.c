@@ -1,13 +1,13 @@
-/* Feed a recorded log to the controller and compare what it puts out, bit by bit.
+/* Feed a recorded log to the controller and compare the outputs, bit by bit.
 
    usage: replay [LOG [STEPS]]          replay.bin and 1000000 if omitted
           replay -w INPUTS OUTPUTS
 
-   The log holds doubles: for each tick the inputs, then the outputs, as in interface.json.
-   Then so many steps are measured, one after the other.
+   The log contains doubles: for each tick the inputs, then the outputs, as in interface.json.
+   Then STEPS steps are measured, one after the other.
    Prints one line of numbers for programs, too. Status 0: all bits the same; 1: not; 2: no log.
 
-   With -w the log holds nothing but inputs, and what the controller makes of them is written.
+   With -w the log contains only inputs, and the controller's outputs are written.
 */
 #define _POSIX_C_SOURCE 199309L
 
@@ -68,7 +68,7 @@ static tick_record *read_log(const char *name, size_t *ticks)
     return records;
 }
 
-/* Return how many ticks differ, and by how much at most, infinite where one is no number; print
+/* Return the number of ticks that differ, and the largest difference, infinite with NaN; print
    the first. */
 static size_t compare(const tick_record *log, size_t ticks, double *largest)
 {
@@ -122,7 +122,7 @@ static void measure(const tick_record *log, size_t ticks, double *times, size_t 
     qsort(times, count, sizeof *times, ascending);
 }
 
-/* Write what the controller makes of inputs; return the status. */
+/* Write the controller's outputs for inputs; return the status. */
 static int write_outputs(const char *from, const char *to)
 {
     FILE *in = fopen(from, "rb"), *out = fopen(to, "wb");

@@ -1,11 +1,12 @@
-/* Feed wrong inputs to the controller, and look whether it stays calm.
+/* Feed invalid inputs to the controller, and check its reaction.
 
    usage: replay_random [LOG [STEPS]]     replay.bin and 100000 if omitted
 
-   Again and again it begins with the first inputs of the log and gets some of those that follow,
-   then inputs of which some or all numbers are NaN, infinite or random, then a few good ones. At
-   every step the first output, what drives are told, must be finite; a number that is none among
-   the inputs must end in a fault; and a fault must stay. Status 0: so it was; 1: not; 2: no log.
+   It repeatedly begins with the first inputs of the log and continues with some of the next ones,
+   then with inputs in which some or all numbers are NaN, infinite or random, then a few valid
+   ones. At every step the first output, the command of the drives, must be finite; a NaN or
+   infinite input must end in a fault; and a fault must hold. Status 0: passed; 1: failed; 2: no
+   log.
 */
 #include <math.h>
 #include <stdint.h>
@@ -58,14 +59,14 @@ static double wrong_number(double right)
         return right + sign * pow(10.0, 12.0 * uniform() - 6.0);
     case 4:
         return 0.0;
-    default: /* any double there is */
+    default: /* any double */
         bits = random_bits();
         memcpy(&any, &bits, sizeof any);
         return any;
     }
 }
 
-/* Spoil one number, or each with some chance; return whether one is none now. */
+/* Change one number, or each with some probability; return whether one is not finite. */
 static int spoil(double *inputs)
 {
     const double chance = uniform() < 0.5 ? 0.0 : uniform();
@@ -100,7 +101,7 @@ static int complain(const char *what, unsigned long step)
     return 1;
 }
 
-/* Return 1 if something is wrong. */
+/* Return 1 after a failure. */
 static int one_run(const tick_record *log, size_t ticks, unsigned long *step, unsigned long *faults)
 {
     const size_t before = (size_t)(random_bits() % (ticks < GOOD ? ticks : GOOD)) + 1;
@@ -122,7 +123,7 @@ static int one_run(const tick_record *log, size_t ticks, unsigned long *step, un
         memcpy(&given, inputs, sizeof given);
         fault = controller_step(&state, &given, &outputs);
         if (!told_is_finite(&outputs)) {
-            return complain("what drives are told is not finite", *step);
+            return complain("the command of the drives is not finite", *step);
         }
         if (none && fault == 0) {
             return complain("an input that is no number is no fault", *step);

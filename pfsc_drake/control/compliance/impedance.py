@@ -1,4 +1,4 @@
-"""The impedance of virtual outputs: how their reference yields to forces, solved exactly."""
+"""Impedance of virtual outputs: compliant reference under forces, solved exactly."""
 
 import enum
 import math
@@ -17,12 +17,12 @@ from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.errors import InputError
 
 MASS, DAMPING, STIFFNESS = range(3)
-# what a profile over the size of all transversal coordinates goes over
+# argument of a profile over the norm of all transversal coordinates
 _ACROSS = Kind.TRANSVERSAL.value
 
 
 class ImpedanceStatus(enum.IntFlag):
-    """What an update of the filter could not use."""
+    """Invalid inputs of an update of the filter."""
 
     OK = 0
     FORCE_NOT_FINITE = 1
@@ -31,7 +31,7 @@ class ImpedanceStatus(enum.IntFlag):
 
 
 class ImpedanceState(NamedTuple):
-    """What an impedance remembers, numbers (``casadi.DM``) or expressions.
+    """State of an impedance, numbers (``casadi.DM``) or expressions.
 
     Attributes:
         position: y_p, shape (m,) [m, rad].
@@ -50,15 +50,15 @@ class ImpedanceLaw:
     """Impedance ``m e'' + d e' + k e = tau``, ``e = y_p - y_d``, of every coordinate, sampled.
 
     For a path it is (3.42) for eta and xi, (3.44) for the angles. The state is the *motion itself*,
-    y_p and y_p', with the force and the parameters of the last interval. Whatever
-    changes - parameters, external reference, force - changes only how the motion goes on:
-    e is formed anew at every tick and absorbs it. Hence no step in y_p or y_p'.
+    y_p and y_p', with the force and the parameters of the last interval. A change of parameters,
+    external reference or force changes only the further motion: e is computed anew at every tick
+    and absorbs the change. Hence no step in y_p or y_p'.
 
-    Over an interval e obeys its differential equation with force and parameters held, solved
-    exactly (:mod:`~pfsc_drake.control.compliance.impedance`); ``y_d`` goes on by its
-    Taylor polynomial of order ``desired_order``. What that misses acts like a disturbance of e: on
-    a sine of 1 m, 5 rad/s, 3e-5 m for order 2 and 6e-11 m for order 4 with Tab. 3.2, and
-    5e-3 m and 1e-8 m for a free mass. Order 2 is the least, for (3.42) contains ``y_d''``.
+    Over an interval e obeys its differential equation with constant force and parameters, solved
+    exactly (:mod:`~pfsc_drake.control.compliance.impedance`); ``y_d`` is extrapolated by its Taylor
+    polynomial of order ``desired_order``. The extrapolation error acts like a disturbance of e: for
+    a sine of 1 m, 5 rad/s, 3e-5 m with order 2 and 6e-11 m with order 4 and Tab. 3.2, and
+    5e-3 m and 1e-8 m for a free mass. Order 2 is the minimum because (3.42) contains ``y_d''``.
 
     ``k = inf`` is position control; when a coordinate becomes rigid, y_p steps to y_d.
     With constant parameters the filter is passive: ``tau . (e(T) - e(0))`` is at least the
@@ -69,14 +69,14 @@ class ImpedanceLaw:
         coordinates: The m coordinates of the virtual output.
         relative_degree: r of the law that follows the reference, 1..4.
         period: Sampling time T [s].
-        desired_order: Highest derivative of y_d that is given, at least max(r, 2), which
-            is the default.
+        desired_order: Highest available derivative of y_d, at least max(r, 2), which is the
+            default.
         response_order: Highest derivative of y_p that contains the response to forces;
-            those above are y_d's alone. With the force held y_p is C^1 and its higher
-            derivatives jump, by powers of d/m: fed with all of them, a loop of r = 4 with
-            poles at -50 1/s errs by 8 times the static deflection of Tab. 3.2, with the
-            default, 2, by 14 %.
-        lap: Length of a closed path [m], over which profiles over ``eta`` are periodic.
+            those above are those of y_d alone. With a constant force y_p is C^1 and its higher
+            derivatives jump, by powers of d/m: with all of them, a loop of r = 4 with poles at
+            -50 1/s has an error of 8 times the static deflection of Tab. 3.2, with the default, 2,
+            of 14 %.
+        revolution: Length of a closed path [m], the period of profiles over ``eta``.
 
     Raises:
         InputError: If a number is out of range.
@@ -91,7 +91,7 @@ class ImpedanceLaw:
         *,
         desired_order: int | None = None,
         response_order: int = 2,
-        lap: float | None = None,
+        revolution: float | None = None,
     ) -> None:
         m, least = len(coordinates), max(relative_degree, 2)
         self.desired_order = least if desired_order is None else desired_order
@@ -108,13 +108,15 @@ class ImpedanceLaw:
         self._across = indices(coordinates, Kind.TRANSVERSAL)
         self._names = [coordinate.name for coordinate in coordinates]
         used = {coordinate.kind: parameters.of(coordinate.kind) for coordinate in coordinates}
-        # they may have been changed since they were made
+        # they may have been changed since their construction
         for part in (p for k in used.values() for p in (k.mass, k.damping, k.stiffness, k)):
             part.__post_init__()
         self._check_profiles(used)
         table = [[kind.mass, kind.damping, kind.stiffness] for kind in used.values()]
         round_trip = {
-            c.name: lap for c in coordinates if c.kind is Kind.TANGENTIAL and lap is not None
+            c.name: revolution
+            for c in coordinates
+            if c.kind is Kind.TANGENTIAL and revolution is not None
         }
         self._profiles = [
             [(p.over if p.varies else _ACROSS, p.interpolant(round_trip.get(p.over))) for p in row]
@@ -125,7 +127,7 @@ class ImpedanceLaw:
         self._constant = self._at(dict.fromkeys([*self._names, _ACROSS], ca.DM(0.0)))
 
     def _check_profiles(self, used: dict[Kind, CoordinateImpedance]) -> None:
-        """Refuse profiles over something that the manifold does not have."""
+        """Reject profiles over coordinates that the manifold does not have."""
         allowed = list(dict.fromkeys([*self._names, _ACROSS]))
         for kind, impedance in used.items():
             for name in ("mass", "damping", "stiffness"):
@@ -150,7 +152,7 @@ class ImpedanceLaw:
         return ca.vertcat(*[rows[i][k] for k in range(3) for i in self._row])
 
     def start(self, motion: Any) -> ImpedanceState:
-        """Return a state that moves on from ``[y_p, y_p']``, shape (2 m,)."""
+        """Return the state with the motion ``[y_p, y_p']``, shape (2 m,)."""
         position, velocity = ca.vertsplit(motion, self.num_outputs)
         idle = ca.DM.zeros(self.num_outputs)
         return ImpedanceState(position, velocity, idle, self.impedance(position))
@@ -158,15 +160,15 @@ class ImpedanceLaw:
     def update(
         self, state: ImpedanceState, desired: Any, force: Any, impedance: Any = None
     ) -> tuple[ImpedanceState, Any]:
-        """Return the state one period later, and what of the inputs could not be used.
+        """Return the state one period later, and the status of the inputs.
 
         Args:
             state: At the last tick.
-            desired: Derivatives 0..desired_order of y_d by rows, shape (.. m,); unless all are
-                finite, y_p rests.
-            force: Manifold forces [N, Nm], shape (m,); unless all are finite, zero.
-            impedance: Rows mass, damping, stiffness, shape (3 m,); unless valid, the last. The
-                constant one if omitted.
+            desired: Derivatives 0..desired_order of y_d by rows, shape (.. m,); y_p rests unless
+                all are finite.
+            force: Manifold forces [N, Nm], shape (m,); replaced by zero unless all are finite.
+            impedance: Rows mass, damping, stiffness, shape (3 m,); replaced by the last one if
+                invalid. The constant one if omitted.
 
         Returns:
             The state, and an :class:`ImpedanceStatus`.
@@ -182,9 +184,9 @@ class ImpedanceLaw:
         (a, b, c, d, p), rates = transition_of(impedance, T)
         e, e_1 = state.position - y_d[0], state.velocity - y_d[1]
         f = tau / ca.vertsplit(impedance, self.num_outputs)[MASS]
-        position, velocity = self.foreseen(desired)
-        position += where(rates.yields, a * e + b * e_1 + p * f, 0.0)
-        velocity += where(rates.yields, c * e + d * e_1 + b * f, 0.0)
+        position, velocity = self.extrapolate(desired)
+        position += where(rates.compliant, a * e + b * e_1 + p * f, 0.0)
+        velocity += where(rates.compliant, c * e + d * e_1 + b * f, 0.0)
         later = ImpedanceState(
             where(desired_known, position, state.position),
             where(desired_known, velocity, 0.0),
@@ -198,8 +200,8 @@ class ImpedanceLaw:
         )
         return later, status
 
-    def foreseen(self, desired: Any) -> tuple[Any, Any]:
-        """Return y_d and y_d' one period later, shapes (m,), by the derivatives that are given.
+    def extrapolate(self, desired: Any) -> tuple[Any, Any]:
+        """Return y_d and y_d' extrapolated by one period, shapes (m,).
 
         Args:
             desired: Derivatives 0..desired_order of y_d by rows, shape (.. m,).
@@ -210,24 +212,24 @@ class ImpedanceLaw:
         return position, sum(w * row for w, row in zip(weights, y_d[1:], strict=False))
 
     def push_to(self, state: ImpedanceState, speed: Any, force: Any, free: slice) -> Any:
-        """Return the force after which some coordinates have other speeds, shape (m,).
+        """Return the force that leads to given speeds of some coordinates, shape (m,).
 
         Args:
-            state: What :meth:`update` made of a force.
-            speed: ``y_p'`` that they are to have, shape of ``free`` [m/s].
-            force: That force, shape (m,).
-            free: Which coordinates; those that are rigid keep their force.
+            state: State after :meth:`update` with ``force``.
+            speed: Desired ``y_p'`` of these coordinates, shape of ``free`` [m/s].
+            force: Force of that update, shape (m,).
+            free: The coordinates; rigid ones keep their force.
         """
         (_, b, _, _, _), rates = transition_of(state.impedance, self.period)
         mass = ca.vertsplit(state.impedance, self.num_outputs)[MASS]
         # e'(T) contains b f / m
         more = (speed - state.velocity[free]) * mass[free] / b[free]
         parts = [force[: free.start], force[free], force[free.stop :]]
-        parts[1] += where(rates.yields[free], more, 0.0)
+        parts[1] += where(rates.compliant[free], more, 0.0)
         return ca.vertcat(*parts)
 
     def _is_valid(self, impedance: Any) -> Any:
-        """Return whether masses, dampings and stiffnesses are what they can be."""
+        """Return whether masses, dampings and stiffnesses are in their ranges."""
         mass, damping, stiffness = ca.vertsplit(impedance, self.num_outputs)
         return all_of(
             mass > 0.0, is_finite(mass), damping >= 0.0, is_finite(damping), stiffness >= 0.0
@@ -236,7 +238,7 @@ class ImpedanceLaw:
     def reference(self, state: ImpedanceState, desired: Any) -> Any:
         """Return derivatives 0..r of y_p by rows, shape ((r + 1) m,).
 
-        From the second on they are those at the last interval's end, with its force and
+        From the second on they are those at the end of the last interval, with its force and
         parameters. For the arguments see :meth:`update`.
         """
         y_d, rates = ca.vertsplit(desired, self.num_outputs), rates_of(state.impedance)
@@ -246,14 +248,14 @@ class ImpedanceLaw:
         for _ in range(2, self._response_order + 1):
             response.append(force - rates.damping * response[-1] - rates.stiffness * response[-2])
             force = 0.0
-        # a motion that is known is not rounded by a difference and a sum
+        # a known motion is not rounded by a difference and a sum
         rows = [
-            where(rates.yields, state.position, y_d[0]),
-            where(rates.yields, state.velocity, y_d[1]),
+            where(rates.compliant, state.position, y_d[0]),
+            where(rates.compliant, state.velocity, y_d[1]),
         ]
         for k in range(2, self.relative_degree + 1):
             yielding = k <= self._response_order
-            more = where(rates.yields, response[k], 0.0) if yielding else 0.0
+            more = where(rates.compliant, response[k], 0.0) if yielding else 0.0
             rows.append(y_d[k] + more)
         return ca.vertcat(*rows[: self.relative_degree + 1])
 
@@ -263,17 +265,17 @@ _SERIES_DAMPING, _SERIES_STIFFNESS, _SERIES_TERMS = 0.5, 0.25, 20
 
 
 class Rates(NamedTuple):
-    """What an impedance is per mass.
+    """Impedance per mass.
 
     Attributes:
         damping: ``d / m``, shape (m,) [1/s].
         stiffness: ``k / m``, zero where rigid, shape (m,) [1/s^2].
-        yields: Where it is not rigid, shape (m,).
+        compliant: 1 of coordinates that are not rigid, shape (m,).
     """
 
     damping: Any
     stiffness: Any
-    yields: Any
+    compliant: Any
 
 
 def rates_of(impedance: Any) -> Rates:
@@ -283,8 +285,8 @@ def rates_of(impedance: Any) -> Rates:
         impedance: Rows mass, damping, stiffness, shape (3 m,).
     """
     mass, damping, stiffness = ca.vertsplit(impedance, impedance.numel() // 3)
-    yields = stiffness < ca.inf
-    return Rates(damping / mass, where(yields, stiffness, 0.0) / mass, yields)
+    compliant = stiffness < ca.inf
+    return Rates(damping / mass, where(compliant, stiffness, 0.0) / mass, compliant)
 
 
 def transition_of(impedance: Any, time: float) -> tuple[tuple[Any, ...], Rates]:
@@ -299,7 +301,7 @@ def transition_of(impedance: Any, time: float) -> tuple[tuple[Any, ...], Rates]:
 
 
 def transition(damping: Any, stiffness: Any, time: float) -> tuple[Any, ...]:
-    """Return the solution of ``e'' + damping e' + stiffness e = f``, f held, in closed form.
+    """Return the closed-form solution of ``e'' + damping e' + stiffness e = f``, f constant.
 
     Args:
         damping: ``d / m`` >= 0, shape (m,) [1/s].
@@ -312,8 +314,8 @@ def transition(damping: Any, stiffness: Any, time: float) -> tuple[Any, ...]:
     """
     h = 0.5 * damping
     square = h * h - stiffness
-    swings, w = square < 0.0, ca.sqrt(ca.fabs(square))
-    # two real roots, the slow one without a difference of what is nearly equal
+    oscillates, w = square < 0.0, ca.sqrt(ca.fabs(square))
+    # two real roots, the slow one without cancellation
     slow = where(h > 0.0, -stiffness / (h + w), 0.0)
     decay = ca.exp(slow * time)
     b_real = decay * where(w > 0.0, -ca.expm1(-2.0 * w * time) / (2.0 * w), time)
@@ -326,7 +328,7 @@ def transition(damping: Any, stiffness: Any, time: float) -> tuple[Any, ...]:
     a_swing, d_swing = cosine + h * b_swing, cosine - h * b_swing
     p_swing = (1.0 - a_swing) / stiffness
     a, b, d, p = (
-        where(swings, swing, real)
+        where(oscillates, swing, real)
         for swing, real in (
             (a_swing, a_real),
             (b_swing, b_real),

@@ -1,4 +1,4 @@
-"""Compliance: forces along a manifold, and how the reference of a loop yields to them."""
+"""Compliance: forces along a manifold, and the compliant reference of a position loop."""
 
 import math
 from typing import Any, Literal
@@ -24,14 +24,14 @@ from pfsc_drake.errors import InputError
 class ImpedanceFilter(Block):
     """Impedance ``m e'' + d e' + k e = tau``, ``e = y_p - y_d``, see :class:`ImpedanceLaw`.
 
-    It stands between the external reference y_d and the position loop, which follows
+    The filter is between the external reference y_d and the position loop, which follows
     y_p (3.40)-(3.44). Neither y_p nor y_p' steps when the filter is engaged, when
     parameters change, or when the external reference does.
 
-    The reference follows from the state and ``desired_reference``; force and
-    ``manifold_state`` enter the update only. So there is no algebraic loop through the
-    controller or through a contact, and no delay in the position loop: y_d passes at
-    once, and a force moves y_p after one period, as it does in the held impedance.
+    The reference depends on the state and ``desired_reference``; force and ``manifold_state``
+    enter the update only. So there is no algebraic loop through the controller or through a
+    contact, and no delay in the position loop: y_d passes without delay, and a force moves y_p
+    after one period, as it does in the sampled impedance.
 
     Ports:
         desired_reference (input): Derivatives 0..p of y_d by rows, shape ((p + 1) m,),
@@ -39,37 +39,36 @@ class ImpedanceFilter(Block):
         manifold_force (input): tau, shape (m,) [N, Nm]; from :class:`ManifoldForceTransform`.
         manifold_state (input): Derivatives 0..r-1 of yhat by rows, shape (r m,); for
             parameters that depend on eta or xi, and for ``start="actual"``.
-        engaged (input, optional): Above 0.5, the default, forces count; else they are
-            taken as zero, and y_p goes back to y_d as the springs pull it. Shape (1,).
-        ready (input, optional): Until it first rises above 0.5, what yields rests where it
-            started, whatever y_d and forces do: so that no coordinate is led by a sensor that is
-            not tared. Then it goes on to y_d as its impedance does. Shape (1,).
+        engaged (input, optional): Above 0.5, the default, forces are used; otherwise they are
+            replaced by zero, and the springs return y_p to y_d. Shape (1,).
+        ready (input, optional): Until it first rises above 0.5, compliant coordinates rest at their
+            start values, independent of y_d and forces, so that a sensor that is not yet tared
+            moves nothing. Then y_p follows its impedance. Shape (1,).
         impedance (input, optional): Rows mass, damping, stiffness of every coordinate,
-            shape (3 m,), in place of the law's own.
-        allowed_speed (input, optional): Part of the ``wanted_speed`` of the coordinates ``free``,
-        what
-            the robot can follow [m/s]; they move no faster. From :class:`LedMotion`.
+            shape (3 m,); replaces the law's impedance.
+        allowed_speed (input, optional): Speed limit of the coordinates ``free``: the part of
+            ``desired_speed`` that the robot can follow [m/s]. From :class:`GuidedMotion`.
         reference (output): Derivatives 0..r of y_p by rows, shape ((r + 1) m,).
         status (output): :class:`ImpedanceStatus` of the last update, shape (1,).
         damping (output): d of the last interval, shape (m,) [N s/m, Nm s/rad].
-        wanted_speed (output): y_p' of the coordinates ``free`` at the next tick as far as the hand
-            goes, then the largest of their masses [m/s, kg]; NaN while nothing moves. Only if there
-            are such coordinates.
+        desired_speed (output): y_p' of the coordinates ``free`` at the next tick without limits,
+            then the largest of their masses [m/s, kg]; NaN while nothing moves. Only if there are
+            such coordinates.
 
     State:
         y_p (``position``), y_p' (``velocity``), and force and impedance of the last interval;
-        whether it has started, waits, was engaged; status. Until it has started, y_p = y_d.
+        flags ``started``, ``waits``, ``engaged``; status. Until it has started, y_p = y_d.
 
     Args:
         law: The law.
-        start: Where y_p starts, and goes on from when ``engaged`` rises: ``reference`` from y_d,
-            then from y_p itself; ``actual`` from the measured yhat (and yhat' if r > 1, else y_d'),
-            so that the loop, not active before, has no error. What is not finite then is awaited.
+        start: Value of y_p at the start and when ``engaged`` rises: ``reference``: y_d, then y_p
+            itself; ``actual``: the measured yhat (and yhat' if r > 1, else y_d'), so that the loop,
+            not active before, has no error. The filter starts at the first finite value.
         free: Coordinates whose speed may be limited; none if omitted.
-        ends: Ends of an open path, between which y_p stays, if there are any.
+        ends: Ends of an open path, between which y_p stays; None if there are none.
 
     Raises:
-        InputError: If ``start`` is neither.
+        InputError: If ``start`` is unknown.
     """
 
     def __init__(
@@ -101,13 +100,13 @@ class ImpedanceFilter(Block):
         if free is not None:
             count = free.stop - free.start
             self.inputs["allowed_speed"] = Port(count, "m/s", optional=True)
-            self.outputs["wanted_speed"] = Port(count + 1, "m/s, kg")
+            self.outputs["desired_speed"] = Port(count + 1, "m/s, kg")
         flags = ("started", "waits", "engaged", "status")
         self.states = {"position": m, "velocity": m, "force": m, "impedance": 3 * m}
         self.states |= dict.fromkeys(flags, 1)
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         motion = self._start_motion(u)
         known = all_finite(motion)
         state = self._law.start(where(known, motion, 0.0))
@@ -118,52 +117,54 @@ class ImpedanceFilter(Block):
         """Return all outputs, and the inner values."""
         m, r = self._law.num_outputs, self._law.relative_degree
         state, desired = _state(x), u.desired_reference[: (r + 1) * m]
-        # at rest where it yields
-        yields = ca.vertsplit(x.impedance, m)[STIFFNESS] < ca.inf
+        # compliant coordinates at rest
+        compliant = ca.vertsplit(x.impedance, m)[STIFFNESS] < ca.inf
         rest = ca.vertcat(x.position, ca.DM.zeros(r * m))
-        resting = where(ca.repmat(yields, r + 1, 1), rest, desired)
+        resting = where(ca.repmat(compliant, r + 1, 1), rest, desired)
         reference = first_of(
             (ca.logic_not(x.started), desired),
             (x.waits, resting),
             otherwise=self._law.reference(state, u.desired_reference),
         )
-        made = {"reference": reference, "status": x.status, "damping": x.impedance[m : 2 * m]}
+        outputs = {"reference": reference, "status": x.status, "damping": x.impedance[m : 2 * m]}
         if self._free is None:
-            return made
-        now, moves, _ = self._begun(x, u)
-        later, status = self._moved(now, u)
+            return outputs
+        now, moves, _ = self._continued_state(x, u)
+        later, status = self._next_state(now, u)
         mass = ca.mmax(ca.vertsplit(later.impedance, m)[0][self._free])
-        wanted = where(ca.logic_and(moves, status == ImpedanceStatus.OK), 1.0, math.nan)
-        speed = wanted * later.velocity[self._free]
-        return made | {"wanted_speed": ca.vertcat(speed, mass)}
+        valid = where(ca.logic_and(moves, status == ImpedanceStatus.OK), 1.0, math.nan)
+        speed = valid * later.velocity[self._free]
+        return outputs | {"desired_speed": ca.vertcat(speed, mass)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
-        now, moves, flags = self._begun(x, u)
-        later, status = self._moved(now, u)
+        """Return the states at the next tick; omitted ones keep their values."""
+        now, moves, flags = self._continued_state(x, u)
+        later, status = self._next_state(now, u)
         if self._free is not None and u.allowed_speed is not None:
-            known = all_finite(y.wanted_speed)
+            known = all_finite(y.desired_speed)
             speed = where(known, u.allowed_speed, later.velocity[self._free])
             push = self._law.push_to(later, speed, later.force, self._free)
-            held, held_status = self._moved(now, u, push)
-            later = ImpedanceState(*[where(known, a, b) for a, b in zip(held, later, strict=True)])
-            status = where(known, held_status, status)
-        kept = {
+            limited, limited_status = self._next_state(now, u, push)
+            later = ImpedanceState(
+                *[where(known, a, b) for a, b in zip(limited, later, strict=True)]
+            )
+            status = where(known, limited_status, status)
+        motion = {
             name: where(moves, getattr(later, name), getattr(now, name)) for name in later._fields
         }
         awaited = where(flags["started"], ImpedanceStatus.OK, ImpedanceStatus.REFERENCE_NOT_FINITE)
-        return kept | flags | {"status": where(moves, status, awaited)}
+        return motion | flags | {"status": where(moves, status, awaited)}
 
     def _start_motion(self, u: Values) -> Any:
-        """Return ``[y_p, y_p']`` from where it starts, shape (2 m,)."""
+        """Return ``[y_p, y_p']`` at the start, shape (2 m,)."""
         size = 2 * self._law.num_outputs
         if not self._at_actual:
             return u.desired_reference[:size]
         measured = u.manifold_state[: min(size, self.inputs["manifold_state"].size)]
         return ca.vertcat(measured, u.desired_reference[measured.numel() : size])
 
-    def _begun(self, x: Values, u: Values) -> tuple[ImpedanceState, Any, dict[str, Any]]:
-        """Return the state that goes on, whether it does, and what is remembered of that."""
+    def _continued_state(self, x: Values, u: Values) -> tuple[ImpedanceState, Any, dict[str, Any]]:
+        """Return the present state, whether it moves, and the next flags."""
         now, engaged, started = _state(x), self._engaged(u), x.started
         if self._at_actual:
             rises = ca.logic_and(engaged, ca.logic_not(x.engaged))
@@ -183,10 +184,10 @@ class ImpedanceFilter(Block):
     def _engaged(self, u: Values) -> Any:
         return ca.DM(1.0) if u.engaged is None else u.engaged > 0.5
 
-    def _moved(
+    def _next_state(
         self, now: ImpedanceState, u: Values, force: Any = None
     ) -> tuple[ImpedanceState, Any]:
-        """Return the state a period later, and its status, by a force or the measured one."""
+        """Return the state one period later and its status; by default of the measured force."""
         if force is None:
             force = where(self._engaged(u), u.manifold_force, 0.0)
         impedance = u.impedance
@@ -206,13 +207,13 @@ class ManifoldForceTransform(Block):
     """External wrench to generalized forces along a manifold, see :meth:`Manifold.force`.
 
     For a path (3.41), (3.44), (3.45): ``tau_par = e_par . f / beta``, ``tau_perp = e_perp . f``,
-    ``tau_cross = e_cross . f``, ``tau_phi = T_ZYX'(phi_pd) R_d' mu``. Values that are not finite
-    come through.
+    ``tau_cross = e_cross . f``, ``tau_phi = T_ZYX'(phi_pd) R_d' mu``. NaN and infinite values pass
+    through.
 
     Ports:
         wrench (input): Force [N] and torque [Nm] on the tool at the tool point, world
             axes, shape (6,).
-        manifold_point (input): Where on the manifold the tool is, e.g. from
+        manifold_point (input): Projection of the tool onto the manifold, e.g. from
             :class:`Projector`.
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,); from
             :class:`ImpedanceFilter`. Only for manifolds with rotational coordinates.
@@ -244,26 +245,27 @@ class ManifoldForceTransform(Block):
 _ACROSS = 1e-6
 
 
-class LedMotion(Block):
-    """Takes back a speed along a path or a surface to what the robot can follow.
+class GuidedMotion(Block):
+    """Limits a speed along a path or a surface to the speeds that the robot can follow.
 
     With the directions t of the tangential coordinates, a limit ``n w >= -beta`` of the tool's
-    velocity (:class:`RobotLimits`) is one of ``eta'``, ``(n t) eta' >= -beta``. Near the manifold
-    ``y' = t eta'``; motion across it, which a position loop makes, goes on as measured. Of the
-    twelve tightest of these, :func:`program_function` finds the motion next to the wanted one.
+    velocity (:class:`RobotLimits`) becomes a limit of ``eta'``, ``(n t) eta' >= -beta``. Near the
+    manifold ``y' = t eta'``; the transversal motion, which the position loop causes, is assumed to
+    continue as measured. Under the twelve tightest limits :func:`program_function` finds the motion
+    closest to the desired one.
 
     Ports:
-        wanted_speed (input): Speeds of the tangential coordinates, then their mass, shape (count +
-        1,)
-            [m/s, kg]; from :class:`ImpedanceFilter`. What is no number is left as it is.
+        desired_speed (input): Speeds of the tangential coordinates, then their mass, shape
+            (count + 1,) [m/s, kg]; from :class:`ImpedanceFilter`. NaN and infinite values pass
+            through.
         joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
-        manifold_point (input): Where on the manifold the tool is.
-        allowed_speed (output): What of it the robot can follow, shape (count,) [m/s].
-        limit_force (output): By what forces the robot's limits held the hand in the last interval,
-            shape (kinds,) [N].
+        manifold_point (input): Projection of the tool onto the manifold.
+        allowed_speed (output): Limited speeds of the tangential coordinates, shape (count,) [m/s].
+        limit_force (output): Forces of the robot's limits against the operator in the last
+            interval, by kind, shape (kinds,) [N].
 
     State:
-        limit_force: The same.
+        limit_force: The output.
 
     Args:
         limits: Limits of the tool's velocity.
@@ -271,11 +273,11 @@ class LedMotion(Block):
         period: Sampling time [s].
 
     Attributes:
-        tangential: Which coordinates are tangential.
-        kinds: What limits there are, see :func:`limit_kinds`, each once.
+        tangential: Indices of the tangential coordinates.
+        kinds: Kinds of limits, see :func:`limit_kinds`, each once.
     """
 
-    expands = False  # the program skips what is rare
+    expands = False  # the program skips rare cases
 
     def __init__(self, limits: RobotLimits, manifold: Manifold, period: float) -> None:
         self._limits, self._axes = limits, manifold.axes
@@ -287,7 +289,7 @@ class LedMotion(Block):
         # 1 where a limit is of a kind
         self._of_kind = ca.DM([[one == kind for kind in self.kinds] for one in every])
         self.inputs = {
-            "wanted_speed": Port(self._count + 1, "m/s, kg"),
+            "desired_speed": Port(self._count + 1, "m/s, kg"),
             "joint_state": Port(4 * limits.num_joints, "rad, rad/s or m, m/s"),
             "manifold_point": Port(manifold.layout.size),
         }
@@ -296,37 +298,37 @@ class LedMotion(Block):
             "limit_force": Port(len(self.kinds), "N"),
         }
         self.states = {"limit_force": len(self.kinds)}
-        self.inner = {"held": len(self.kinds)}
+        self.inner = {"deceleration": len(self.kinds)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values.
 
-        ``held``: by how much of each kind of limit [m/s^2].
+        ``deceleration``: by each kind of limit [m/s^2].
         """
-        wanted = u.wanted_speed[: self._count]
-        speed, held = self._allowed(u.joint_state, u.manifold_point, wanted)
+        desired = u.desired_speed[: self._count]
+        speed, deceleration = self._limit_speed(u.joint_state, u.manifold_point, desired)
         return {
-            "allowed_speed": where(any_of(held), speed, wanted),
+            "allowed_speed": where(any_of(deceleration), speed, desired),
             "limit_force": x.limit_force,
-            "held": held,
+            "deceleration": deceleration,
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
-        moves, mass = all_finite(u.wanted_speed[: self._count]), u.wanted_speed[self._count]
-        return {"limit_force": where(moves, mass * y.held, x.limit_force)}
+        """Return the states at the next tick; omitted ones keep their values."""
+        moves, mass = all_finite(u.desired_speed[: self._count]), u.desired_speed[self._count]
+        return {"limit_force": where(moves, mass * y.deceleration, x.limit_force)}
 
-    def _allowed(self, joint_state: Any, point: Any, wanted: Any) -> tuple[Any, Any]:
-        """Return the motion next to a wanted one that the limits allow, and what holds it.
+    def _limit_speed(self, joint_state: Any, point: Any, desired: Any) -> tuple[Any, Any]:
+        """Return the motion closest to the desired one within the limits, and their effect.
 
         Args:
-            joint_state: As measured, shape (4N,).
+            joint_state: Measured joint state, shape (4N,).
             point: The manifold's point.
-            wanted: ``eta'`` [m/s], shape (1,) or (2,).
+            desired: ``eta'`` [m/s], shape (1,) or (2,).
 
         Returns:
-            ``eta'``, and by how much of each kind of limit it is held [m/s^2], shape (kinds,);
-            zeros where a number is none.
+            ``eta'``, and the deceleration by each kind of limit [m/s^2], shape (kinds,); zeros if
+            an input is NaN or infinite.
         """
         n, unused = self._limits.num_joints, 3 - self._count
         limits = self._limits.function(joint_state[:n], joint_state[n : 2 * n])
@@ -336,10 +338,10 @@ class LedMotion(Block):
         units = ca.horzcat(rows, limits[:, 4]) / ca.repmat(size, 1, self._count + 1)
         units = where(ca.repmat(number >= 0.0, 1, self._count + 1), units, 0.0)
         n_t = ca.horzcat(units[:, :-1], ca.DM.zeros(units.shape[0], unused))
-        target = ca.vertcat(wanted, ca.DM.zeros(unused))
+        target = ca.vertcat(desired, ca.DM.zeros(unused))
         pick = tightest_function(units.shape[0], SLOTS)
         picked = pick(ca.horzcat(number, n_t, units[:, -1]), target)
-        # no beta is negative, so that rest is always allowed and no slot has to give way
+        # no beta is negative: rest is always feasible, and no slot has to be relaxed
         number, no = picked[:, 0], ca.DM.zeros(SLOTS)
         velocity, forces, _ = self._program(
             1.0, target, number >= 0.0, picked[:, 1:4], no, picked[:, 4], no, no

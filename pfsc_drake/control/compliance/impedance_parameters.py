@@ -15,11 +15,11 @@ from pfsc_drake.errors import InputError, require
 from pfsc_drake.yaml.fields import REQUIRED
 from pfsc_drake.yaml.rules import NotNegative, Numbers, Parameters, Positive, Range
 
-# relative; what misses the length of a lap by less is a lap
+# relative tolerance of the length of a revolution
 _ROUNDING = 1e-6
 
 
-# of masses, dampings and stiffnesses; who has the profile knows which
+# of masses, dampings and stiffnesses; the owner of the profile decides which
 _UNIT, _LARGEST = "kg, N s/m or N/m", 1e10
 
 
@@ -28,7 +28,7 @@ class Profile(Parameters):
     """A parameter: constant, or cubic, C^1, monotone between breakpoints, constant outside.
 
     Over the arc length of a closed path it is periodic instead: cubic, C^1 and monotone from the
-    last breakpoint to the first of the next lap, too.
+    last breakpoint to the first of the next revolution, too.
 
     Attributes:
         value: The constant, if there are no breakpoints.
@@ -58,11 +58,11 @@ class Profile(Parameters):
         """Whether it is no constant."""
         return bool(self.at)
 
-    def interpolant(self, lap: float | None = None) -> Callable[[Any], Any]:
-        """Return the parameter as a function of what it goes over, a number or an expression.
+    def interpolant(self, revolution: float | None = None) -> Callable[[Any], Any]:
+        """Return the parameter as a function of its coordinate, a number or an expression.
 
         Args:
-            lap: Period of what it goes over, if it has one.
+            revolution: Period of the coordinate; None if it is not periodic.
 
         Raises:
             InputError: If the breakpoints do not fit into a period, or the values at its two
@@ -72,18 +72,18 @@ class Profile(Parameters):
             constant = self.value
             return lambda _: constant
         at, values = np.array(self.at), np.array(self.values)
-        if lap is None:
+        if revolution is None:
             slopes = PchipInterpolator(at, values).derivative()(at)
             slopes[[0, -1]] = 0.0
         else:
-            at, values, slopes = self._periodic(at, values, lap)
+            at, values, slopes = self._periodic(at, values, revolution)
         pieces = CubicHermiteSpline(at, values, slopes).c.T
         begins = [ca.DM([begin, *piece]) for begin, piece in zip(at, pieces, strict=False)]
         ends, first, last, lowest = at[1:], float(at[0]), float(at[-1]), min(self.values)
 
         def value(x: Any) -> Any:
-            if lap is not None:
-                x = x - lap * ca.floor((x - first) / lap)
+            if revolution is not None:
+                x = x - revolution * ca.floor((x - first) / revolution)
             x = first_of((x < first, first), (x > last, last), otherwise=x)
             cases = zip([x < end for end in ends], begins, strict=True)
             piece = first_of(*list(cases)[:-1], otherwise=begins[-1])
@@ -94,24 +94,24 @@ class Profile(Parameters):
         return value
 
     def _periodic(
-        self, at: np.ndarray, values: np.ndarray, lap: float
+        self, at: np.ndarray, values: np.ndarray, revolution: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return breakpoints, values and slopes over one period, both its ends included."""
-        span, rounding = float(at[-1] - at[0]), _ROUNDING * lap
-        if span > lap + rounding:
-            raise InputError(f"at: {self.at}; the closed path is {lap:.6g} m long")
-        if span >= lap - rounding:
+        span, rounding = float(at[-1] - at[0]), _ROUNDING * revolution
+        if span > revolution + rounding:
+            raise InputError(f"at: {self.at}; the closed path is {revolution:.6g} m long")
+        if span >= revolution - rounding:
             if abs(values[-1] - values[0]) > _ROUNDING * max(values[0], values[-1]):
                 raise InputError(
-                    f"values: {self.values}; the last must be the first one, a lap of "
-                    f"{lap:.6g} m later"
+                    f"values: {self.values}; the last must be the first one, a revolution of "
+                    f"{revolution:.6g} m later"
                 )
             at, values = at[:-1], values[:-1]
-        # the laps around tell the slopes at the seam
-        around = np.concatenate([at - lap, at, at + lap])
+        # the neighbouring revolutions determine the slopes at the seam
+        around = np.concatenate([at - revolution, at, at + revolution])
         slopes = PchipInterpolator(around, np.tile(values, 3)).derivative()(at)
         return (
-            np.append(at, at[0] + lap),
+            np.append(at, at[0] + revolution),
             np.append(values, values[0]),
             np.append(slopes, slopes[0]),
         )
@@ -126,15 +126,15 @@ class SlowEnds(Parameters):
         d(eta) = d_min + (d_max - d_min) (3 - 2 tanh(40 eta) + tanh(80 (eta - eta_max)))
 
     The bracket is 2 at the start, where ``d = 2 d_max - d_min``, and not 1 as its name suggests;
-    it is 0 in between and 1 at the end, where ``d = d_max``. Beyond the ends it goes on: up to
-    ``4 (d_max - d_min) + d_min`` before the start and ``2 d_max - d_min`` after the end. All of it
-    is positive on paths of any length, and C^infinity.
+    it is 0 in between and 1 at the end, where ``d = d_max``. Beyond the ends it rises further, to
+    ``4 (d_max - d_min) + d_min`` before the start and ``2 d_max - d_min`` after the end. It is
+    positive on paths of any length, and C^infinity.
 
     Attributes:
         least: ``d_min``, in the middle of a long path [N s/m].
         most: ``d_max``, at its end [N s/m], not less.
-        start_rate: Next to the start [1/m]; 40 as printed.
-        end_rate: Next to the end [1/m]; 80 as printed.
+        start_rate: Rate of change at the start [1/m]; 40 as printed.
+        end_rate: Rate of change at the end [1/m]; 80 as printed.
         length: ``eta_max`` [m]; 0 for the length of the path.
     """
 
@@ -150,7 +150,7 @@ class SlowEnds(Parameters):
 
     @property
     def over(self) -> str:
-        """Name of the coordinate that it goes over."""
+        """Name of its coordinate."""
         return "eta"
 
     @property
@@ -158,19 +158,19 @@ class SlowEnds(Parameters):
         """Whether it is no constant."""
         return self.most > self.least
 
-    def interpolant(self, lap: float | None = None) -> Callable[[Any], Any]:
+    def interpolant(self, revolution: float | None = None) -> Callable[[Any], Any]:
         """Return the damping as a function of the arc length [m], a number or an expression.
 
         Args:
-            lap: Length of a closed path, which has no ends.
+            revolution: Length of a closed path, which has no ends; None for an open one.
 
         Raises:
             InputError: If the path is closed, or its length is not known.
         """
-        if lap is not None:
+        if revolution is not None:
             raise InputError("!SlowEnds: the path is closed and has no ends; allowed: open paths")
         if self.length == 0.0:
-            raise InputError("!SlowEnds: length = 0; must be positive where no path tells it")
+            raise InputError("!SlowEnds: length = 0; must be positive without a path")
         least, span, length = self.least, self.most - self.least, self.length
         start_rate, end_rate = self.start_rate, self.end_rate
 
@@ -181,7 +181,7 @@ class SlowEnds(Parameters):
         return value
 
 
-# the first is what one without a tag means
+# the first is the type of an entry without a tag
 Damping = Profile | SlowEnds
 
 
@@ -204,19 +204,19 @@ class CoordinateImpedance:
         masses = self.mass.values or [self.mass.value]
         if not all(0.0 < mass < math.inf for mass in masses):
             raise InputError(f"mass: {masses}; must be positive and finite")
-        # profiles themselves refuse the rest
+        # profiles themselves check the rest
         if isinstance(self.damping, Profile) and not math.isfinite(self.damping.value):
             raise InputError(f"damping: {self.damping.value}; must be finite")
 
 
 @dataclass
 class ImpedanceParameters:
-    """Impedance of all coordinates; those not given are position-controlled.
+    """Impedance of all coordinates; omitted ones are position-controlled.
 
     Attributes:
-        tangential: Tangential of the tangential coordinates.
-        transversal: Transversal of the transversal ones.
-        rotational: Rotational of the angles.
+        tangential: Impedance of the tangential coordinates.
+        transversal: Impedance of the transversal coordinates.
+        rotational: Impedance of the angles.
     """
 
     tangential: CoordinateImpedance = field(default_factory=CoordinateImpedance)
@@ -224,7 +224,7 @@ class ImpedanceParameters:
     rotational: CoordinateImpedance = field(default_factory=CoordinateImpedance)
 
     def on_path(self, length: float) -> "ImpedanceParameters":
-        """Return them with the length of a path [m] where slow ends do not say one."""
+        """Return the parameters with the length of a path [m] for slow ends without a length."""
         kinds = (self.tangential, self.transversal, self.rotational)
         return ImpedanceParameters(*(_on_path(kind, length) for kind in kinds))
 

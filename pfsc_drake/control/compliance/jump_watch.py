@@ -1,4 +1,4 @@
-"""Jumps of a force/torque sensor: steps that its amplifier would not let through."""
+"""Jumps of a force/torque sensor: steps that its amplifier cannot transmit."""
 
 from typing import Any
 
@@ -7,34 +7,34 @@ import numpy as np
 
 from pfsc_drake.blocks.cases import any_of
 
-# of a step: by what the first and the second sample after it may differ from where it led
+# shares of a step by which the first and the second sample after it may differ from its level
 _FLAT = (0.03, 0.11)
 # standard deviations of the noise: of the difference of two samples, and of steps that are judged
 _NOISE, _JUDGED = 6.0 * np.sqrt(2.0), 50.0
-# of a step, the least that must follow in the next sample where it has gone through an amplifier
+# least share of a step that follows in the next sample behind an amplifier
 _LEAST_TAIL = 2.0 * _FLAT[0]
 _SAMPLES = 3
 
 
 class JumpWatch:
-    """Finds loads on a sensor that jump as no force does.
+    """Detects steps of a measured load that no force can cause.
 
-    A force reaches the reading through the amplifier's first-order filter. If it steps, by
-    whatever size, the next sample still changes by ``exp(-2 pi bandwidth period)`` of the first
-    step, and the force of an impact falls off again. A load that changes by more than
-    ``smallest`` within one sample and then stays where it is, by 3 % of the step in the first
-    sample and by 11 % in the second, is the sensor's, not the environment's; it is found in the
-    second. Steps below 50 standard deviations of the noise are not judged; none is of a
-    sensor whose bandwidth is beyond 0.45 of the sampling rate, since it lets steps through.
+    A force reaches the reading through the amplifier's first-order filter. After a step of any
+    size, the next sample still changes by ``exp(-2 pi bandwidth period)`` of the first change, and
+    the force of an impact decreases again. A load that changes by more than ``smallest`` within one
+    sample and then stays constant, within 3 % of the step in the first sample and 11 % in the
+    second, is a fault of the sensor; it is detected in the second sample. Steps below 50 standard
+    deviations of the noise are ignored, and so are all steps of a sensor whose bandwidth is above
+    0.45 of the sampling rate, which transmits steps.
 
     Args:
-        smallest: Steps that are judged, shape (6,) [N, Nm]; infinite for none.
+        smallest: Smallest steps that are detected, shape (6,) [N, Nm]; infinite for none.
         noise: Standard deviation of a sample, shape (6,) [N, Nm].
-        bandwidth: That of the amplifier [Hz].
+        bandwidth: Bandwidth of the amplifier [Hz].
         period: Sampling time [s].
 
     Attributes:
-        size: Number of values that are remembered.
+        size: Size of the memory.
     """
 
     size = 6 * _SAMPLES
@@ -52,9 +52,9 @@ class JumpWatch:
         """Return whether the load has jumped two samples ago, and the next memory.
 
         Args:
-            load: Load on the sensor beside the tool's own, shape (6,) [N, Nm].
-            memory: The three loads before, the last one first, shape (18,).
-            at_range: Whether each reading is at the end of its range, where it stays, shape (6,).
+            load: Load on the sensor less the tool's load, shape (6,) [N, Nm].
+            memory: The three previous loads, the last one first, shape (18,).
+            at_range: Whether each reading is saturated, shape (6,).
         """
         after, there, before = ca.vertsplit(memory, 6)
         size = ca.fabs(there - before)

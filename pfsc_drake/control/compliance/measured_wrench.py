@@ -1,4 +1,4 @@
-"""A measured wrench: its bias, components that stand still, when it is lost, a payload on it."""
+"""A measured wrench: bias, frozen components, loss of the sensor, compensation of a payload."""
 
 from enum import IntEnum
 from types import MappingProxyType
@@ -10,30 +10,29 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, all_of, any_of, is_finite, where
 
-# s, over whose means a sensor is judged to be quiet
+# s, length of blocks whose means decide whether a sensor is quiet
 TARING_BLOCK = 0.01
 
 
 class Taring:
-    """The sensor's bias as the mean of a quiet stretch of residuals.
+    """Taring: bias of a sensor as the mean of residuals over a quiet window.
 
-    Quiet is judged by means over blocks of samples. Noise does not matter then, and neither do the
-    strokes of drives that creep against their friction: an arm that holds a load which nobody
-    told it of does so for seconds, at rest but for the last increments of its encoders, and what
-    the tool's inertia is believed to do at every one of them is a spike of a sample or two. What
-    pushes or moves the tool lasts longer than a block. The first block is judged, but does not
-    count for the bias: what came before it, a start for instance, may still fade in it.
+    The window is quiet if means over blocks of samples hardly differ. Thus noise has no influence,
+    nor has stick-slip motion of the drives: an arm with an unmodelled load creeps for seconds by
+    single increments of its encoders, and the compensation of the tool's inertia causes a spike of
+    one or two samples at each of them. Forces on the tool and its motion last longer than a block.
+    The first block must agree with the others, but does not contribute to the bias, because
+    transients, e.g. of the start, may still decay in it.
 
-    What is remembered of a stretch (:attr:`states`) is the number of its samples, their sum, the
-    lowest and the highest mean of a block, and the sum of the block that is not full; all zero is
-    the empty one. It starts anew, with the last block, whenever the means differ too much, so that
-    taring goes on until it is quiet.
+    The states of a window (:attr:`states`) are the number of its samples, their sum, the lowest and
+    the highest mean of a block, and the sum of the incomplete block; all are zero for an empty
+    window. Whenever the means differ too much, the window restarts with the last block.
 
     Args:
-        samples: Number of samples in a stretch.
+        samples: Number of samples in a window.
         largest_spread: Largest difference of means in it, shape (6,) [N, Nm].
-        largest_bias: Largest mean that is believed, shape (6,) [N, Nm].
-        block: Number of samples in a block; a stretch is made of whole ones.
+        largest_bias: Largest plausible bias, shape (6,) [N, Nm].
+        block: Number of samples in a block; a window consists of whole blocks.
     """
 
     states: ClassVar = MappingProxyType(
@@ -59,11 +58,11 @@ class Taring:
         self._largest_spread = ca.DM(np.asarray(largest_spread, dtype=float))
         self._largest_bias = ca.DM(np.asarray(largest_bias, dtype=float))
 
-    def extended(self, x: Values, residual: Any) -> Values:
-        """Return a stretch with one more residual; only its last block if that differs.
+    def extend(self, x: Values, residual: Any) -> Values:
+        """Return the window with one more residual; only its last block if that differs.
 
         Args:
-            x: The stretch.
+            x: The window.
             residual: Shape (6,) [N, Nm].
         """
         count, block = x.taring_count + 1.0, x.taring_block + residual
@@ -83,29 +82,28 @@ class Taring:
         )
 
     def bias(self, x: Values) -> tuple[Any, Any, Any]:
-        """Return the bias, whether the stretch is long enough, and whether it is believed.
+        """Return the bias, whether the window is long enough, and whether the bias is plausible.
 
         Args:
-            x: The stretch.
+            x: The window.
 
         Returns:
-            The mean, shape (6,) [N, Nm], and two conditions, shape (1,): where the first does not
-            hold, the others mean nothing; where the second does not, the stretch is to be thrown
-            away.
+            The mean, shape (6,) [N, Nm], and two conditions, shape (1,): if the first is false, the
+            other results are meaningless; if the second is false, the window must be discarded.
         """
         mean = x.taring_sum / (x.taring_count - self._only_judged)
-        is_believed = all_of(ca.fabs(mean) <= self._largest_bias)
-        return mean, x.taring_count >= self._samples, is_believed
+        is_plausible = all_of(ca.fabs(mean) <= self._largest_bias)
+        return mean, x.taring_count >= self._samples, is_plausible
 
 
-# s, for which a component has to move first, and to stand still then
+# s, for which a component has to change first, and to be constant then
 STILL_TIME = 0.05
-# other components that must move, and samples within which they must have changed
+# other components that must change, and samples within which they must have changed
 _OTHERS, _LATELY = 3, 3
 
 
 def memory_size(size: int) -> int:
-    """Return the number of values that are remembered of a measurement of as many components."""
+    """Return the size of the memory of :func:`stands_still` for a number of components."""
     return 3 * size
 
 
@@ -117,23 +115,24 @@ def stands_still(
     noisy: np.ndarray,
     robot_moves: ca.SX,
 ) -> tuple[ca.SX, ca.SX]:
-    """Return whether components of a sensor stand still that should not.
+    """Return whether components of a sensor are frozen.
 
-    One stands still when it has been the same, to the last bit, for so many samples. With noise
-    larger than its steps none ever does, so the sensor is broken if more than three do that have
-    some. One is enough if at least three others changed within the last three samples; there only
-    components count that changed at each of as many samples in a row before. What is constant
-    anyway, as without noise, never did; and a sensor at rest with coarse steps repeats its values,
-    too, but in all components. All of those that count, if they are more than three, must not do so
-    while the robot moves, whatever their noise.
+    A component is constant if its value is the same, to the last bit, for ``samples`` samples. A
+    component with noise larger than its resolution is never constant; the sensor has failed if more
+    than three of them are. One constant component is sufficient if at least three others changed
+    within the last three samples. Here only components are considered that changed at ``samples``
+    consecutive samples before: components without noise never did, and a sensor at rest with a
+    coarse resolution repeats its values, too, but in all components. Independent of noise, the
+    sensor has failed if all considered components, more than three, are constant while the robot
+    moves.
 
     Args:
         measured: The measurement, shape (n,).
-        memory: ``[last measurement, samples for which it stayed, samples at which it changed]``
-            of each component, shape (3n,); zero before the first.
-        at_range: Whether each is at the end of its range, where it stays, shape (n,).
+        memory: ``[last measurement, samples for which it was constant, samples at which it
+            changed]`` of each component, shape (3n,); zero before the first.
+        at_range: Whether each is saturated, shape (n,).
         samples: Number of samples.
-        noisy: Whether each is believed to have noise larger than its steps, shape (n,).
+        noisy: Whether each has noise larger than its resolution, shape (n,).
         robot_moves: Whether the robot moves.
 
     Returns:
@@ -143,7 +142,7 @@ def stands_still(
     same = ca.logic_and(measured == last, ca.logic_not(at_range))
     counts = changed >= samples
     stayed = ca.if_else(same, stayed + 1.0, 0.0)
-    # once it counts it goes on to
+    # once it is considered it remains so
     changed = ca.if_else(counts, changed, ca.if_else(same, 0.0, changed + 1.0))
     moving = ca.logic_and(counts, stayed < _LATELY)
     still = ca.logic_and(counts, stayed >= samples)
@@ -155,23 +154,23 @@ def stands_still(
 
 
 class SensorFault(IntEnum):
-    """Why a compensated wrench is not to be trusted."""
+    """Fault of a measured wrench."""
 
     NONE = 0
-    LOST = 1  # no finite number, or a component that stands still
+    LOST = 1  # NaN or infinite, or a frozen component
     SATURATED = 2
-    JUMPED = 3  # by a step that no force makes
+    JUMPED = 3  # a step that no force can cause
 
 
 class MeasuredWrench(Block):
-    """A measured wrench, the load of the tool taken off already, with what stops the robot.
+    """A measured wrench, already without the load of the tool, with its fault.
 
     Ports:
         wrench (input): ``[force, torque]`` on the tool at the tool point, world axes, shape (6,)
             [N, Nm].
-        measured (output): The same.
-        sensor_fault (output): A :class:`SensorFault`, shape (1,): ``LOST`` where a component is no
-            finite number.
+        measured (output): The input.
+        sensor_fault (output): A :class:`SensorFault`, shape (1,): ``LOST`` if a component is NaN or
+            infinite.
         tared (output): 1, shape (1,).
     """
 
@@ -186,28 +185,30 @@ class MeasuredWrench(Block):
 
 
 class PayloadCompensation(Block):
-    """Takes the weight of a payload off a wrench while it is held.
+    """Subtracts the weight of a grasped payload from a wrench.
 
-    ``f - h m g`` and ``tau - h (R_e p_TC) x m g``, h being the share of the payload that hangs on
-    the gripper. What hung there while the sensor was tared is part of its bias, and h counts from
-    there; that is right as long as the tool keeps its orientation, or nothing was held.
+    ``f - h m g`` and ``tau - h (R_e p_TC) x m g`` with the share h of the payload that hangs on the
+    gripper. A payload that was grasped while the sensor was tared is part of its bias, and h is
+    relative to that share; this is exact if the tool keeps its orientation, or if nothing was
+    grasped.
 
     Ports:
         wrench (input): At the tool point, world axes, shape (6,) [N, Nm], see
             :class:`ToolCompensation`.
-        tool_pose (input): ``[y_t, R_e by rows]`` as measured, shape (12,).
-        held (input): Share that is held, 0 to 1, shape (1,).
+        tool_pose (input): Measured ``[y_t, R_e by rows]``, shape (12,).
+        held (input): Grasped share of the payload, 0 to 1, shape (1,).
         tared (input): Above 0.5 once the sensor is tared, shape (1,).
         sensor_fault (input): A :class:`SensorFault`, shape (1,).
         payload_free (output): The wrench without the payload, shape (6,) [N, Nm].
-        fault (output): The sensor's, which is lost too where the share is no number, shape (1,).
+        fault (output): Fault of the sensor; ``LOST`` also if the share is NaN or infinite, shape
+            (1,).
 
     State:
-        Share that was held when the sensor was tared (``at_taring``).
+        Grasped share when the sensor was tared (``at_taring``).
 
     Args:
-        mass: m, as believed [kg].
-        p_TC: Its centre of mass in the tool's frame, as believed [m], shape (3,).
+        mass: m, nominal [kg].
+        p_TC: Nominal centre of mass of the payload in the tool's frame [m], shape (3,).
         gravity: g, world axes [m/s^2], shape (3,).
     """
 
@@ -233,5 +234,5 @@ class PayloadCompensation(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         return {"at_taring": where(u.tared < 0.5, u.held, x.at_taring)}

@@ -1,4 +1,4 @@
-"""Compliance of joints beyond the number of outputs: a posture that yields and comes back."""
+"""Null-space compliance of redundant joints: a compliant posture reference."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,8 +25,8 @@ class NullSpaceImpedanceParameters(Parameters):
     Attributes:
         inertia: ``m`` [kg m^2 or kg], positive.
         damping: ``d`` [Nm s/rad or N s/m], positive.
-        stiffness: ``k`` [Nm/rad or N/m]; zero for a posture that stays where it is left.
-        filter_rate: ``w`` of the filter that makes the posture smooth [rad/s].
+        stiffness: ``k`` [Nm/rad or N/m]; zero for a posture that does not return.
+        filter_rate: ``w`` of the filter that smooths the posture [rad/s].
     """
 
     inertia: Positive = 1.0
@@ -37,21 +37,21 @@ class NullSpaceImpedanceParameters(Parameters):
 
 @dataclass
 class NullSpaceImpedance:
-    """Posture reference ``q_0`` that yields to joint torques, for every joint alike.
+    """Compliant posture reference ``q_0``, with the same impedance for every joint.
 
     It obeys ``(m s^2 + d s + k) (s / w + 1)^(r - 1) q_0 = u + k q_goal``.
 
     The torque u is the part of the joints' external torques that does no work on the outputs,
-    ``N' tau`` (:func:`~pfsc_drake.control.law.decoupling.free_torque`), so that what presses on
-    the tool along its outputs does not bend the posture. The filter of order r - 1 makes q_0
-    continuous up to its r-th derivative, which a law of relative degree r follows exactly.
-    Torques are held over a sampling interval, over which the equation is solved exactly.
+    ``N' tau`` (:func:`~pfsc_drake.control.law.decoupling.free_torque`), so that forces on the tool
+    along its outputs do not change the posture. The filter of order r - 1 makes q_0 continuous up
+    to its r-th derivative, which a law of relative degree r follows exactly. Torques are constant
+    over a sampling interval, over which the equation is solved exactly.
 
-    The motion is the derivatives 0..r of q_0 by rows, shape ((r + 1) N,).
+    The motion consists of the derivatives 0..r of q_0 by rows, shape ((r + 1) N,).
 
     Attributes:
         parameters: The impedance.
-        relative_degree: ``r`` of the law that follows, 1 to 4.
+        relative_degree: ``r`` of the law that follows the posture, 1 to 4.
         period: Sampling time [s].
     """
 
@@ -86,8 +86,8 @@ class NullSpaceImpedance:
         """Return the motion one period later as an expression, shape ((r + 1) N,).
 
         Args:
-            motion: Derivatives of the posture under way, as the class says.
-            torque: u, shape (N,) [Nm or N]; zero instead unless all of it is finite.
+            motion: Derivatives of the posture, see the class.
+            torque: u, shape (N,) [Nm or N]; replaced by zero unless all entries are finite.
             goal: ``q_goal``, shape (N,).
         """
         force = self.parameters.stiffness * goal + where(all_finite(torque), torque, 0.0)
@@ -95,41 +95,40 @@ class NullSpaceImpedance:
         return ca.vec(derivatives @ self._transition.T + force @ self._response.T)
 
 
-# of a joint's velocity limit, up to which a posture is pulled
+# share of a joint's velocity limit, the largest speed of a posture under its pull
 _LARGEST_SPEED = 0.5
 
 
-class YieldingPosture(Block):
+class CompliantPosture(Block):
     """A :class:`NullSpaceImpedance` under external torques and the pull of a potential.
 
-    With ``N'`` the projection on what leaves the outputs alone, the posture ``q_0`` is driven by
-    ``u = N' (tau_ext + pull_stiffness (-dV/dq))``.
+    With the null-space projection ``N'``, which does not affect the outputs, the posture ``q_0`` is
+    driven by ``u = N' (tau_ext + pull_stiffness (-dV/dq))``.
 
-    What pulls, spring or potential, is scaled down as a whole where the damper alone would let
-    it move a joint faster than half its velocity limit: far from its goal a posture must not
-    take away what the drives need for the outputs.
+    The pull of spring and potential is scaled down as a whole where it would move a joint, against
+    the damper alone, faster than half its velocity limit: far from its goal a posture must not use
+    the speed that the drives need for the outputs.
 
-    It starts at rest where the joints are, and goes smoothly to its goal. Of torques, joints and
-    a manifold's point that are not all finite nothing drives it but the spring.
+    The posture starts at rest at the present joint positions, and moves smoothly to its goal. If
+    torques, joint state or manifold point contain NaN or infinite values, only the spring acts.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        manifold_point (input): Where on the manifold the tool is.
-        tau_ext (input, optional): External torques that the posture yields to, shape (N,)
-            [Nm or N].
+        manifold_point (input): Projection of the tool onto the manifold.
+        tau_ext (input, optional): External torques that move the posture, shape (N,) [Nm or N].
         posture_reference (output): Derivatives 0..r of ``q_0`` by rows, shape ((r + 1) N,).
 
     State:
-        motion: The output. goal: Where the spring pulls, shape (N,).
+        motion: The output. goal: Rest position of the spring, shape (N,).
 
     Args:
         robot: The robot, N joints.
-        manifold: What it follows.
-        posture: How the law follows the posture; its weight decides the projection.
-        impedance: How the posture moves.
+        manifold: Manifold that the robot follows.
+        posture: Posture control of the law; its weight determines the projection.
+        impedance: Impedance of the posture.
         potential: ``V``, one of ``POTENTIALS``, or empty for none.
-        pull_stiffness: Pull stiffness of the potential [Nm/rad or N/m], not negative.
-        goal: Where the posture goes, shape (N,) [rad or m]; None for where it starts.
+        pull_stiffness: Stiffness of the potential [Nm/rad or N/m], not negative.
+        goal: Goal of the posture, shape (N,) [rad or m]; None for the start posture.
 
     Raises:
         InputError: If the potential is unknown, or its stiffness negative.
@@ -166,7 +165,7 @@ class YieldingPosture(Block):
         self.states = {"motion": size, "goal": n}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         q = u.joint_state[: self._n]
         goal = q if self._goal is None else ca.DM(self._goal)
         return {"motion": self._impedance.start(q), "goal": goal}
@@ -176,7 +175,7 @@ class YieldingPosture(Block):
         return {"posture_reference": x.motion}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         q_0 = x.motion[: self._n]
         free, pull = 0.0, self._impedance.parameters.stiffness * (x.goal - q_0)
         if u.tau_ext is not None or self._pulls:
@@ -194,8 +193,8 @@ def _free_torques_function(
 ) -> ca.Function:
     """Return ``(q, manifold_point, torque) -> (free, pulled)``, the last three (N,).
 
-    They are the parts of external torques and pull that do no work on the outputs; zero if
-    something is not finite.
+    These are the parts of external torques and pull that do no work on the outputs; zero if an
+    input is NaN or infinite.
     """
     q, torque = ca.SX.sym("q", robot.dimension), ca.SX.sym("torque", robot.dimension)
     point = ca.SX.sym("manifold_point", manifold.layout.size)

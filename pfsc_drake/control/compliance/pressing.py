@@ -1,4 +1,4 @@
-"""A force with which a tool is to press on a surface, added to what a filter yields to."""
+"""Contact force reference of a tool on a surface, added to the input of an impedance filter."""
 
 import math
 from collections.abc import Callable
@@ -13,40 +13,39 @@ from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.errors import require
 from pfsc_drake.yaml.rules import Parameters, Range
 
-# of the largest reference, by which the force may differ from it
+# default of the allowed difference, as a multiple of the largest reference
 _ALLOWED = 1.5
 
 
 @dataclass
 class PressParameters(Parameters):
-    """Force reference of the transversal coordinate, in place of a place.
+    """Force reference of the transversal coordinate, instead of a position reference.
 
     With the impedance ``m xi'' + d xi' = tau_perp + f`` and no stiffness the tool moves at
-    ``|f| / d`` until the workpiece bears it, and then presses with ``|f|``: on the way to the
-    workpiece with little, to be slow without much damping, which would turn a slope of the
-    workpiece into a force; from touch-down with all of it; in the end the other way, off the
-    workpiece. A force that went on would carry the tool away for ever, and so would what is left
-    of the sensor's bias: the last part of the way off is led by a spring, which holds the tool
-    there.
+    ``|f| / d`` until it touches the workpiece, and then presses with ``|f|``. The approach uses a
+    small force, because a large damping would turn a slope of the workpiece into a force; after
+    touch-down the full force acts; finally the force is reversed and the tool retreats. A constant
+    force or a residual bias of the sensor would move the tool away without bound. Hence a spring
+    controls the last part of the retreat and holds the tool at the clearance.
 
     Attributes:
-        force: With which it presses against the normal [N].
-        approach: The same until touch-down [N].
-        retreat: With which it is taken off along the normal [N], a positive number.
-        clearance: How far it is taken off from where it pressed [m], a positive number.
-        begin: When it sets off [s].
-        touching: From which measured force on the tool is on the workpiece [N]; the approach
-            must reach it.
-        retreat_time: How long before the end of the reference it is taken off [s].
+        force: Contact force against the normal [N].
+        approach: Force until touch-down [N].
+        retreat: Force of the retreat along the normal [N], a positive number.
+        clearance: Distance of the retreat from the point of contact [m], a positive number.
+        begin: Start of the approach [s].
+        touching: Measured force from which on the tool is in contact [N]; the approach must exceed
+            it.
+        retreat_time: Time between the retreat and the end of the reference [s].
         ramp: Time of every change, which is C^4 [s].
-        limit: By how much the measured force may differ from its reference, either way, before
-            that is a fault [N]; 0 for one and a half times the largest reference. While the tool
-            moves free it differs by the reference itself.
+        limit: Largest difference of the measured force from its reference, of either sign, before
+            a fault [N]; 0 for one and a half times the largest reference. While the tool moves
+            freely the difference is the reference itself.
     """
 
     force: Annotated[float, Range(0.0, 1e6, "N")] = 20.0
     approach: Annotated[float, Range(0.0, 1e6, "N")] = 6.0
-    # without it nothing would hold the tool once it does not press any more
+    # without it no force would act on the tool after contact
     retreat: Annotated[float, Range(0.0, 1e6, "N", open=True)] = 6.0
     clearance: Annotated[float, Range(0.0, 1e3, "m", open=True)] = 0.01
     begin: Annotated[float, Range(0.0, 1e6, "s")] = 0.1
@@ -72,31 +71,30 @@ class PressParameters(Parameters):
 
     @property
     def allowed_difference(self) -> float:
-        """By how much the measured force may differ from its reference [N]."""
+        """Largest allowed difference of the measured force from its reference [N]."""
         return self.limit or _ALLOWED * self._largest
 
-    def taken_off(self, end: float) -> float:
-        """Return from when on the tool is taken off [s].
+    def retreat_begin(self, end: float) -> float:
+        """Return the time at which the retreat begins [s].
 
         Args:
-            end: When the reference ends [s].
+            end: End of the reference [s].
         """
         return end - self.retreat_time
 
     def over_time(self, end: float, stiffest: float) -> Callable[[Any, Any, Any], Any]:
-        """Return the force along the inward normal that the workpiece is to bear.
+        """Return the force on the workpiece along the inward normal over time.
 
         Args:
-            end: When the reference ends [s].
-            stiffest: Stiffness up to which the tool does not swing, ``d^2 / (4 m)`` [N/m]; that of
-                the spring in the end is half the clearance's for ``retreat``, or this if less.
+            end: End of the reference [s].
+            stiffest: Largest stiffness without oscillation, ``d^2 / (4 m)`` [N/m]; the stiffness of
+                the spring of the retreat is ``2 retreat / clearance``, at most this value.
 
         Returns:
-            Function of the time, of the time of touch-down, infinite before it, and of how far the
-            tool is from where it was when it began to be taken off, [s], [s], [m] -> [N]; of
-            numbers or expressions.
+            Function of the time, of the time of touch-down, infinite before it, and of the distance
+            since the begin of the retreat, [s], [s], [m] -> [N]; of numbers or expressions.
         """
-        rest, off = Transition(self.ramp, 0), self.taken_off(end)
+        rest, off = Transition(self.ramp, 0), self.retreat_begin(end)
         stiffness = min(2.0 * self.retreat / self.clearance, stiffest)
 
         def change(time: Any, begin: Any) -> Any:
@@ -116,39 +114,38 @@ class PressParameters(Parameters):
 class Pressing(Block):
     """Adds a force over time to one of the forces along the virtual output.
 
-    It remembers when the tool first met the workpiece: the first tick at which the force along the
-    coordinate is measured, tared, and at least ``touching``. From ``off`` on it tells the force how
-    far the tool, as it is led, has gone from where it was then.
+    The block stores the time of touch-down: the first tick at which the sensor is tared and the
+    measured force along the coordinate is at least ``touching``. From the time ``off`` on the force
+    depends on the distance that the reference has travelled since then.
 
-    It watches the force, too: a loop that bounces, a sensor that is late or whose bias jumps, and
-    a workpiece that is not where it was taught show in the difference of what is measured and
-    what is asked for.
+    The block also monitors the difference of measured force and reference. It is large if the
+    loop bounces, if the sensor is delayed or its bias jumps, or if the workpiece is not at its
+    taught position.
 
     Ports:
         manifold_force (input): Forces along the coordinates, shape (m,) [N, Nm].
-        reference (input): Where the filter leads the coordinates, derivatives by rows, shape
+        reference (input): Compliant reference of the filter, derivatives by rows, shape
             (reference_size,) [m, rad].
-        ready (input): Whether these are to be trusted, shape (1,): 1 once the sensor is tared.
-        press (output): The force with which the tool is to press against the coordinate,
-            shape (1,) [N].
+        ready (input): Whether the forces are valid, shape (1,): 1 once the sensor is tared.
+        press (output): Reference of the contact force against the coordinate, shape (1,) [N].
         pressed_force (output): The input less ``press`` in its coordinate, shape (m,).
-        lost (output): Whether that is more than is allowed, either way, 1 or 0, shape (1,); 0 until
-            the forces are to be trusted.
+        lost (output): Whether the difference exceeds its limit, 1 or 0, shape (1,); 0 until the
+            forces are valid.
 
     Args:
-        press: Force over time and time of touch-down [s], which is infinite before, and over the
-            way since ``off`` [m], which is zero before -> [N].
+        press: Force as a function of time, time of touch-down [s], infinite before, and distance
+            since ``off`` [m], zero before -> [N].
         touching: Force of touch-down [N].
-        coordinate: Which coordinate it acts along.
+        coordinate: Index of its coordinate.
         num_outputs: m.
-        reference_size: Reference size of the port.
-        period: Between looks at the force [s].
-        allowed: Difference of measured force and reference that is allowed [N].
-        off: From when on the way counts [s].
+        reference_size: Size of the port ``reference``.
+        period: Sampling time [s].
+        allowed: Largest difference of measured force and reference [N].
+        off: Begin of the retreat [s].
 
     State:
-        Time of touch-down (``touch_down``) [s] and place at ``off`` (``place``) [m], both infinite
-        before.
+        Time of touch-down (``touch_down``) [s] and position at ``off`` (``lift_off``) [m], both
+        infinite before.
     """
 
     def __init__(
@@ -174,16 +171,16 @@ class Pressing(Block):
             "pressed_force": Port(num_outputs, "N, Nm"),
             "lost": Port(1),
         }
-        self.states = {"touch_down": 1, "place": 1}
+        self.states = {"touch_down": 1, "lift_off": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
-        return {"touch_down": ca.DM.inf(), "place": ca.DM.inf()}
+        """Return the initial states; omitted ones are zero."""
+        return {"touch_down": ca.DM.inf(), "lift_off": ca.DM.inf()}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        place = u.reference[self._coordinate]
-        lifted = where(x.place < ca.inf, place - x.place, 0.0)
+        position = u.reference[self._coordinate]
+        lifted = where(x.lift_off < ca.inf, position - x.lift_off, 0.0)
         press = self._press(t * self._period, x.touch_down, lifted)
         along = ca.DM.zeros(u.manifold_force.numel())
         along[self._coordinate] = 1.0
@@ -192,11 +189,11 @@ class Pressing(Block):
         return {"press": press, "pressed_force": u.manifold_force - along * press, "lost": lost}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         time, met = t * self._period, u.manifold_force[self._coordinate] >= self._touching
         touches = all_of(met, u.ready > 0.5, x.touch_down == ca.inf)
-        lifts = ca.logic_and(time >= self._off, x.place == ca.inf)
+        lifts = ca.logic_and(time >= self._off, x.lift_off == ca.inf)
         return {
             "touch_down": where(touches, time, x.touch_down),
-            "place": where(lifts, u.reference[self._coordinate], x.place),
+            "lift_off": where(lifts, u.reference[self._coordinate], x.lift_off),
         }

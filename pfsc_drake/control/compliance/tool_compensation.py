@@ -1,4 +1,4 @@
-"""A tool's weight and inertia taken off a force/torque measurement; what a sensor stops for."""
+"""Compensation of a tool's weight and inertia in a force/torque measurement, and alarms."""
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any
@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, latched, where
+from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, latch, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.compliance.jump_watch import JumpWatch
 from pfsc_drake.control.compliance.measured_wrench import (
@@ -27,7 +27,7 @@ from pfsc_drake.yaml.fields import equal
 from pfsc_drake.yaml.rules import NotNegative, Numbers, OneOf, Parameters, Positive, Range
 
 _INERTIA = ("none", "differentiated", "given")
-# rad/s or m/s, of a joint, with which no load on a sensor stays the same
+# rad/s or m/s; above this joint speed the load on a sensor is never constant
 _MOVING = 1e-2
 
 _Limits = Annotated[np.ndarray, Numbers(6, Range(0.0, open=True, infinite=True))]
@@ -35,24 +35,24 @@ _Limits = Annotated[np.ndarray, Numbers(6, Range(0.0, open=True, infinite=True))
 
 @dataclass
 class ToolCompensationParameters(Parameters):
-    """How the tool's load is taken off a measurement.
+    """Compensation of the tool's load in a measurement.
 
     Attributes:
         inertia: ``differentiated``: inertial load from filtered differences of the joint
-            velocities; ``given``: from accelerations that another component knows;
+            velocities; ``given``: from accelerations of another component;
             ``none``: only the weight.
-        bandwidth: Bandwidth of the filter for the joints' motion [Hz]; that of the sensor.
+        bandwidth: Bandwidth of the filter for the joints' motion [Hz]; equal to the sensor's.
         taring_time: Length of the window whose mean becomes the bias [s].
         taring_spread: Largest difference of means over 10 ms within the window, shape (6,)
             [N, Nm].
-        taring_bias: Largest bias that is believed, shape (6,) [N, Nm]; a hand that rests
-            on the tool, or another tool, must not become a bias.
-        force_dead_band: [N].
-        torque_dead_band: [Nm].
-        noise: Standard deviation of a sample as it is believed, shape (6,) [N, Nm]: a sensor that
-            has some and repeats itself to the last bit is lost. 0 where steps are larger.
-        jump: Steps within one sample that are judged, shape (6,) [N, Nm]: a larger one that stays
-            is a fault of the sensor, see
+        taring_bias: Largest plausible bias, shape (6,) [N, Nm]; a hand that rests on the tool, or
+            another tool, must not become a bias.
+        force_dead_band: Dead band of forces [N].
+        torque_dead_band: Dead band of torques [Nm].
+        noise: Nominal standard deviation of a sample, shape (6,) [N, Nm]: a sensor with noise whose
+            samples are equal to the last bit is lost. 0 if the resolution is coarser.
+        jump: Largest steps within one sample, shape (6,) [N, Nm]: a larger permanent step is a
+            fault of the sensor, see
             :class:`~pfsc_drake.control.compliance.jump_watch.JumpWatch`. ``.inf`` for none.
     """
 
@@ -87,7 +87,7 @@ def compensation_function(
 
     ``r = measured - predicted``; with ``[f, tau] = r - bias`` the external wrench is
     ``R_WS f`` and ``R_WS (tau - p_ST x f)``, both shortened by a dead band. The motion goes
-    through the low-pass, so that load and measurement are of the same age.
+    through the low-pass, so that load and measurement have the same delay.
 
     Args:
         robot: The robot.
@@ -99,15 +99,15 @@ def compensation_function(
     Returns:
         ``(motion, state, known, measured, bias) -> (wrench at the tool point in W, residual
         r in S, next state)``. ``motion`` is ``[q, v]``, shape (2N,), with given inertia
-        ``[q, v, a]``; ``state`` that of the filter, which rests on the motion if not
-        ``known``: as long as ``motion``, and N longer for rigid joints with
+        ``[q, v, a]``; ``state`` is the state of the filter, which rests on the motion if not
+        ``known``: of the size of ``motion``, and N larger for rigid joints with
         differentiated inertia.
     """
     n = robot.dimension
     size = 3 * n if inertia == "given" else 2 * n
     differentiated = inertia == "differentiated"
-    # rigid joints accelerate in steps, as the drives are held, and their acceleration is the
-    # difference of the velocity over the last interval; the trapezoidal rule would ring
+    # rigid joints accelerate in steps, as drive torques are sampled, and their acceleration is the
+    # difference of the velocity over the last interval; the trapezoidal rule would oscillate
     stepwise = differentiated and not robot.is_elastic
     memory = ca.SX.sym("state", size + n * stepwise)
     motion, known = ca.SX.sym("motion", size), ca.SX.sym("known")
@@ -141,24 +141,23 @@ def compensation_function(
 
 
 class ToolCompensation(Block):
-    """Estimates what the environment applies to the tool.
+    """Estimates the external wrench on the tool.
 
-    With the load r = measured - predicted that the tool alone does not explain (see
-    :func:`compensation_function`), the output is ``r - b`` as a wrench at the tool point
-    in world axes: what is applied **to** the robot. The bias b is the mean of r over the
-    first quiet stretch (see :class:`Taring`). Until there is one the output is exactly
-    zero, so that an untared sensor moves nothing; a sensor that saturates or moves is
-    not tared, and taring goes on. A constant force that acts while taring is taken for
-    bias, as with any such sensor.
+    With the residual load r = measured - predicted, which the tool alone does not explain (see
+    :func:`compensation_function`), the output is ``r - b`` as a wrench at the tool point in world
+    axes, applied **to** the robot. The bias b is the mean of r over the first quiet window (see
+    :class:`Taring`). Until then the output is exactly zero, so that an untared sensor moves
+    nothing; taring continues while the sensor is saturated or its reading changes. A constant
+    force during taring is taken for bias, as with any such sensor.
 
     The joints' motion goes through the same filter as the sensor's signal, so that load
-    and measurement are of the same age.
+    and measurement have the same delay.
 
-    A measurement or joint state that is not finite, components of the measurement that stand
-    still while others or the robot move (see :func:`stands_still`), and, once it is tared, a
-    reading that jumps (see :class:`JumpWatch`) make the output zero, and a fault
-    that only a new initialization clears. A saturated sensor is reported while it lasts; its
-    output is the clipped one.
+    A measurement or joint state with NaN or infinite values, components of the measurement that are
+    constant while others or the robot move (see :func:`stands_still`), and, after taring, a reading
+    that jumps (see :class:`JumpWatch`) set the output to zero and cause a fault that only a new
+    initialization clears. Saturation is reported while it lasts; the output is then saturated,
+    too.
 
     Ports:
         measured_wrench (input): ``[force, torque]`` in the sensor frame, shape (6,) [N, Nm].
@@ -166,23 +165,22 @@ class ToolCompensation(Block):
         joint_acceleration (input): ``q_J''``, shape (N,); only with inertia ``given``. It
             must not depend on this block's output in the same tick.
         wrench (output): ``[force, torque]`` at the tool point, world axes, shape (6,) [N, Nm].
-        tared (output): 1 once the bias is known, else 0; no direct feedthrough.
+        tared (output): 1 once the bias is known, otherwise 0; no direct feedthrough.
         fault (output): A :class:`SensorFault`.
         residual (output): r, in the sensor frame, zero while the sensor is lost, shape (6,)
             [N, Nm].
 
     State:
-        The ``bias``, shape (6,); whether it is ``tared``; the ``fault`` that stays, LOST, JUMPED
-        or none;
-        the stretch of taring (``taring_..``); the ``filter`` of the joints' motion, shape (2N,) or
-        (3N,), which rests on the first motion as long as it is not ``known``; what is ``watched``
-        of the measurement, and the ``last`` three r, each of shape (18,).
+        The ``bias``, shape (6,); whether it is ``tared``; the latched ``fault``, LOST, JUMPED or
+        none; the window of taring (``taring_..``); the ``filter`` of the joints' motion, shape
+        (2N,) or (3N,), which rests on the first motion until it is ``known``; the memory
+        of :func:`stands_still` (``watched``), and the ``last`` three r, each of shape (18,).
 
     Args:
         robot: The robot with the tool.
         load: Everything behind the sensor.
         measurement_range: Measurement range of the sensor, shape (6,) [N, Nm].
-        parameters: How to compensate.
+        parameters: Parameters of the compensation.
         period: Sampling time [s].
 
     Raises:
@@ -253,7 +251,7 @@ class ToolCompensation(Block):
             (all_of(jumped, x.tared), SensorFault.JUMPED),
             otherwise=SensorFault.NONE,
         )
-        broken = latched(x.fault, found)
+        broken = latch(x.fault, found)
         good = ca.logic_not(broken)
         return {
             "wrench": where(all_of(good, x.tared), wrench, 0.0),
@@ -270,13 +268,13 @@ class ToolCompensation(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         is_quiet = y.fault == SensorFault.NONE
         broken = all_of(ca.logic_not(is_quiet), y.fault != SensorFault.SATURATED)
-        stretch = self._taring.extended(x, y.residual)
-        bias, is_long, is_believed = self._taring.bias(stretch)
+        stretch = self._taring.extend(x, y.residual)
+        bias, is_long, is_plausible = self._taring.bias(stretch)
         tares = ca.logic_not(ca.logic_or(broken, x.tared))
-        found = all_of(tares, is_quiet, is_long, is_believed)
+        found = all_of(tares, is_quiet, is_long, is_plausible)
         goes_on = ca.logic_and(is_quiet, ca.logic_not(is_long))
         return {
             "bias": where(found, bias, x.bias),
@@ -293,15 +291,15 @@ class ToolCompensation(Block):
 
 
 class Alarms(Block):
-    """Turns what force sensor and compliance tell, and who asks for a stop, into a fault.
+    """Combines alarms of force sensor and compliance and stop requests into a fault.
 
     Ports:
         alarms (input, optional): A
             :class:`~pfsc_drake.control.compliance.tool_compensation.SensorFault`, whether the
-            sensor is tared, before which its range does not matter, an
+            sensor is tared (before taring its saturation is ignored), an
             :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`, and whether the
-            force with which the robot presses is lost, shape (4,).
-        stop_request (input, optional): Nonzero if somebody wants the robot to stop, shape (1,).
+            contact force is lost, shape (4,).
+        stop_request (input, optional): Nonzero to stop the robot, shape (1,).
         fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).
     """
 
@@ -314,13 +312,13 @@ class Alarms(Block):
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        asked = (
+        requested = (
             Fault.NONE
             if u.stop_request is None
             else where(u.stop_request, Fault.STOP_REQUESTED, Fault.NONE)
         )
         if u.alarms is None:
-            return {"fault": ca.DM(asked) if u.stop_request is None else asked}
+            return {"fault": ca.DM(requested) if u.stop_request is None else requested}
         sensor, tared, compliance, press_lost = ca.vertsplit(u.alarms)
         fault = first_of(
             (sensor == SensorFault.LOST, Fault.FORCE_SENSOR_LOST),
@@ -331,6 +329,6 @@ class Alarms(Block):
             (sensor == SensorFault.JUMPED, Fault.FORCE_SENSOR_JUMPED),
             (compliance, Fault.COMPLIANCE_INVALID),
             (press_lost, Fault.PRESS_FORCE_LOST),
-            otherwise=asked,
+            otherwise=requested,
         )
         return {"fault": fault}

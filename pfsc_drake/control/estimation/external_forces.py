@@ -1,4 +1,4 @@
-"""What acts on a robot from outside: joint torques of a wrench on the tool, and back."""
+"""External forces: joint torques of a wrench on the tool, and the inverse."""
 
 from typing import Any
 
@@ -14,25 +14,25 @@ from pfsc_drake.robot.tool_load import dead_band, joint_torque_function
 
 
 class ExternalTorque(Block):
-    """``tau_ext = J_g(q_J)^T wrench + link_torque`` (2.11), with derivatives as a law asks for.
+    """``tau_ext = J_g(q_J)^T wrench + link_torque`` (2.11), with the derivatives that a law needs.
 
-    A law of relative degree r counts on ``tau_ext`` up to the derivative r - 2. A sensor
-    gives none; they are estimated from the samples (:class:`SignalDerivatives`), as if the first
-    had been there for ever. Without an estimator the torque is passed on as it is and its
-    derivatives are zero.
+    A law of relative degree r needs ``tau_ext`` up to the derivative r - 2. A sensor measures no
+    derivatives; they are estimated from the samples (:class:`SignalDerivatives`), as if the first
+    sample had always been present. Without an estimator the torque is passed through unchanged and
+    its derivatives are zero.
 
     Ports:
         wrench (input, optional): ``[force, torque]`` on the tool at the tool point, world axes,
             shape (6,) [N, Nm]; zero if not connected.
-        link_torque (input, optional): What acts elsewhere on the robot means in the joints, shape
-            (N,) [Nm or N]; zero if not connected.
+        link_torque (input, optional): Joint torques of the forces that act elsewhere on the robot,
+            shape (N,) [Nm or N]; zero if not connected.
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         tau_ext (output): Derivatives 0..num_derivatives by rows, shape
             ((num_derivatives + 1) N,) [Nm or N, per s, per s^2].
 
     State:
-        With an estimator what it predicts for this tick (``predicted``), and whether there was a
-        sample (``seen``). A torque that is not finite comes out as it is and leaves both alone.
+        With an estimator its prediction for this tick (``predicted``), and whether there was a
+        sample (``seen``). A NaN or infinite torque passes through and changes neither.
 
     Args:
         robot: The robot.
@@ -73,7 +73,7 @@ class ExternalTorque(Block):
         return {"tau_ext": self._estimator.estimate(predicted, tau)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         if self._estimator is None:
             return {}
         good, predicted = all_finite(y.tau_ext), self._estimator.predict(y.tau_ext)
@@ -87,13 +87,13 @@ _POSITION_ONLY = 3
 
 
 class ToolWrench(Block):
-    """The wrench on the tool that torques in the joints tell of, the inverse of (2.11).
+    """Estimates the wrench on the tool from torques in the joints, the inverse of (2.11).
 
     ``wrench = (J J^T + damping^2 I)^-1 J tau_ext`` of ``tau_ext = J_g^T wrench``: without damping
-    the inverse, or where there are more joints than components the least squares fit; with damping
-    what a singular posture does not tell is taken for zero instead of being blown up. Arms of
-    three joints tell a force, and are taken to bear no torque. Both parts are shortened by a dead
-    band. Values that are not finite come through.
+    the inverse, or with more joints than components the least-squares fit. With damping, components
+    that a singular posture does not determine tend to zero instead of growing without bound. Arms
+    with three joints determine a force only; the torque is assumed to be zero. Both parts are
+    reduced by a dead band. NaN and infinite values pass through.
 
     Ports:
         tau_ext (input): External torques in the joints [Nm or N], shape (N,).
@@ -116,13 +116,13 @@ class ToolWrench(Block):
         n = robot.dimension
         if n != _POSITION_ONLY and n < 6:
             raise InputError(
-                f"forces on the tool from the torques in {n} joints: cannot be told; needs 3 "
+                f"forces on the tool from the torques in {n} joints: not determined; needs 3 "
                 "joints for a force, 6 or more for force and torque"
             )
         for name, value in (("damping", damping), ("dead bands", min(dead_bands))):
             if not 0.0 <= value < np.inf:
                 raise InputError(f"{name} = {value}: must be zero or positive")
-        self._n, self._told = n, 3 if n == _POSITION_ONLY else 6
+        self._n, self._size = n, 3 if n == _POSITION_ONLY else 6
         self._damping, self._dead_bands = damping, dead_bands
         self._fit = self._fit_function(robot)
         self.inputs = {
@@ -143,8 +143,8 @@ class ToolWrench(Block):
     def _fit_function(self, robot: RobotModel) -> ca.Function:
         """Return ``(q, tau_ext) -> wrench`` without dead bands."""
         q, tau, wrench = ca.SX.sym("q", self._n), ca.SX.sym("tau", self._n), ca.SX.sym("wrench", 6)
-        J = ca.jacobian(joint_torque_function(robot)(q, wrench), wrench)[:, : self._told].T
-        square = J @ J.T + self._damping**2 * ca.SX.eye(self._told)
+        J = ca.jacobian(joint_torque_function(robot)(q, wrench), wrench)[:, : self._size].T
+        square = J @ J.T + self._damping**2 * ca.SX.eye(self._size)
         found = ca.ldl_solve(J @ tau, *ca.ldl(square))
-        found = ca.densify(ca.vertcat(found, ca.SX(6 - self._told, 1)))
+        found = ca.densify(ca.vertcat(found, ca.SX(6 - self._size, 1)))
         return ca.Function("tool_wrench", [q, tau], [found])

@@ -59,7 +59,7 @@ class SignalDerivatives:
         )
 
     def start(self, sample: Any) -> Any:
-        """Return the state of a signal that has always been at rest.
+        """Return the state for a signal that has always been at rest.
 
         Args:
             sample: First sample, shape (N,).

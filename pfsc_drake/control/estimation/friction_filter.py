@@ -1,4 +1,4 @@
-"""Joint friction: of known coefficients, and the Kalman filter of App. A that finds them."""
+"""Joint friction: model with known coefficients, and the Kalman filter of App. A."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import kept_if_finite, where
+from pfsc_drake.blocks.cases import hold_if_not_finite, where
 from pfsc_drake.checks import checked_vector
 from pfsc_drake.control.estimation.momentum import MomentumModel
 from pfsc_drake.errors import InputError
@@ -16,8 +16,8 @@ from pfsc_drake.errors import InputError
 def friction_torque(coulomb: Any, viscous: Any, velocity: Any, smoothing: float) -> Any:
     """Return ``tau_f = f_c tanh(v / v_s) + f_v v``, shape (N, 1) [Nm or N].
 
-    That is (2.41) with a smooth step: a torque that jumped with the sign of a measured velocity
-    would rattle drives at rest.
+    This is (2.41) with a smooth step: a torque that jumps with the sign of a measured velocity
+    causes chattering of drives at rest.
 
     Args:
         coulomb: ``f_c``, shape (N, 1) [Nm or N].
@@ -29,17 +29,17 @@ def friction_torque(coulomb: Any, viscous: Any, velocity: Any, smoothing: float)
 
 
 def require_smoothing(smoothing: float) -> None:
-    """Refuse a velocity of smoothing that is not positive.
+    """Require a positive velocity of smoothing.
 
     Raises:
-        InputError: If so.
+        InputError: If it is not positive.
     """
     if not 0.0 < smoothing < np.inf:
         raise InputError(f"smoothing = {smoothing}: must be a positive number")
 
 
 class FrictionModel(Block):
-    """What friction of known coefficients asks of the drives, see :func:`friction_torque`.
+    """Friction model with known coefficients, see :func:`friction_torque`.
 
     Ports:
         velocity (input): v of the drives [rad/s or m/s]; its last N entries if there are more,
@@ -117,30 +117,29 @@ class FrictionKalmanFilter(Block):
 
         p_k = p_{k-1} - s f_c - w f_v + T u,   f_c, f_v constant,   p measured
 
-    With ``intervals: begin``, as printed, velocity and forces are held over the interval:
-    ``s = T sign(v_{k-1})``, ``w = T v_{k-1}``, ``u = tau_{k-1} + f_{k-1}``. They change in it,
-    which leaves f_v off by up to a tenth. With ``mean`` they enter by their means::
+    With ``intervals: begin``, as printed, velocity and forces are constant over the interval:
+    ``s = T sign(v_{k-1})``, ``w = T v_{k-1}``, ``u = tau_{k-1} + f_{k-1}``. Their change within the
+    interval causes an error of f_v of up to a tenth. With ``mean`` they enter by their means::
 
         w = q_k - q_{k-1},  s = T (|v_k| - |v_{k-1}|) / (v_k - v_{k-1}),
         u = tau_{k-1} + (f_k + f_{k-1}) / 2
 
-    (s for a velocity that goes evenly from one value to the other), and an axis at rest, below a
-    velocity, is left alone: a drive that sticks tells nothing about its coefficients. Velocities
-    and positions are those that friction acts on, of the motors. Where velocities are measured
-    with a delay, all is taken that much earlier. After a sample that is not finite the estimate
-    stands still, and the next sample starts a new interval.
+    (s for a velocity that changes linearly), and an axis at rest, below a threshold velocity, is
+    not updated: a drive that sticks contains no information about its coefficients. Velocities and
+    positions are those of the motors, on which friction acts. Where velocities are measured with a
+    delay, all quantities are evaluated at that earlier time. After a NaN or infinite sample the
+    estimate is constant, and the next sample starts a new interval.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        drive_torque (input): What the drives are told until the next tick, within their limits
+        drive_torque (input): Commanded drive torques until the next tick, within their limits
             [Nm or N], shape (N,).
-        known_torque (input, optional): What else is known to act until then, see
+        known_torque (input, optional): Other known torques that act until then, see
             :class:`~pfsc_drake.control.estimation.momentum.MomentumModel`, shape
             (N,); zero if not connected.
-        velocity (input, optional): For which the friction torque is wanted [rad/s or m/s],
-            shape (N,); the motors' measured one if not connected.
-        estimate (output): ``[tau_f, f_c, f_v]``, shape (3N,). What drives the joints may depend
-            on it.
+        velocity (input, optional): Velocity at which the friction torque is evaluated
+            [rad/s or m/s], shape (N,); the motors' measured one if not connected.
+        estimate (output): ``[tau_f, f_c, f_v]``, shape (3N,). The drive torques may depend on it.
         friction_torque (output): ``tau_f`` alone, shape (N,).
 
     State:
@@ -203,7 +202,7 @@ class FrictionKalmanFilter(Block):
         self.inner = {"corrected": 3 * n, "covariance": 6 * n} | sampled
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         zero, one = ca.DM.zeros(self._model.dimension), ca.DM.ones(self._model.dimension)
         P_0 = self._noise.initial
         return {
@@ -217,9 +216,9 @@ class FrictionKalmanFilter(Block):
         n, delay = self._model.dimension, self._model.delay
         q_M, v = ca.vertsplit(u.joint_state, n)[2:]
         q = q_M - delay * v
-        found, P = self._filtered(x, momentum, forces, q, v)
-        wanted = v if u.velocity is None else u.velocity
-        torque = friction_torque(found[1], found[2], wanted, self._smoothing)
+        found, P = self._filter_step(x, momentum, forces, q, v)
+        velocity = v if u.velocity is None else u.velocity
+        torque = friction_torque(found[1], found[2], velocity, self._smoothing)
         return {
             "estimate": ca.vertcat(torque, *found[1:]),
             "friction_torque": torque,
@@ -231,27 +230,27 @@ class FrictionKalmanFilter(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         sampled = {
             "estimate": y.corrected,
             "covariance": y.covariance,
             "position": y.position,
             "velocity": y.velocity,
             "forces": y.forces,
-            "acting": self._model.acting(u.drive_torque, u.known_torque),
+            "acting": self._model.known_torques(u.drive_torque, u.known_torque),
             "acted": x.acting,
         }
-        kept, good = kept_if_finite(sampled, x)
-        return kept | {"seen": good}
+        states, good = hold_if_not_finite(sampled, x)
+        return states | {"seen": good}
 
-    def _filtered(
+    def _filter_step(
         self, x: Values, momentum: Any, forces: Any, q: Any, v: Any
     ) -> tuple[list[Any], list[Any]]:
-        """Return p, f_c, f_v, and the entries of P, after a sample; all axes at once."""
+        """Return p, f_c, f_v, and the entries of P after a sample, for all axes."""
         T, model, noise = self._period, self._model, self._noise
         p, f_c, f_v = ca.vertsplit(x.estimate, model.dimension)
         pp, pc, pv, cc, cv, vv = ca.vertsplit(x.covariance, model.dimension)
-        tau = model.acting_when_measured(x.acting, x.acted, T)
+        tau = model.mean_torque(x.acting, x.acted, T)
         v_0 = x.velocity
         if self._mean:
             turns = v * v_0 < 0.0
@@ -285,7 +284,7 @@ class FrictionKalmanFilter(Block):
             cv - gain[1] * pv_1,
             vv_1 - gain[2] * pv_1,
         ]
-        # nothing is learned from an interval at rest, or whose begin is unknown
+        # no correction in an interval at rest, or whose begin is unknown
         moves = ca.fmin(ca.fabs(v), ca.fabs(v_0)) > self._resting
         learns = ca.logic_and(x.seen > 0.0, moves)
         anew = [momentum, f_c, f_v], [R, 0.0, 0.0, cc, cv, vv]

@@ -1,4 +1,4 @@
-"""How far links may be from where motors and torques say that they are."""
+"""Standard deviations of link positions that are estimated from motors and torques."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -15,20 +15,17 @@ from pfsc_drake.yaml.rules import NotNegative, Parameters, Range
 
 @dataclass
 class StateUncertainty(Parameters):
-    """How well is known by what a controller finds the links' side of elastic joints.
+    """Uncertainty of the data from which the links' side of elastic joints is estimated.
 
-    All are standard deviations. Errors of two joints, and of two kinds, have nothing to do with
-    each other.
+    All are standard deviations. Errors of different joints and of different kinds are uncorrelated.
 
     Attributes:
         stiffness: Stiffness of a joint, as a share of it.
         torque_scale: Relative error of the scale of torque sensors.
-        torque_noise: Noise of a sample of theirs, as a share of the joint's largest torque.
-        friction: Friction that is believed, as a share of it.
-        coulomb: Coulomb friction of which nothing is believed, as a share of the joint's largest
-            torque.
-        viscous: Viscous friction of which nothing is believed, as a share of the largest torque at
-            the largest speed.
+        torque_noise: Noise of a sample of torque sensors, as a share of the joint's largest torque.
+        friction: Modelled friction, as a share of it.
+        coulomb: Unmodelled Coulomb friction, as a share of the joint's largest torque.
+        viscous: Unmodelled viscous friction, as a share of the largest torque at the largest speed.
     """
 
     stiffness: Annotated[float, Range(0.0, 0.5)] = 0.05
@@ -41,15 +38,15 @@ class StateUncertainty(Parameters):
 
 @dataclass(frozen=True)
 class LinkErrors:
-    """Standard deviations of what goes into the links' side of N joints; see the block.
+    """Standard deviations of the data for the links' side of N joints; see the block.
 
     Attributes:
-        noise: What noise leaves of positions and velocities, shape (2, N) [rad, rad/s or m, m/s].
+        noise: Noise of estimated positions and velocities, shape (2, N) [rad, rad/s or m, m/s].
         share: Relative error of a deflection.
-        lag: By how much torques are found later than they act [s].
-        coulomb: Of Coulomb friction while a joint moves, shape (N,) [Nm or N].
-        stuck: Largest friction that may hold a joint at rest, shape (N,) [Nm or N].
-        viscous: Of viscous friction, shape (N,) [Nm s/rad or N s/m].
+        lag: Delay of estimated torques [s].
+        coulomb: Coulomb friction while a joint moves, shape (N,) [Nm or N].
+        stuck: Largest static friction, shape (N,) [Nm or N].
+        viscous: Viscous friction, shape (N,) [Nm s/rad or N s/m].
     """
 
     noise: np.ndarray
@@ -60,39 +57,39 @@ class LinkErrors:
     viscous: np.ndarray
 
     @property
-    def of_sensors(self) -> bool:
+    def has_torque_sensors(self) -> bool:
         """Whether torques are measured, not observed."""
         return self.lag == 0.0
 
 
 class LinkDeviation(Block):
-    """Tells standard deviations of the links' positions and velocities, and of the tool point.
+    """Computes standard deviations of the links' positions and velocities, and of the tool point.
 
-    What :class:`LinkState` finds is off by errors that have nothing to do with each other. With
-    the deflection ``d = q_M - q_J`` of a joint as it was found::
+    The estimate of :class:`LinkState` contains uncorrelated errors. With the estimated deflection
+    ``d = q_M - q_J`` of a joint::
 
         sigma_q^2 = noise^2 + (share d)^2 + (lag d')^2 + (sigma_f / K_s)^2
         sigma_v^2 = noise_v^2 + (share d')^2                 of torques that are measured
         sigma_f^2 = (f_c tanh(v_M / w))^2 + (f_v v_M)^2 + (f_s / cosh^2(v_M / w))^2 / 3
         sigma_y^2 = sum over the joints of (dy/dq_J sigma_q)^2
 
-    ``share`` is that of wrong stiffnesses, of torques that are right, and of wrong scales. Torques
-    that are observed come later by the ``lag``, and what is not known of friction is taken for
-    one: an error of what is believed while a joint moves, and anything up to what may hold it while
-    it rests, evenly, whence the 3. What that does to a velocity comes and goes with reversals, so
-    that of such velocities no deviation is told. An error of known size, as that of the lag, counts
-    like a deviation.
+    With measured torques ``share`` contains the errors of stiffness and of torque scale. Observed
+    torques are delayed by the ``lag``, and unmodelled friction is taken for a torque of the spring:
+    the error of the friction model while a joint moves, and at rest a torque that is uniformly
+    distributed up to the largest static friction, whence the 3. The resulting velocity error varies
+    with reversals; with observed torques there is no velocity deviation. An error of known
+    size, such as the lag, is treated as a deviation.
 
     Ports:
-        joint_state (input): ``[q_J, v_J, q_M, v_M]`` as :class:`LinkState` finds it, shape (4N,).
+        joint_state (input): ``[q_J, v_J, q_M, v_M]`` from :class:`LinkState`, shape (4N,).
         position_deviation (output): sigma_q, shape (N,) [rad or m].
         velocity_deviation (output): sigma_v where torques are measured, shape (N,)
             [rad/s or m/s].
         tool_deviation (output): sigma_y along the axes of the world, shape (3,) [m].
 
     Args:
-        robot: The robot as it is believed, N joints.
-        errors: Standard deviations of what goes into it.
+        robot: Nominal model of the robot, N joints.
+        errors: Standard deviations of its data.
     """
 
     def __init__(self, robot: RobotModel, errors: LinkErrors) -> None:
@@ -103,7 +100,7 @@ class LinkDeviation(Block):
         self._jacobian = _tool_jacobian(robot)
         self.inputs = {"joint_state": Port(4 * n, "rad, rad/s or m, m/s")}
         self.outputs = {"position_deviation": Port(n, "rad or m"), "tool_deviation": Port(3, "m")}
-        if errors.of_sensors:
+        if errors.has_torque_sensors:
             self.outputs["velocity_deviation"] = Port(n, "rad/s or m/s")
         self.states = {}
 
@@ -113,17 +110,17 @@ class LinkDeviation(Block):
         q_J, v_J, q_M, v_M = ca.vertsplit(u.joint_state, self._n)
         noise_q, noise_v = (ca.DM(noise) for noise in errors.noise)
         squares = noise_q**2 + (errors.share * (q_M - q_J)) ** 2
-        if not errors.of_sensors:
+        if not errors.has_torque_sensors:
             slip = ca.tanh(v_M / SMOOTH)
             friction = (ca.DM(errors.coulomb) * slip) ** 2 + (ca.DM(errors.viscous) * v_M) ** 2
-            held = ca.DM(errors.stuck) * (1.0 - slip**2)
+            static_friction = ca.DM(errors.stuck) * (1.0 - slip**2)
             squares += (errors.lag * (v_M - v_J)) ** 2
-            squares += self._compliance**2 * (friction + held**2 / 3.0)
+            squares += self._compliance**2 * (friction + static_friction**2 / 3.0)
         found = {
             "position_deviation": ca.sqrt(squares),
             "tool_deviation": ca.sqrt(self._jacobian(q_J) ** 2 @ squares),
         }
-        if errors.of_sensors:
+        if errors.has_torque_sensors:
             found["velocity_deviation"] = ca.sqrt(noise_v**2 + (errors.share * (v_M - v_J)) ** 2)
         return found
 

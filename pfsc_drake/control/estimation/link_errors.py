@@ -1,4 +1,4 @@
-"""What is wrong with where links are found, from how well is known by what they are found."""
+"""Errors of estimated link positions from the uncertainty of the data."""
 
 from dataclasses import dataclass
 
@@ -15,18 +15,18 @@ from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momen
 from pfsc_drake.control.estimation.robot_state import LinkState
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function, largest_speeds
 
-# ticks after which an observer at rest knows what acted before
-_BEGUN = 3
+# ticks after which an observer at rest has settled
+_SETTLING = 3
 
 
 @dataclass(frozen=True)
 class MotorEncoders:
-    """What encoders of motors do to positions and velocities.
+    """Encoder model of the motors: errors of positions and velocities.
 
     Attributes:
         step: Smallest step of a position, shape (N,) [rad or m]; 0 if there is none.
         difference_quotient: Whether velocities are difference quotients of positions.
-        filter_time: Time constant of a filter behind them [s].
+        filter_time: Time constant of a filter of the difference quotients [s].
     """
 
     step: np.ndarray
@@ -34,12 +34,12 @@ class MotorEncoders:
     filter_time: float = 0.0
 
     def rate(self, off: ca.MX, before: ca.MX, last: ca.MX, period: float) -> ca.MX:
-        """Return by how much a velocity is off, shape (N,).
+        """Return the error of a velocity, shape (N,).
 
         Args:
-            off: By how much the position is off, shape (N,).
-            before: The same a tick before.
-            last: By how much the velocity was off then.
+            off: Error of the position, shape (N,).
+            before: Error of the position one tick earlier.
+            last: Error of the velocity one tick earlier.
             period: Sampling time [s].
         """
         if not self.difference_quotient:
@@ -56,14 +56,14 @@ def errors_of_measured_torques(
     bandwidth: float,
     period: float,
 ) -> LinkErrors:
-    """Return the errors of links that are found by torque sensors.
+    """Return the errors of link positions that are estimated from torque sensors.
 
     Args:
-        robot: The robot as it is believed, N joints.
-        uncertainty: How well is known by what.
+        robot: Nominal model of the robot, N joints.
+        uncertainty: Uncertainty of the data.
         encoders: Encoders of its motors.
-        q_J: Where it is near when it rests, shape (N,).
-        bandwidth: Of the links' motion, see :class:`LinkState` [rad/s].
+        q_J: Posture at rest, shape (N,).
+        bandwidth: Bandwidth of the links' motion, see :class:`LinkState` [rad/s].
         period: Sampling time [s].
     """
     nothing = np.zeros(robot.dimension)
@@ -83,16 +83,16 @@ def errors_of_observed_torques(
     period: float,
     friction: tuple[np.ndarray, np.ndarray] | None,
 ) -> LinkErrors:
-    """Return the errors of links that are found by the motors alone.
+    """Return the errors of link positions that are estimated from the motors alone.
 
     Args:
-        robot: The robot as it is believed, N joints.
-        uncertainty: How well is known by what.
+        robot: Nominal model of the robot, N joints.
+        uncertainty: Uncertainty of the data.
         encoders: Encoders of its motors.
-        q_J: Where it is near when it rests, shape (N,).
-        bandwidth: Of the links' motion and of the torques [rad/s].
+        q_J: Posture at rest, shape (N,).
+        bandwidth: Bandwidth of the links' motion and of the torques [rad/s].
         period: Sampling time [s].
-        friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
+        friction: Nominal coefficients f_c and f_v, each (N,); None if there are none.
     """
     if friction is None:
         effort = _finite(robot.gather("effort_limit"))
@@ -103,22 +103,23 @@ def errors_of_observed_torques(
         coulomb, viscous = share * stuck, share * f_v
     finder = observing_network(robot, bandwidth, period)
     noise = _noise(robot, finder, encoders, np.zeros(robot.dimension), q_J, period)
-    # a ramp is observed that much later: the interval's middle, and a filter of first order
+    # delay of an observed ramp: the interval's middle, and a filter of first order
     follow = 1.0 - np.exp(-bandwidth * period)
     lag = float(period * (1.0 / follow - 0.5))
     return LinkErrors(noise, uncertainty.stiffness, lag, coulomb, np.asarray(stuck), viscous)
 
 
 def observing_network(robot: RobotModel, bandwidth: float, period: float) -> Network:
-    """Return what finds the links' side by the motors, of ``joint_state``, ``drive_torque``.
+    """Return the observer of the links' side with inputs ``joint_state`` and ``drive_torque``.
 
     Args:
-        robot: The robot as it is believed, without friction.
-        bandwidth: Of the links' motion and of the torques [rad/s].
+        robot: Nominal model of the robot, without friction.
+        bandwidth: Bandwidth of the links' motion and of the torques [rad/s].
         period: Sampling time [s].
 
     Returns:
-        Its third input ``known_torque`` is what springs bear at the start; output ``joint_state``.
+        A network; its third input ``known_torque`` is the initial torque of the springs, its output
+        ``joint_state``.
     """
     nothing = np.zeros(robot.dimension)
     model = motor_momentum(robot, (nothing, nothing))
@@ -150,18 +151,18 @@ def _noise(
     q_J: np.ndarray,
     period: float,
 ) -> np.ndarray:
-    """Return what white noise leaves of positions and velocities of links, shape (2, N).
+    """Return the noise of estimated positions and velocities of links, shape (2, N).
 
-    Near a posture at rest, what finds the links is linear in what is measured:
-    ``x_{k+1} = A x_k + B w_k``, ``y_k = C x_k + D w_k``, so that of noise w of covariance Q
-    ``P = A P A^T + B Q B^T`` is left in x, and ``C P C^T + D Q D^T`` in y. Steps of encoders
-    are noise that is even within a step.
+    Near a posture at rest, the observer is linear in the measurements:
+    ``x_{k+1} = A x_k + B w_k``, ``y_k = C x_k + D w_k``. White noise w of covariance Q leads to the
+    covariance ``P = A P A^T + B Q B^T`` of x and ``C P C^T + D Q D^T`` of y. The quantization of
+    encoders is noise that is uniformly distributed within a step.
 
     Args:
-        robot: The robot as it is believed, N joints.
-        finder: What finds the links, of ``joint_state`` and torques.
+        robot: Nominal model of the robot, N joints.
+        finder: Observer of the links, with inputs ``joint_state`` and torques.
         encoders: Encoders of its motors.
-        torque_noise: Standard deviation of noise of torques, shape (N,).
+        torque_noise: Standard deviation of the noise of torques, shape (N,).
         q_J: The posture, shape (N,).
         period: Sampling time [s].
     """
@@ -179,7 +180,7 @@ def _noise(
     state = program.initial(
         x=np.zeros(program.size), preset=np.zeros(len(program.states)), t=0, **begin
     )["x_start"]
-    for k in range(_BEGUN):
+    for k in range(_SETTLING):
         state = step(x=state, t=k, **nominal)["x_next"]
 
     x, w = ca.MX.sym("x", program.size + 2 * n), ca.MX.sym("w", 2 * n)
@@ -187,9 +188,9 @@ def _noise(
     off, noise = ca.vertsplit(w, n)
     rate = encoders.rate(off, before, last, period)
     measured = rest + ca.vertcat(ca.DM(2 * n, 1), off, rate)
-    # noise of a sensor's torque; what the drives were told is known exactly
-    told = {name: weight + (noise if name == "joint_torque" else 0.0) for name in torques}
-    later = step(x=inner, t=0, joint_state=measured, **told)
+    # noise of torque sensors; commanded torques are known exactly
+    torque_inputs = {name: weight + (noise if name == "joint_torque" else 0.0) for name in torques}
+    later = step(x=inner, t=0, joint_state=measured, **torque_inputs)
     found = ca.vertsplit(later["joint_state"], n)
     after, y = ca.vertcat(later["x_next"], off, rate), ca.vertcat(*found[:2])
     slopes = [ca.jacobian(of, by) for of in (after, y) for by in (x, w)]
@@ -201,5 +202,5 @@ def _noise(
 
 
 def _finite(effort: np.ndarray) -> np.ndarray:
-    """Return largest torques, 0 where none is known."""
+    """Return largest torques, 0 for unlimited ones."""
     return np.where(np.isfinite(effort), effort, 0.0)

@@ -1,9 +1,9 @@
-"""Generalized momenta, and what changes them: observers without accelerations.
+"""Generalized momenta and their observers, which need no accelerations.
 
-The momentum of a robot's links ``p = D_E(q) q'`` obeys ``p' = tau + beta``, with whatever
-torques ``tau`` act on the links, and ``beta = C^T(q, q') q' - g(q)``, the gradient of the
+The momentum of a robot's links ``p = D_E(q) q'`` obeys ``p' = tau + beta``, with all torques
+``tau`` that act on the links, and ``beta = C^T(q, q') q' - g(q)``, the gradient of the
 kinetic less the potential energy (A. De Luca, R. Mattone, ICRA 2003; App. A). Its rate needs
-no acceleration, and a difference of momenta tells the mean of all that acted in between.
+no acceleration, and a difference of momenta is the impulse of all torques in between.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import kept_if_finite, where
+from pfsc_drake.blocks.cases import hold_if_not_finite, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.estimation.filters import SignalDerivatives
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, gravity_torque
@@ -27,14 +27,14 @@ class MomentumModel:
     """One momentum per joint, and the torques that change it.
 
     ``p' = f + drive_weight tau_d + known_weight tau_k + sign z``: the forces f follow from the
-    state, ``tau_d`` is what the drives were told, ``tau_k`` what else is known to act, and z
-    the torque that is to be found.
+    state, ``tau_d`` are the commanded drive torques, ``tau_k`` other known torques, and z the
+    unknown torque.
 
     Attributes:
         state: Symbol ``[q_J, v_J, q_M, v_M]``, shape (4N, 1).
         momentum: p as an expression of the state, shape (N, 1) [Nm s or N s].
         forces: f as an expression of the state, shape (N, 1) [Nm or N].
-        drive_weight: Drive weight of each drive, 1 or 0, shape (N,).
+        drive_weight: Weight of each drive torque, 1 or 0, shape (N,).
         known_weight: Weight of each known torque, shape (N,).
         sign: 1 or -1.
         delay: Age of the velocities when they are measured [s].
@@ -56,8 +56,9 @@ class MomentumModel:
     def with_delay(self, delay: float) -> "MomentumModel":
         """Return the momenta of a state whose velocities are older than its positions.
 
-        A difference quotient is the velocity half an interval ago. So that all is of one age,
-        positions are taken back, ``q - delay q'``; what acts has to be of the same age, too.
+        A difference quotient is the velocity half an interval ago. To evaluate all quantities at
+        the same time, positions are shifted back, ``q - delay q'``; the torques must be shifted by
+        the same time.
 
         Args:
             delay: Age of the velocities [s].
@@ -67,28 +68,28 @@ class MomentumModel:
         momentum, forces = ca.substitute([self.momentum, self.forces], [self.state], [then])
         return replace(self, momentum=momentum, forces=forces, delay=delay)
 
-    def acting(self, drive_torque: Any, known_torque: Any | None) -> Any:
-        """Return the torques that are known to change the momenta, shape (N, 1).
+    def known_torques(self, drive_torque: Any, known_torque: Any | None) -> Any:
+        """Return the known torques that change the momenta, shape (N, 1).
 
         Args:
-            drive_torque: What the drives are told, shape (N, 1).
-            known_torque: What else is known to act, shape (N, 1); None for nothing.
+            drive_torque: Commanded drive torques, shape (N, 1).
+            known_torque: Other known torques, shape (N, 1); None for none.
         """
         acting = ca.DM(self.drive_weight) * drive_torque
         return acting if known_torque is None else acting + ca.DM(self.known_weight) * known_torque
 
-    def acting_when_measured(self, acting: Any, acted: Any, period: float) -> Any:
-        """Return the mean of what acted over an interval of the age of the velocities, (N, 1).
+    def mean_torque(self, acting: Any, acted: Any, period: float) -> Any:
+        """Return the mean torques over an interval that is delayed like the velocities, (N, 1).
 
         Args:
-            acting: What acts since the last sample, shape (N, 1).
-            acted: What did in the interval before, shape (N, 1).
+            acting: Torques since the last sample, shape (N, 1).
+            acted: Torques in the interval before, shape (N, 1).
             period: Sampling time [s].
         """
         return acting + self.delay / period * (acted - acting)
 
     def __content__(self) -> object:
-        """Return what decides over it."""
+        """Return the data that determine it."""
         return self.function, self.drive_weight, self.known_weight, self.sign, self.delay
 
     @cached_property
@@ -108,12 +109,12 @@ class MomentumModel:
 def drive_momentum(robot: RobotModel) -> MomentumModel:
     """Return the momenta on which friction of the drives acts; z is the friction torque.
 
-    Of an elastic joint the motor's alone, ``p = D_M v_M``, ``p' = tau_d - tau_J - tau_f``,
-    (2.65b): forces on the tool reach it only through the joint torque
-    ``tau_J = K_s (q_M - q_J) + K_d (v_M - v_J)``, which is measured. Of a rigid joint that of
-    the whole arm and the rotor, ``p = D_E v_J + D_M v_M``,
-    ``p' = tau_d + beta + tau_ext - tau_f``: what pushes the tool is taken for friction unless
-    it is known, ``tau_k = tau_ext``. The damping of the joints' own bearings is known.
+    Elastic joint: momentum of the motor, ``p = D_M v_M``, ``p' = tau_d - tau_J - tau_f``, (2.65b).
+    Forces on the tool enter only by the joint torque
+    ``tau_J = K_s (q_M - q_J) + K_d (v_M - v_J)``, which is measured. Rigid joint: momentum of the
+    arm and the rotor, ``p = D_E v_J + D_M v_M``, ``p' = tau_d + beta + tau_ext - tau_f``. External
+    forces are taken for friction unless they are known, ``tau_k = tau_ext``. The damping of the
+    joints' bearings is known.
 
     Args:
         robot: The robot; any of its N joints may be elastic.
@@ -137,10 +138,10 @@ def drive_momentum(robot: RobotModel) -> MomentumModel:
 def link_momentum(robot: RobotModel) -> MomentumModel:
     """Return the momenta on which forces on the tool act; z is the external torque.
 
-    Of elastic joints ``p = D_E v_J``, ``p' = tau_J + beta + tau_ext`` (2.65a), whatever the
-    friction of the drives. Of a rigid joint ``p = D_E v_J + D_M v_M``,
-    ``p' = tau_d + beta + tau_ext - tau_f``: friction is taken for a force unless it is known,
-    ``tau_k = tau_f``.
+    Elastic joint: ``p = D_E v_J``, ``p' = tau_J + beta + tau_ext`` (2.65a), independent of the
+    friction of the drives. Rigid joint: ``p = D_E v_J + D_M v_M``,
+    ``p' = tau_d + beta + tau_ext - tau_f``. Friction is taken for an external force unless it is
+    known, ``tau_k = tau_f``.
 
     Args:
         robot: The robot; any of its N joints may be elastic.
@@ -164,13 +165,13 @@ def link_momentum(robot: RobotModel) -> MomentumModel:
 def motor_momentum(robot: RobotModel, friction: tuple[np.ndarray, np.ndarray]) -> MomentumModel:
     """Return the momenta of the motors alone; z is the torque of the springs behind them.
 
-    ``p = D_M v_M``, ``p' = tau_d - f_c tanh(v_M / w) - f_v v_M - z``, which knows nothing of the
-    links: what it does not know of friction is taken for a torque of the springs. A torque
-    ``tau_k`` is taken off z.
+    ``p = D_M v_M``, ``p' = tau_d - f_c tanh(v_M / w) - f_v v_M - z``, independent of the links.
+    Unmodelled friction is taken for a torque of the springs. A torque ``tau_k`` is subtracted from
+    z.
 
     Args:
-        robot: The robot, N joints; z of rigid ones means nothing.
-        friction: Coefficients f_c and f_v that are believed, each (N,).
+        robot: The robot, N joints; z of rigid ones is meaningless.
+        friction: Nominal coefficients f_c and f_v, each (N,).
     """
     n, (f_c, f_v) = robot.dimension, friction
     state = ca.SX.sym("state", 4 * n)
@@ -201,32 +202,31 @@ class MomentumObserver(Block):
     """Observer of the unknown torque z in ``p' = f + tau + sign z``, sampled.
 
     With the momenta of :func:`~pfsc_drake.control.estimation.momentum.drive_momentum`
-    it finds the friction of the drives, with those of ``link_momentum`` the external torques.
+    it estimates the friction of the drives, with those of ``link_momentum`` the external torques.
 
-    The drives hold their torque over an interval, so that between two samples z was on
-    average::
+    The drives hold their torque over an interval. The mean of z between two samples is::
 
         z_mean = sign ((p_k - p_{k-1}) / T - (f_k + f_{k-1}) / 2 - tau_{k-1})
 
     with ``tau = drive_weight tau_d + known_weight tau_k``; where velocities are measured with a
-    delay, tau is the mean over an interval that much earlier. The estimate follows it as
-    :class:`SignalDerivatives` does; without derivatives that is the disturbance observer of
-    first order with rate L, ``z_hat' = L (z - z_hat)``, exactly discretized::
+    delay, tau is the mean over an interval that is earlier by this delay. The estimate follows z as
+    in :class:`SignalDerivatives`; without derivatives this is the disturbance observer of first
+    order with rate L, ``z_hat' = L (z - z_hat)``, exactly discretized::
 
         z_hat_k = z_hat_{k-1} + (1 - exp(-L T)) (z_mean - z_hat_{k-1})
 
-    The first estimate is zero. After a sample that is not finite it stands still, and the next
-    sample starts a new interval.
+    The first estimate is zero. After a NaN or infinite sample it is constant, and the next sample
+    starts a new interval.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        drive_torque (input): What the drives are told until the next tick, within their limits
+        drive_torque (input): Commanded drive torques until the next tick, within their limits
             [Nm or N], shape (N,).
-        known_torque (input, optional): What else is known to act until then, see
+        known_torque (input, optional): Other known torques that act until then, see
             :class:`~pfsc_drake.control.estimation.momentum.MomentumModel`, shape
             (N,) [Nm or N]; zero if not connected.
         estimate (output): z and its derivatives by rows, shape ((num_derivatives + 1) N,)
-            [Nm or N, per s, per s^2]. What drives the joints may depend on it.
+            [Nm or N, per s, per s^2]. The drive torques may depend on it.
 
     State:
         estimate (predicted for this tick), momentum and forces of the last tick, torques that act
@@ -263,7 +263,7 @@ class MomentumObserver(Block):
         """Return all outputs, and the inner values."""
         model, T = self._model, self._period
         p, f = self._momentum(u.joint_state)
-        tau = model.acting_when_measured(x.acting, x.acted, T)
+        tau = model.mean_torque(x.acting, x.acted, T)
         z_mean = model.sign * ((p - x.momentum) / T - (f + x.forces) / 2.0 - tau)
         predicted = x.estimate[: model.dimension]
         sample = where(x.seen > 0.0, z_mean, predicted)
@@ -271,13 +271,13 @@ class MomentumObserver(Block):
         return {"estimate": estimate, "momentum": p, "forces": f}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         sampled = {
             "estimate": self._filter.predict(y.estimate),
             "momentum": y.momentum,
             "forces": y.forces,
-            "acting": self._model.acting(u.drive_torque, u.known_torque),
+            "acting": self._model.known_torques(u.drive_torque, u.known_torque),
             "acted": x.acting,
         }
-        kept, good = kept_if_finite(sampled, x)
-        return kept | {"seen": good}
+        states, good = hold_if_not_finite(sampled, x)
+        return states | {"seen": good}

@@ -1,4 +1,4 @@
-"""What a wrench on a tool does to whoever holds the workpiece that it comes from."""
+"""Reaction of a wrench on the tool: the opposite wrench on the workpiece."""
 
 from typing import Any
 
@@ -10,10 +10,11 @@ _POSE = 12
 
 
 class Reaction(Block):
-    """The wrench on a workpiece whose opposite a tool bears, at the origin C of its frame.
+    """Reaction wrench on a workpiece at the origin C of its frame.
 
-    A process at the tool point ``y_t`` puts ``[f, mu]`` on the tool. By Newton's third law the
-    workpiece bears ``[-f, -mu]`` at the same point, which is at its frame's origin ``p_WC``::
+    A process at the tool point ``y_t`` applies ``[f, mu]`` to the tool. By Newton's third law it
+    applies ``[-f, -mu]`` to the workpiece at the same point. At the frame's origin ``p_WC`` this
+    is::
 
         f_C = -f,   mu_C = -mu - (y_t - p_WC) x f
 

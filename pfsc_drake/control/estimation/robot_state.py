@@ -1,4 +1,4 @@
-"""What no sensor tells of a robot's state: links behind elastic joints, and a few ticks on."""
+"""Estimation of a robot's state: links behind elastic joints, and prediction over a delay."""
 
 import math
 from typing import Any
@@ -18,36 +18,36 @@ from pfsc_drake.robot.robot_model import (
     link_acceleration,
 )
 
-# an acceleration that the model does not know is followed without lag while it stays
+# a constant unmodelled acceleration is followed without lag
 _DEGREE = 2
 
 
 class LinkState(Block):
-    """Finds positions and velocities of links from motors and the torques of their springs.
+    """Estimates positions and velocities of links from motors and the torques of their springs.
 
-    A torque ``tau_J = K_s (q_M - q_J) + K_d (v_M - v_J)`` tells where a link is, and by (2.65a) how
-    it is accelerated. So its velocity is no derivative of what is measured: a fading-memory
-    polynomial filter (:class:`SignalDerivatives`) follows position, velocity and what acceleration
-    the model does not know, of forces from outside and of wrong masses::
+    A torque ``tau_J = K_s (q_M - q_J) + K_d (v_M - v_J)`` determines the position of a link and, by
+    (2.65a), its acceleration. The velocity therefore needs no derivative of a measurement: a
+    fading-memory polynomial filter (:class:`SignalDerivatives`) estimates position, velocity and
+    the unmodelled acceleration, caused by external forces and wrong masses::
 
-        q_J = q_M - (tau_J - K_d (v_M - v_J)) / K_s            what it is corrected by
-        q_J'' = D_E^-1(q_J) (tau_J - n_E(q_J, v_J)) + unknown  what it expects
+        q_J = q_M - (tau_J - K_d (v_M - v_J)) / K_s            correction
+        q_J'' = D_E^-1(q_J) (tau_J - n_E(q_J, v_J)) + unknown  prediction
 
-    with the spring's torque of the middle of the coming interval,
+    with the spring's torque in the middle of the next interval,
     ``tau_J + K_s (v_M - v_J) T / 2``. Rigid joints have one side.
 
     Ports:
-        joint_state (input): ``[q_J, v_J, q_M, v_M]``, of elastic joints the motors' side alone is
-            read, shape (4N,).
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,); only the motors' side of elastic
+            joints is used.
         joint_torque (input): Torques of the springs and dampers, shape (N,) [Nm or N].
-        joint_state (output): The same with the links' side found, shape (4N,).
+        joint_state (output): Joint state with the estimated links' side, shape (4N,).
 
     State:
         The filter's ``prediction`` of positions, velocities and unknown accelerations.
 
     Args:
-        robot: The robot as it is believed, N joints.
-        bandwidth: Rate at which the filter forgets [rad/s].
+        robot: Nominal model of the robot, N joints.
+        bandwidth: Rate at which the filter forgets old samples [rad/s].
         period: Sampling time [s].
 
     Raises:
@@ -71,7 +71,7 @@ class LinkState(Block):
         self.states = {"prediction": (_DEGREE + 1) * n}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         _, _, q_M, _ = ca.vertsplit(u.joint_state, self._n)
         return {"prediction": self._filter.start(q_M - self._deflection(u.joint_torque))}
 
@@ -87,7 +87,7 @@ class LinkState(Block):
         return {"joint_state": ca.vertcat(sample, v_J, q_M, v_M), "estimate": estimate}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         n, T = self._n, self._period
         q_J, v_J, _, v_M = ca.vertsplit(y.joint_state, n)
         torque = u.joint_torque + self._springs()["o0"] * (v_M - v_J) * (T / 2.0)
@@ -96,33 +96,33 @@ class LinkState(Block):
         return {"prediction": self._filter.predict(y.estimate) + known}
 
     def _deflection(self, spring: Any) -> Any:
-        """Return by how much springs are bent, zero in rigid joints."""
+        """Return the deflections of the springs, zero in rigid joints."""
         stiffness = self._springs()["o0"] + (1.0 - self._elastic)
         return self._elastic * spring / stiffness
 
 
-# of the series; a resonance of 500 rad/s over 3 ms is exact to 1e-8
+# terms of the series; a resonance of 500 rad/s over 3 ms is exact to 1e-8
 _TERMS = 10
-# beyond it no law for elastic joints has been seen to hold
+# no law for elastic joints was stable with longer delays
 MOST_TICKS = 10
 
 
-def advanced(
+def advance_state(
     robot: RobotModel, state: ca.SX, torques: list[ca.SX], period: float, age: float = 0.0
 ) -> ca.SX:
-    """Return the joint state after torques that are known have acted, one after another.
+    """Return the joint state after a sequence of known torques.
 
-    Inertia and weight are those of the posture in the middle of the time, springs and dampers of
-    the joints exact: every derivative of the motion follows from the two before it by (2.65), and
-    the state is the sum of a Taylor series.
+    Inertia and weight are evaluated at the posture in the middle of the time interval; springs and
+    dampers of the joints are exact. Every derivative of the motion follows from the two before it
+    by (2.65), and the state is the sum of a Taylor series.
 
     Args:
         robot: The robot, N joints, any of them elastic.
         state: ``[q_J, v_J, q_M, v_M]``, shape (4N, 1).
-        torques: What acted in the interval before, and what acts in each of those that follow
-            [Nm or N], each (N, 1).
-        period: How long each acts [s].
-        age: How old the velocities of ``state`` are [s], not more than the period.
+        torques: Torques in the previous interval and in each of the following ones [Nm or N],
+            each (N, 1).
+        period: Duration of each interval [s].
+        age: Age of the velocities of ``state`` [s], at most the period.
 
     Returns:
         Shape (4N, 1).
@@ -163,42 +163,47 @@ def advanced(
 
 
 @once_per_content()
-def _advance(robot: RobotModel, ticks: int, period: float, age: float) -> ca.Function:
-    """Return ``(state, sent) -> state`` as :func:`advanced` makes it, torques oldest first."""
+def _advance_function(robot: RobotModel, ticks: int, period: float, age: float) -> ca.Function:
+    """Return ``(state, sent) -> state`` of :func:`advance_state`, torques oldest first."""
     n = robot.dimension
     state, sent = ca.SX.sym("state", 4 * n), ca.SX.sym("sent", (ticks + 1) * n)
-    told = advanced(robot, state, ca.vertsplit(sent, n), period, age)
+    predicted = advance_state(robot, state, ca.vertsplit(sent, n), period, age)
     return ca.Function(
-        "advance", [state, sent], ca.cse([told]), ["state", "sent"], ["told"], MAY_BE_PARAMETRIC
+        "advance",
+        [state, sent],
+        ca.cse([predicted]),
+        ["state", "sent"],
+        ["predicted"],
+        MAY_BE_PARAMETRIC,
     )
 
 
 class StatePredictor(Block):
-    """Tells the joint state of the moment at which torques act that are told now.
+    """Predicts the joint state at the time at which the present command takes effect.
 
-    A robot that acts on torques d ticks after they were told is, for its law, one without delay
-    whose state is that of d ticks later: it follows from what is measured, from the torques that
-    are on their way, and from the model, see :func:`advanced`. An error of the model is an error of
-    d ticks' motion alone. Velocities that are older than positions are brought up to them, too.
-    What cannot be foretold, because something of the state is no number, is passed on as it is
-    measured: by that a robot can still be stopped and held.
+    A robot that applies torques d ticks after they were commanded is, for its law, a robot without
+    delay whose state is the one d ticks later. This state follows from the measurements, from the
+    commanded torques that have not yet taken effect, and from the model, see :func:`advance_state`.
+    An error of the model affects only the motion of d ticks. Velocities that are older than
+    positions are predicted to the same time. If the state contains NaN or infinite entries, the
+    measured state is passed through, so that the robot can still be stopped and held at rest.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        drive_torque (input): What the drives are told, within their limits [Nm or N], shape (N,).
-        friction_torque (input, optional): What friction is believed to take of it.
-        joint_state (output): The same of d ticks later, shape (4N,). What drives the joints may
-            depend on it.
+        drive_torque (input): Commanded drive torques, within their limits [Nm or N], shape (N,).
+        friction_torque (input, optional): Estimated friction torque, which is subtracted from it.
+        joint_state (output): Joint state d ticks later, shape (4N,). The drive torques may depend
+            on it.
 
     State:
-        What was ``sent``, the oldest first, less friction, shape ((d + 1) N,). At the start that
-        is the links' weight.
+        Commanded torques less friction (``sent``), the oldest first, shape ((d + 1) N,). Initially
+        the links' weight.
 
     Args:
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model of the robot, N joints.
         ticks: d, 0 to 10.
         period: Sampling time T [s].
-        age: How old measured velocities are [s], 0 to T.
+        age: Age of measured velocities [s], 0 to T.
 
     Raises:
         InputError: If a number is out of range.
@@ -212,12 +217,12 @@ class StatePredictor(Block):
         if not 0.0 <= age <= period:
             raise InputError(f"age of velocities: {age:g} s; must be 0 to {period:g} s")
         n = robot.dimension
-        self._n, self._advance = n, _advance(robot, ticks, period, age)
-        # what holds the links still
+        self._n, self._advance_function = n, _advance_function(robot, ticks, period, age)
+        # torques that hold the links at rest
         self._weight = ca.Function(
             "weight",
-            [self._advance.sx_in(0)],
-            [bias_torque(robot, self._advance.sx_in(0)[:n], ca.SX(n, 1))],
+            [self._advance_function.sx_in(0)],
+            [bias_torque(robot, self._advance_function.sx_in(0)[:n], ca.SX(n, 1))],
             MAY_BE_PARAMETRIC,
         )
         self._ticks = ticks
@@ -230,16 +235,16 @@ class StatePredictor(Block):
         self.states = {"sent": (ticks + 1) * n}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted ones are zero."""
         return {"sent": ca.repmat(self._weight(u.joint_state), self._ticks + 1, 1)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        told = self._advance(u.joint_state, x.sent)
-        return {"joint_state": where(is_finite(told), told, u.joint_state)}
+        predicted = self._advance_function(u.joint_state, x.sent)
+        return {"joint_state": where(is_finite(predicted), predicted, u.joint_state)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         net = u.drive_torque
         if u.friction_torque is not None:
             net = net - u.friction_torque

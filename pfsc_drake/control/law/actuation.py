@@ -1,6 +1,6 @@
-"""From the drive input to the joint motion: one description for every kind of drive.
+"""Actuation models: from the drive input to the joint motion, for every kind of drive.
 
-Whatever the drives are, the joints' motion is known from the state up to order
+With any kind of drive, the joints' motion is known from the state up to order
 r - 1, and the drive input is affine in the joint derivative of order r, the
 relative degree: ``u = gain q^(r) + drift + offset``.
 """
@@ -22,7 +22,7 @@ _FOR_MIXED = (*_FOR_RIGID, "singular_perturbation")
 
 @dataclass(frozen=True)
 class DriveState:
-    """What is measured, as expressions.
+    """Measured state of the drives and joints, as expressions.
 
     Attributes:
         q_J: Joint coordinates [rad or m], shape (N, 1).
@@ -47,9 +47,9 @@ class DrivenMotion:
     Attributes:
         q: Joint coordinates and their time derivatives, orders 0..r-1, each (N, 1).
         gain: Matrix of ``u = gain q^(r) + drift + offset``, shape (N, N).
-        drift: Vector that belongs to the gain, shape (N, 1).
-        offset: Vector of the rest, already averaged over the sampling interval
-            where the law respects the hold, shape (N, 1).
+        drift: Varying part of the input beside the gain, shape (N, 1).
+        offset: Remaining part, already averaged over the sampling interval if the law
+            respects the hold, shape (N, 1).
     """
 
     q: Sequence[ca.SX]
@@ -67,15 +67,15 @@ def velocity_servo(robot: RobotModel, state: DriveState) -> DrivenMotion:
 def rigid(robot: RobotModel, state: DriveState, *, changes: bool = False) -> DrivenMotion:
     """Rigid joints (2.42), r = 2: the inverse dynamics of (3.29).
 
-    Where joints are elastic the law acts on motor coordinates, because with link
-    coordinates the loop is unstable (Sec. 3.8.3). It serves any mixture of rigid and
-    elastic joints: of a rigid joint, motor and link coordinate are one.
+    With elastic joints the law acts on motor coordinates, because with link
+    coordinates the loop is unstable (Sec. 3.8.3). It applies to any mixture of rigid and
+    elastic joints: motor and link coordinate of a rigid joint are equal.
 
     Args:
         robot: The robot.
         state: Its state.
-        changes: Whether weight, Coriolis terms and damping belong to what changes while the torque
-            is held: all but external torques is then drift, to be extrapolated.
+        changes: Whether weight, Coriolis terms and damping change while the torque is held: all
+            except external torques is then drift, to be extrapolated.
     """
     q, v = (state.q_J, state.v_J) if robot.is_rigid else (state.q_M, state.v_M)
     D_E = robot.mass_matrix(q)
@@ -123,8 +123,8 @@ def visco_elastic(robot: RobotModel, state: DriveState, sampling_time: float) ->
         a_M = (tau_J' - K_s (v_M - v_J) + (K_d + K_s T_s) a_J) / (K_d + K_s T_s)
 
     As in :func:`elastic`, ``tau_J`` and ``a_J`` enter by their means over the interval,
-    ``tau_J + T_s/2 tau_J'`` and ``a_J + T_s/2 q'''``, and ``tau_J'`` should be that of the
-    interval's end: ``gain q''' + drift`` is to be extrapolated by ``T_s``. Else the error
+    ``tau_J + T_s/2 tau_J'`` and ``a_J + T_s/2 q'''``, and ``tau_J'`` by its value at the
+    interval's end: ``gain q''' + drift`` must be extrapolated by ``T_s``. Otherwise the error
     is of first order in T_s, 25 times as large on the bent lemniscate at 1.5 m/s.
 
     ``T_s = 0`` gives (3.58) as printed, whose zero dynamics (3.60) decay with
@@ -162,8 +162,8 @@ def elastic(robot: RobotModel, state: DriveState, sampling_time: float) -> Drive
     Every joint must be elastic, see :func:`visco_elastic`.
 
     ``a_M = a_J + K_s^-1 tau_J''``, ``tau_d = D_M a_M + tau_J``. While the torque is held,
-    ``tau_J`` and ``a_J`` go on changing at known rates; their mean values over the
-    sampling interval take the place of the present ones. The rest, ``D_M K_s^-1 tau_J''``,
+    ``tau_J`` and ``a_J`` change at known rates; their mean values over the
+    sampling interval replace the present ones. The rest, ``D_M K_s^-1 tau_J''``,
     is ``gain q^(4) + drift``; its rate would need one more derivative of everything, so
     that the controller extrapolates it from its last two values.
 
@@ -229,7 +229,7 @@ def _require_elastic(robot: RobotModel, law: str) -> None:
 
 
 def _refuse(robot: RobotModel, law: str) -> NoReturn:
-    """Say which joints a law does not suit, and which laws suit the robot."""
+    """Raise an error with the unsuitable joints of a law, and the laws for the robot."""
     stiff = [name for name, k in zip(robot.names, robot.K_s, strict=True) if not np.isfinite(k)]
     suitable = _FOR_RIGID if robot.is_rigid else _FOR_MIXED
     raise InputError(

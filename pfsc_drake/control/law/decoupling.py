@@ -1,4 +1,4 @@
-"""The one place that inverts a decoupling matrix."""
+"""Inversion of the decoupling matrix, with spare motion, restraint and damping."""
 
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
@@ -11,19 +11,19 @@ from pfsc_drake.blocks.linear_algebra import cholesky, householder, solve, solve
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.rules import Parameters, Range
 
-# of a posture's coordinate, by which part of itself it must move with the outputs at rest
+# of a posture's coordinate, least share of its motion with the outputs at rest
 _LEAST_SHARE = 0.1
 
 
 class Restraint(NamedTuple):
-    """How fast joints may become by what they do beside the outputs.
+    """Limits of joint speeds by motion beside the outputs.
 
     Attributes:
         rest: Highest joint derivative with which they come to rest, shape (N,).
-        velocity: Velocity of the joints, shape (N,); None where the highest derivative is one.
-        settling: ``a_2``: in the end joints move with ``(x - rest) / a_2``.
-        speeds: Largest of the joints, shape (N,), infinite for any.
-        to_ends: Largest upwards and downwards with which they come to rest before their ends,
+        velocity: Velocity of the joints, shape (N,); None if the highest derivative is a velocity.
+        settling: ``a_2``: joints finally move with ``(x - rest) / a_2``.
+        speeds: Largest speeds of the joints, shape (N,), infinite for any.
+        to_ends: Largest speeds upwards and downwards at which they come to rest before their ends,
             shape (N, 2); None for any.
     """
 
@@ -35,16 +35,16 @@ class Restraint(NamedTuple):
 
 
 class Spare(NamedTuple):
-    """What joints beyond the number of outputs are to do.
+    """Spare motion of redundant joints.
 
     Attributes:
-        desired: Highest joint derivative that is wanted, shape (N,).
-        scale: Upper triangular ``S`` with ``S S' = W^-1``, shape (N, N), of the weight W by which
-            deviations from it are judged, see :func:`scale_of`; None for the identity.
+        desired: Desired highest joint derivative, shape (N,).
+        scale: Upper triangular ``S`` with ``S S' = W^-1``, shape (N, N), of the weight W of
+            deviations from it, see :func:`scale_of`; None for the identity.
         slope: Slope of one more coordinate ``c`` of the joints, ``h = dc/dq``, shape (N,); None for
             none.
-        rate: ``h q^(r)`` that this coordinate is to have.
-        restraint: By what all of this is held back; None for nothing.
+        rate: Desired ``h q^(r)`` of this coordinate.
+        restraint: Limits of this motion; None for none.
     """
 
     desired: ca.SX
@@ -55,17 +55,16 @@ class Spare(NamedTuple):
 
 
 class DecouplingSolution(NamedTuple):
-    """Solution of ``A x = rhs`` and how far A is from singular.
+    """Solution of ``A x = rhs`` and conditioning of A.
 
     Attributes:
         x: Highest joint derivative, shape (N,); NaN where A is singular.
         rcond: Reciprocal condition number of A in [0, 1], 0 if A is singular or not finite: in the
-            1-norm; where A has more columns than rows, or damping may set in, ``m / (|A| |A^+|)``
-            (Frobenius), which changes as smoothly as A does.
+            1-norm; if A has more columns than rows, or with damping, ``m / (|A| |A^+|)``
+            (Frobenius), which is as smooth as A.
         usable: Whether the solution may be used, 1 or 0.
-        residual: ``rhs - A x``, shape (m,), that damping near a singular A leaves, else zeros.
-        rest: The same as x without what joints are to do beside the outputs, as far as they are
-            held back, shape (N,); None where they are not.
+        residual: ``rhs - A x``, shape (m,), due to damping near a singular A, else zeros.
+        rest: The same as x without spare motion, shape (N,); None without a restraint.
     """
 
     x: ca.SX
@@ -77,26 +76,26 @@ class DecouplingSolution(NamedTuple):
 
 @dataclass(frozen=True)
 class DecouplingInverse(Parameters):
-    """Solves ``A q^(r) = v - b`` and judges the conditioning of A, shape (m, N) with N >= m.
+    """Solver of ``A q^(r) = v - b`` with a check of the conditioning of A, (m, N) with N >= m.
 
-    With as many joints as outputs that is one linear system. With more, it is the solution
-    that deviates least from a desired value w, weighted by W::
+    With as many joints as outputs it is one linear system. With more joints, it is the solution
+    with the least weighted deviation from a desired value w::
 
         x = w + W^-1 A' (A W^-1 A')^-1 (rhs - A w)
 
-    and then, within what leaves the outputs alone, the one that gives one more coordinate of the
-    joints the rate that is wanted of it. It fades out where it hardly moves without the outputs.
+    and then, in the null space of the outputs, the one with the desired rate of one more
+    coordinate of the joints. This rate fades out where the coordinate depends on the outputs.
 
-    Restraint: with ``x_0`` the solution by which joints come to rest as far as the outputs let
-    them, everything else ends in joint velocities ``u = (x - x_0) / a_2`` beside those ``q_y'``
-    that the outputs take. What is used is ``x_0 + s (x - x_0)`` with the largest ``s <= 1`` for
-    which ``|q_y'| + s |u|`` stays below every joint's largest speed, and ``q_y' + s u`` below that
-    with which a joint comes to rest before its end, unless the outputs alone take more. So a
-    posture far away, or a coordinate that hardly moves alone, asks for no more than joints can do.
+    Restraint: with ``x_0`` the solution for joints that come to rest as far as the outputs permit,
+    the remaining motion leads to joint velocities ``u = (x - x_0) / a_2`` beside ``q_y'`` of the
+    outputs. The result is ``x_0 + s (x - x_0)`` with the largest ``s <= 1`` for which
+    ``|q_y'| + s |u|`` is below every joint's largest speed, and ``q_y' + s u`` below the speed at
+    which a joint comes to rest before its end, unless the outputs alone need more. So a distant
+    posture, or a coordinate that depends on the outputs, does not demand too much of the joints.
 
     Damping: where the reciprocal condition number c is below ``damped_below = c_0``, the system
     is solved with ``A W^-1 A' + lambda^2 I``, ``lambda^2 = (c_0^2 - c^2) |A S|^2`` (Frobenius),
-    which keeps x bounded through a singular posture; what the outputs miss is told.
+    which keeps x bounded through a singular posture; the error of the outputs is ``residual``.
 
     Attributes:
         min_rcond: Smallest reciprocal condition number (rows in m and rad) at which the solution
@@ -121,7 +120,7 @@ class DecouplingInverse(Parameters):
         Args:
             A: Decoupling matrix, shape (m, N).
             rhs: Right-hand side, shape (m,).
-            spare: What joints beyond the number of outputs are to do; needed if N > m.
+            spare: Spare motion of redundant joints; needed if N > m.
         """
         if spare is not None or self.damped_below:
             return self._solve_next_to(A, rhs, spare or Spare(ca.SX(A.shape[1], 1)))
@@ -133,7 +132,7 @@ class DecouplingInverse(Parameters):
         B = A if spare.scale is None else A @ spare.scale
         sides = _sides(A, rhs, spare)
         Q, R = householder(B.T)
-        # conditioning is that of the outputs, whatever the weight
+        # the conditioning of the outputs does not depend on the weight
         rcond = _rcond(A, R if spare.scale is None else householder(A.T)[1])
         y, damped = Q @ solve_upper(R, sides, transposed=True), ca.SX(0)
         missed = ca.SX(*sides.shape)
@@ -143,7 +142,7 @@ class DecouplingInverse(Parameters):
             U = cholesky(B @ B.T + square * ca.SX.eye(B.shape[0]))
             z = solve_upper(U, solve_upper(U, sides, transposed=True))
             y, missed = where(damped, B.T @ z, y), where(damped, square * z, 0.0)
-        x, rest, share = _restrained(Q, y, spare)
+        x, rest, share = _apply_restraint(Q, y, spare)
         x = where(ca.logic_or(rcond > 0.0, damped), x, np.nan)
         residual = missed[:, 0]
         if rest is not None:
@@ -172,13 +171,13 @@ def free_torque(A: ca.SX, torque: ca.SX, scale: ca.SX | None = None) -> ca.SX:
         scale: Upper triangular ``S`` with ``S S' = W^-1``, shape (N, N); None for the identity.
     """
     if scale is None:
-        return _beside(householder(A.T)[0], torque)
-    free = _beside(householder((A @ scale).T)[0], scale.T @ torque)
+        return _complement(householder(A.T)[0], torque)
+    free = _complement(householder((A @ scale).T)[0], scale.T @ torque)
     return solve_upper(scale, free, transposed=True)
 
 
-def _beside(Q: ca.SX, x: ca.SX) -> ca.SX:
-    """Return what is left of a vector beside the span of orthonormal columns."""
+def _complement(Q: ca.SX, x: ca.SX) -> ca.SX:
+    """Return a vector minus its projection onto the span of orthonormal columns."""
     return x - Q @ (Q.T @ x)
 
 
@@ -195,23 +194,23 @@ def _next_to(Q: ca.SX, y: ca.SX, spare: Spare) -> ca.SX:
 
     Args:
         Q: Orthonormal columns that span the rows of ``A S``, shape (N, m).
-        y: What the outputs ask for beyond the desired value, shape (N,).
-        spare: What is desired of the spare motion.
+        y: Deviation from the desired value for the outputs, shape (N,).
+        spare: Spare motion.
     """
     scale = ca.SX.eye(Q.shape[0]) if spare.scale is None else spare.scale
     x = spare.desired + scale @ y
     if spare.slope is None:
         return x
     whole = scale.T @ spare.slope
-    alone = _beside(Q, whole)
-    # continuous: a coordinate that can hardly move alone is given up
+    alone = _complement(Q, whole)
+    # continuous: the rate of a coordinate that depends on the outputs fades out
     divisor = ca.fmax(ca.sumsqr(alone), _LEAST_SHARE**2 * ca.sumsqr(whole))
     missing = (spare.rate - ca.dot(spare.slope, x)) / where(divisor > 0.0, divisor, 1.0)
     return x + scale @ (alone * missing)
 
 
 def _sides(A: ca.SX, rhs: ca.SX, spare: Spare) -> ca.SX:
-    """Return what is left to the outputs beside desired motion, rest and nothing, as columns."""
+    """Return right-hand sides of the outputs beside desired motion, rest and none, as columns."""
     sides, restraint = [rhs - A @ spare.desired], spare.restraint
     if restraint is not None:
         sides.append(rhs - A @ restraint.rest)
@@ -220,13 +219,13 @@ def _sides(A: ca.SX, rhs: ca.SX, spare: Spare) -> ca.SX:
     return ca.horzcat(*sides)
 
 
-def _restrained(Q: ca.SX, y: ca.SX, spare: Spare) -> tuple[ca.SX, ca.SX | None, ca.SX]:
+def _apply_restraint(Q: ca.SX, y: ca.SX, spare: Spare) -> tuple[ca.SX, ca.SX | None, ca.SX]:
     """Return the solution, the one of joints that come to rest, and the share beyond that.
 
     Args:
         Q: Orthonormal columns that span the rows of ``A S``, shape (N, m).
         y: Value of each side of :func:`_sides`, as columns.
-        spare: What joints are to do.
+        spare: Spare motion.
     """
     x, restraint = _next_to(Q, y[:, 0], spare), spare.restraint
     if restraint is None:

@@ -1,4 +1,4 @@
-"""The relation between drives and virtual output at a tick, which everything else rests on."""
+"""Relation between drives and virtual output at a sample, the basis of the law."""
 
 from typing import Any, NamedTuple
 
@@ -37,7 +37,7 @@ class Relation(NamedTuple):
         """Return the number of all elements.
 
         Args:
-            linearization: Whose relation it is.
+            linearization: Linearization of the relation.
         """
         return sum(rows * columns for rows, columns in _shapes(linearization))
 
@@ -47,7 +47,7 @@ class Relation(NamedTuple):
 
         Args:
             vector: Shape (size,).
-            linearization: Whose relation it is.
+            linearization: Linearization of the relation.
         """
         shapes = _shapes(linearization)
         ends = np.cumsum([0, *(rows * columns for rows, columns in shapes)]).tolist()
@@ -56,13 +56,13 @@ class Relation(NamedTuple):
 
 
 class ExactLinearization(Block):
-    """Finds how the virtual output's r-th derivative depends on the drives (3.28).
+    """Relation of the virtual output's r-th derivative to the drives (3.28).
 
-    It is the larger part of a law's work, and is done once a tick, for all that depend on it.
+    It takes the larger part of a law's computation, and is evaluated once a sample.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        manifold_point (input): Where on the manifold the tool is.
+        manifold_point (input): Point of the manifold closest to the tool.
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
             Only for r > 1.

@@ -1,4 +1,4 @@
-"""Why a robot stops: the first fault stays, and the drives do something else from then on."""
+"""Faults: the first one is latched, and switches the drives to the safe stop."""
 
 import enum
 from collections.abc import Sequence
@@ -7,11 +7,11 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import first_of, latched, where
+from pfsc_drake.blocks.cases import first_of, latch, where
 
 
 class Fault(enum.IntEnum):
-    """Why a law, or a system beside it, went to its safe state."""
+    """Cause of the safe state, found by the law or another system."""
 
     NONE = 0
     INPUT_NOT_FINITE = 1
@@ -35,7 +35,7 @@ class Fault(enum.IntEnum):
 
     @property
     def explanation(self) -> str:
-        """One phrase for people."""
+        """Explanation in one phrase."""
         return _EXPLANATIONS[self]
 
 
@@ -52,22 +52,22 @@ _EXPLANATIONS = {
     Fault.FORCE_SENSOR_LOST: "the force/torque sensor is lost",
     Fault.FORCE_SENSOR_SATURATED: "the force/torque sensor is at the end of its range",
     Fault.COMPLIANCE_INVALID: "force, impedance or reference of the compliance is not valid",
-    Fault.BUS_LOST: "no reference has come over the bus for too long",
+    Fault.BUS_LOST: "no reference was received over the bus for too long",
     Fault.JOINT_SPEED: "a joint is faster than its limit",
     Fault.DRIVE_CHATTERS: "a drive jumps between its limits",
     Fault.PRESS_FORCE_LOST: "the force on the workpiece is far from its reference",
-    Fault.STOP_REQUESTED: "a stop was asked for",
+    Fault.STOP_REQUESTED: "a stop was requested",
     Fault.BEYOND_END: "the tool went beyond an end of the path",
     Fault.FORCE_SENSOR_JUMPED: "the force/torque sensor has jumped as no force does",
 }
 
 
 class FaultLatch(Block):
-    """The first fault of several kinds; only a new start takes it away.
+    """Latch of the first fault of several kinds; only a new start clears it.
 
     Ports:
-        (inputs): A fault each, shape (1,), 0 for none; of those at one tick the first counts.
-        fault (output): The fault, from the tick on at which it is found, shape (1,).
+        (inputs): A fault each, shape (1,), 0 for none; of several in one sample the first counts.
+        fault (output): The fault, from its first sample on, shape (1,).
 
     State:
         fault
@@ -83,25 +83,25 @@ class FaultLatch(Block):
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         found = [getattr(u, name) for name in self.inputs]
-        return {"fault": latched(x.fault, first_of(*zip(found, found, strict=True), otherwise=0))}
+        return {"fault": latch(x.fault, first_of(*zip(found, found, strict=True), otherwise=0))}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the next states; omitted states do not change."""
         return {"fault": y.fault}
 
 
 class FaultSwitch(Block):
-    """What drives are told: by a law, or, after a fault, by what stops the robot.
+    """Switch of the commands to the drives: the law, or after a fault the safe stop.
 
     Ports:
-        drive (input): By the law, shape (N,).
-        stop (input, optional): After a fault, shape (N,); zero if not connected.
+        drive (input): Command of the law, shape (N,).
+        stop (input, optional): Command after a fault, shape (N,); zero if not connected.
         fault (input): Nonzero from the fault on, shape (1,).
-        command (output): What they are told, shape (N,).
+        command (output): Command to the drives, shape (N,).
 
     Args:
         num_drives: N.
-        unit: Unit of what they are told.
+        unit: Unit of the commands.
     """
 
     def __init__(self, num_drives: int, unit: str = "") -> None:

@@ -16,10 +16,10 @@ from pfsc_drake.control.law.law_functions import (
     Aim,
     LawInputs,
     aim_and_drives,
-    coming_to_rest,
-    judged,
-    left_to_outputs,
-    spare_of,
+    find_fault,
+    limit_spare_motion,
+    rest_motion,
+    spare_motion,
 )
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.posture import Posture
@@ -28,12 +28,12 @@ from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel
 
-# m; what a tool is beyond an end of an open path before it is a fault, and what may be chosen
+# m; largest distance of a tool beyond an end of an open path without a fault, and its range
 MAX_BEYOND_END, BEYOND_END_RANGE = 0.02, (1e-4, 0.5)
 
 
 class LawLayout:
-    """Where the results of a law lie in a flat array.
+    """Layout of the results of a law in a flat array.
 
     Attributes:
         drive: Drive input within its limits, shape (N,) [Nm, or rad/s for servos].
@@ -41,11 +41,11 @@ class LawLayout:
         virtual_input: ``v``, shape (m,).
         status: Fault (:class:`Fault`), reciprocal condition number of the decoupling
             matrix, number of drives at their limit; shape (3,).
-        held: The part of the drive input that is extrapolated over the hold, shape (N,).
-        reference_velocity: Joint velocities that the reference asks for [rad/s or m/s], shape
-            (N,), or (0,) of a law that does not tell them.
-        residual: What damping lets the virtual output's r-th derivatives miss, shape (m,), or
-            (0,) of a law that does not damp.
+        varying_input: Part of the drive input that is extrapolated over the hold, shape (N,).
+        reference_velocity: Joint velocities of the reference [rad/s or m/s], shape (N,), or (0,)
+            of a law without them.
+        residual: Error of the virtual output's r-th derivatives due to damping, shape (m,), or (0,)
+            of a law without damping.
         size: Length of the whole array.
     """
 
@@ -61,43 +61,45 @@ class LawLayout:
         sizes += [num_velocities, num_residuals]
         ends = np.cumsum(sizes).tolist()
         fields = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
-        self.drive, self.manifold_state, self.virtual_input, self.status, self.held = fields[:5]
+        self.drive, self.manifold_state, self.virtual_input, self.status, self.varying_input = (
+            fields[:5]
+        )
         self.reference_velocity, self.residual = fields[5:]
         self.size: int = ends[-1]
 
 
 class FollowingLaw:
-    """The law that makes one robot follow a manifold.
+    """Law of one robot that follows a manifold.
 
-    For a path it is (3.29), (3.50), (3.58), (3.65) or (3.70), as the drives are.
+    For a path it is (3.29), (3.50), (3.58), (3.65) or (3.70), depending on the drives.
 
-    Angles go on over full turns: from one tick to the next they are unwrapped, so that a
-    reference that turns on and on is followed. An error angle of 90 deg or more is a fault,
+    Angles continue over full turns: from sample to sample they are unwrapped, so that the
+    reference may turn any number of times. An error angle of 90 deg or more is a fault,
     because (3.38) is not defined there.
 
-    The law is one function without state; everything it remembers is told to it.
+    The law is one function without state; its memory is an input.
 
     Args:
         robot: The robot.
         linearization: The compiled relation between drives and virtual output.
         stabilization: Gains of the virtual output's error dynamics.
-        inverse: Inverts the decoupling matrix.
+        inverse: Inverse of the decoupling matrix.
         limits: Magnitude limits of the drive input, shape (N,).
-        max_alpha: Where the feasible neighbourhood (3.9) ends for the controller, below 1.
-        safe_state: What the drives do after a fault.
-        tells_reference_velocity: Whether the results tell the joint velocities that the
-            reference asks for, ``q' - A^-1 (yhat' - yhat_p')``; for r > 1. With more joints than
-            outputs it is the one next to the posture reference's.
-        posture: What joints beyond the number of outputs do; for a robot that has some.
-        max_beyond_end: How far the tool may be beyond an end of an open path [m].
+        max_alpha: End of the feasible neighbourhood (3.9) for the controller, below 1.
+        safe_state: Safe state of the drives after a fault.
+        has_reference_velocity: Whether the results have the joint velocities of the reference,
+            ``q' - A^-1 (yhat' - yhat_p')``; for r > 1. With redundant joints they are closest to
+            the velocity of the posture reference.
+        posture: Posture control of redundant joints; needed if there are any.
+        max_beyond_end: Largest distance of the tool beyond an end of an open path [m].
 
     Attributes:
         layout: Layout of the results.
         function: The law as a CasADi function of :class:`LawInputs` by name; its result is laid
             out by ``layout``.
         robot: The robot.
-        inverse: Inverts the decoupling matrix.
-        safe_state: What the drives do after a fault.
+        inverse: Inverse of the decoupling matrix.
+        safe_state: Safe state of the drives after a fault.
 
     Raises:
         InputError: If dimensions do not match, or a limit is not positive.
@@ -113,7 +115,7 @@ class FollowingLaw:
         max_alpha: float,
         safe_state: SafeState,
         *,
-        tells_reference_velocity: bool = False,
+        has_reference_velocity: bool = False,
         posture: Posture | None = None,
         max_beyond_end: float = MAX_BEYOND_END,
     ) -> None:
@@ -137,7 +139,7 @@ class FollowingLaw:
         if linearization.is_redundant != (posture is not None):
             raise InputError(
                 f"posture: {'none' if posture is None else 'given'} for {n} joints and "
-                f"{coordinates} outputs; one is needed where there are more joints than outputs"
+                f"{coordinates} outputs; one is needed with more joints than outputs"
             )
         safe_state.check(n)
         self.robot, self.safe_state = robot, safe_state
@@ -145,12 +147,12 @@ class FollowingLaw:
         self.stabilization = stabilization
         self.limits = np.asarray(limits, dtype=float)
         self.posture, self.inverse = posture, inverse
-        self._tells_velocity = tells_reference_velocity
+        self._has_velocity = has_reference_velocity
         self.layout = LawLayout(
             n,
             linearization.num_outputs,
             linearization.relative_degree,
-            n if tells_reference_velocity else 0,
+            n if has_reference_velocity else 0,
             linearization.num_outputs if inverse.damped_below else 0,
         )
         self.function = self._compose(max_alpha, max_beyond_end)
@@ -164,19 +166,19 @@ class FollowingLaw:
         spare = None
         if self.posture is not None:
             motion = ca.horzsplit(aim.motion)
-            spare = spare_of(self.posture, self.robot, motion, u.posture)
+            spare = spare_motion(self.posture, self.robot, motion, u.posture)
         elif inverse.damped_below:
-            spare = coming_to_rest(self.stabilization, ca.horzsplit(aim.motion))
+            spare = rest_motion(self.stabilization, ca.horzsplit(aim.motion))
         solution = inverse.solve(aim.A, aim.rhs, spare)
-        x = left_to_outputs(drives, self.limits, solution)
-        wanted = drives.input(x)
-        drive = ca.fmin(ca.fmax(wanted, -self.limits), self.limits)
-        saturated = ca.sum1(ca.fabs(wanted) > self.limits)
-        told = ca.vertcat(ca.vec(aim.Y), aim.v)
+        x = limit_spare_motion(drives, self.limits, solution)
+        unlimited = drives.input(x)
+        drive = ca.fmin(ca.fmax(unlimited, -self.limits), self.limits)
+        saturated = ca.sum1(ca.fabs(unlimited) > self.limits)
+        outputs = ca.vertcat(ca.vec(aim.Y), aim.v)
         # limits turn NaN into numbers
-        finite = all_finite(wanted, told, solution.rcond, u.state, u.tau_ext)
+        finite = all_finite(unlimited, outputs, solution.rcond, u.state, u.tau_ext)
         usable = ca.logic_and(solution.usable, finite)
-        fault = judged(
+        fault = find_fault(
             u,
             linearization,
             aim,
@@ -184,8 +186,8 @@ class FollowingLaw:
             max_alpha=max_alpha,
             max_beyond_end=max_beyond_end,
         )
-        result = [drive, told, fault, solution.rcond, saturated, drives.held(x)]
-        if self._tells_velocity:
+        result = [drive, outputs, fault, solution.rcond, saturated, drives.varying_input(x)]
+        if self._has_velocity:
             result.append(self._reference_velocity(u, aim, spare))
         if inverse.damped_below:
             result.append(solution.residual)
@@ -200,10 +202,10 @@ class FollowingLaw:
 
     @cached_property
     def _bound(self) -> BoundFunction:
-        """The law with what it rests on, of the arguments of :meth:`evaluate`."""
+        """Law with its linearization, as a function of the arguments of :meth:`evaluate`."""
         has_posture = self.posture is not None
         u = LawInputs.symbols(self.linearization, has_posture=has_posture)
-        told = u._asdict()
+        arguments = u._asdict()
         relation = ExactLinearization(self.linearization).output(
             Values(),
             Values(
@@ -214,13 +216,15 @@ class FollowingLaw:
             ),
             0,
         )
-        result = self.function(**told | relation)["result"]
-        del told["relation"]
-        whole = ca.Function("whole_law", list(told.values()), [result], list(told), ["result"])
+        result = self.function(**arguments | relation)["result"]
+        del arguments["relation"]
+        whole = ca.Function(
+            "whole_law", list(arguments.values()), [result], list(arguments), ["result"]
+        )
         return BoundFunction(whole)
 
     def _reference_velocity(self, u: LawInputs, aim: Aim, spare: Spare | None) -> ca.SX:
-        """Return the joint velocities that the reference asks for, shape (N,)."""
+        """Return the joint velocities of the reference, shape (N,)."""
         n, moving = self.linearization.num_joints, u.state[self.linearization.velocity]
         error = aim.Y[:, 1] - aim.Y_p[:, 1]
         if self.posture is None or spare is None:
@@ -240,13 +244,13 @@ class FollowingLaw:
         point: np.ndarray,
         reference: np.ndarray,
         integral: np.ndarray,
-        last_held: np.ndarray | None = None,
+        last_varying_input: np.ndarray | None = None,
         tau_ext: np.ndarray | None = None,
         friction: np.ndarray | None = None,
         last_output: np.ndarray | None = None,
         posture: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Return the drive input of one tick and all that belongs to it.
+        """Return the drive input of one sample with all other results.
 
         Args:
             state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -254,12 +258,11 @@ class FollowingLaw:
             reference: Derivatives 0..r of the virtual output's reference by rows,
                 shape ((r + 1) m,).
             integral: Integral of the virtual output's error, shape (m,).
-            last_held: ``held`` of the last tick, shape (N,); if omitted nothing is
-                extrapolated.
+            last_varying_input: ``varying_input`` of the last sample, shape (N,); no extrapolation
+                if omitted.
             tau_ext: External joint torques and derivatives, shape (N (r - 1),); zero if omitted.
-            friction: ``tau_f`` that the drives are to overcome besides [Nm or N], shape (N,);
-                zero if omitted.
-            last_output: Virtual output of the last tick, shape (m,), from which angles go on;
+            friction: ``tau_f`` to be compensated [Nm or N], shape (N,); zero if omitted.
+            last_output: Virtual output of the last sample, shape (m,), from which angles continue;
                 if omitted they lie within half a turn of zero.
             posture: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,); only
                 for a law with a posture, and zero if omitted.
@@ -267,10 +270,12 @@ class FollowingLaw:
         Returns:
             New array laid out by ``layout``. With a fault, its ``drive`` must not be used.
         """
-        known = float(last_held is not None)
-        given = (state, point, reference, integral, last_held, known)
-        told = (tau_ext, friction, last_output, posture)
-        for argument, values in zip(self._bound.arguments.values(), given + told, strict=True):
+        known = float(last_varying_input is not None)
+        required = (state, point, reference, integral, last_varying_input, known)
+        optional = (tau_ext, friction, last_output, posture)
+        for argument, values in zip(
+            self._bound.arguments.values(), required + optional, strict=True
+        ):
             argument[:] = 0.0 if values is None else values
         self._bound.evaluate()
         return self._bound.results["result"].copy()

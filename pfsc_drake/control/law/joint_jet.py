@@ -1,4 +1,4 @@
-"""The joints' motion as a law knows it: from the state, and from what it asks for at this tick."""
+"""Joint motion by the law: from the measured state and the commanded highest derivative."""
 
 from typing import Any
 
@@ -13,20 +13,20 @@ from pfsc_drake.control.law.linearization import Linearization
 
 
 class JointJet(Block):
-    """Joint coordinates with all derivatives up to the one that the drives decide over.
+    """Joint coordinates with all derivatives up to the commanded one.
 
-    Derivatives 0..r-1 are those that the measured state implies, see :mod:`actuation`. The r-th is
-    what the law asks for at this tick: the drive input holds ``held = gain q^(r) + drift``, so that
-    ``q^(r) = gain^-1 (held - drift)``. Who is carried by the robot knows its motion from that,
-    without a difference quotient.
+    Derivatives 0..r-1 follow from the measured state, see :mod:`actuation`. The r-th is commanded
+    in this sample: the drive input contains ``varying_input = gain q^(r) + drift``, so that
+    ``q^(r) = gain^-1 (varying_input - drift)``. The motion of a workpiece on the robot follows
+    from it without a difference quotient.
 
     Ports:
-        relation (input): What drives do to the virtual output, from :class:`ExactLinearization`.
+        relation (input): Relation of drives and virtual output, from :class:`ExactLinearization`.
         evaluation (input): The law's result, laid out by its ``layout``.
         joint_jet (output): Derivatives 0..r by rows, shape ((r + 1) N,) [rad or m, per s, ..].
 
     Args:
-        linearization: Whose relation it is.
+        linearization: Linearization of the relation.
         layout: Layout of the law's result.
     """
 
@@ -42,13 +42,13 @@ class JointJet(Block):
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         relation = Relation.of(u.relation, self._linearization)
-        held = u.evaluation[self._layout.held]
-        top = self._highest(relation.gain, held - relation.drift)
+        varying_input = u.evaluation[self._layout.varying_input]
+        top = self._highest(relation.gain, varying_input - relation.drift)
         return {"joint_jet": ca.vertcat(ca.vec(relation.motion), top)}
 
 
 @once_per_content()
 def _highest_derivative(n: int) -> ca.Function:
-    """Return ``(gain, held - drift) -> q^(r)``, shapes (n, n), (n,) and (n,)."""
+    """Return ``(gain, varying_input - drift) -> q^(r)``, shapes (n, n), (n,) and (n,)."""
     gain, rest = ca.SX.sym("gain", n, n), ca.SX.sym("rest", n)
     return ca.Function("highest_derivative", [gain, rest], [solve(gain, rest)[0]])

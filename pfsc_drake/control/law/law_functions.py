@@ -1,4 +1,4 @@
-"""The parts of a law as expressions: what is wanted, what drives do for it, what forbids it."""
+"""Parts of a law as expressions: desired output motion, drive inputs, and faults."""
 
 import math
 from collections.abc import Sequence
@@ -24,20 +24,20 @@ _LARGEST_ANGLE = math.pi / 2.0
 
 
 class LawInputs(NamedTuple):
-    """What a law is told, as expressions.
+    """Inputs of a law, as expressions.
 
     Attributes:
         state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         manifold_point: Laid out by the manifold's layout.
-        relation: What drives do to the virtual output, see :class:`Relation`.
+        relation: Relation of drives and virtual output, see :class:`Relation`.
         reference: Derivatives 0..r of the virtual output's reference by rows, shape ((r + 1) m,).
         integral: Integral of the virtual output's error, shape (m,).
-        last_held: Part of the last tick's drive input that is extrapolated, shape (N,).
-        known: Whether there was one, 1 or 0.
+        last_varying_input: Extrapolated part of the last sample's drive input, shape (N,).
+        known: Whether there was a last sample, 1 or 0.
         tau_ext: External joint torques and derivatives up to order r - 2 by rows [Nm or N, per s,
             ..], shape (N max(r - 1, 0),).
-        friction: ``tau_f`` that the drives are to overcome besides [Nm or N], shape (N,).
-        last_output: Virtual output of the last tick, shape (m,), from which angles go on.
+        friction: ``tau_f`` to be compensated [Nm or N], shape (N,).
+        last_output: Virtual output of the last sample, shape (m,), from which angles continue.
         posture: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,), or (0,) of
             a law without posture.
     """
@@ -47,7 +47,7 @@ class LawInputs(NamedTuple):
     relation: ca.SX
     reference: ca.SX
     integral: ca.SX
-    last_held: ca.SX
+    last_varying_input: ca.SX
     known: ca.SX
     tau_ext: ca.SX
     friction: ca.SX
@@ -60,7 +60,7 @@ class LawInputs(NamedTuple):
 
         Args:
             linearization: The relation between drives and virtual output.
-            has_posture: Whether joints beyond the number of outputs have a posture reference.
+            has_posture: Whether redundant joints have a posture reference.
         """
         n, m = linearization.num_joints, linearization.num_outputs
         r = linearization.relative_degree
@@ -71,12 +71,12 @@ class LawInputs(NamedTuple):
 
 
 class Aim(NamedTuple):
-    """What a law wants of the virtual output.
+    """Desired motion of the virtual output.
 
     Attributes:
         Y: Derivatives 0..r-1 of the virtual output in columns, shape (m, r).
-        Y_p: Those of the reference from which errors count, shape (m, r).
-        v: Its r-th derivative that is wanted, shape (m,).
+        Y_p: Derivatives of the reference, shape (m, r).
+        v: Desired r-th derivative of the virtual output, shape (m,).
         A: Decoupling matrix, shape (m, N).
         rhs: ``v - b``, shape (m,).
         motion: Derivatives 0..r-1 of the joint coordinates in columns, shape (N, r).
@@ -95,47 +95,47 @@ class Aim(NamedTuple):
 class DriveRelation(NamedTuple):
     """Drive inputs as an affine function of the highest joint derivative ``x = q^(r)``.
 
-    ``held = gain x + drift`` is extrapolated by ``lead`` ticks, ``offset`` is added.
+    ``varying_input = gain x + drift`` is extrapolated by ``lead`` samples, ``offset`` is added.
 
     Attributes:
         gain: Shape (N, N).
         drift: Shape (N,).
-        offset: What is not extrapolated, shape (N,).
-        lead: In ticks.
-        last_held: Last held of the last tick, shape (N,).
+        offset: Constant part, shape (N,).
+        lead: Extrapolation in samples.
+        last_varying_input: ``varying_input`` of the last sample, shape (N,).
     """
 
     gain: ca.SX
     drift: ca.SX
     offset: ca.SX
     lead: ca.SX
-    last_held: ca.SX
+    last_varying_input: ca.SX
 
-    def held(self, x: ca.SX) -> ca.SX:
-        """Return what is extrapolated, shape (N,)."""
+    def varying_input(self, x: ca.SX) -> ca.SX:
+        """Return the extrapolated part of the drive input, shape (N,)."""
         return self.gain @ x + self.drift
 
     def input(self, x: ca.SX) -> ca.SX:
         """Return the drive input without limits, shape (N,)."""
-        held = self.held(x)
-        return held + self.lead * (held - self.last_held) + self.offset
+        varying = self.varying_input(x)
+        return varying + self.lead * (varying - self.last_varying_input) + self.offset
 
 
 def aim_and_drives(
     u: LawInputs, linearization: Linearization, stabilization: Stabilization
 ) -> tuple[Aim, DriveRelation]:
-    """Return what is wanted of the virtual output, and how drives act.
+    """Return the desired motion of the virtual output, and the relation of the drives.
 
     Args:
-        u: What the law is told.
-        linearization: Whose relation is told.
+        u: Inputs of the law.
+        linearization: Linearization of the relation.
         stabilization: Gains of the virtual output.
     """
     m, r = linearization.num_outputs, linearization.relative_degree
     Y, A, b, gain, drift, offset, motion = Relation.of(u.relation, linearization)
     y_p = ca.vertsplit(u.reference, m)
     if linearization.manifold.follows_time:
-        # the reference point moves with time, and the errors from it shall vanish
+        # the reference point moves with time, and the errors relative to it vanish
         y_p = [ca.SX(m, 1)] * (r + 1)
     angle = ca.SX(0.0)
     turning = indices(linearization.manifold.coordinates, Kind.ROTATIONAL)
@@ -145,16 +145,16 @@ def aim_and_drives(
     v = stabilization.virtual_input(ca.horzsplit(Y), y_p, u.integral)
     lead = where(u.known, linearization.lead, 0.0)
     aim = Aim(Y, ca.horzcat(*y_p[:r]), v, A, v - b, motion, angle)
-    return aim, DriveRelation(gain, drift, offset + u.friction, lead, u.last_held)
+    return aim, DriveRelation(gain, drift, offset + u.friction, lead, u.last_varying_input)
 
 
-def spare_of(
+def spare_motion(
     posture: Posture, robot: RobotModel, motion: Sequence[ca.SX], reference: ca.SX
 ) -> Spare:
-    """Return what joints are to do that the outputs leave free.
+    """Return the spare motion of redundant joints.
 
     Args:
-        posture: What a law wants of them.
+        posture: Posture control of the joints.
         robot: The robot.
         motion: Derivatives 0..r-1 of the joint coordinates, each (N,).
         reference: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,).
@@ -172,11 +172,11 @@ def spare_of(
     return Spare(terms.desired, scale, terms.slope, terms.rate, restraint)
 
 
-def coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> Spare:
-    """Return the desired motion by which joints come to rest wherever they are.
+def rest_motion(stabilization: Stabilization, motion: Sequence[ca.SX]) -> Spare:
+    """Return the desired motion by which joints come to rest at any position.
 
-    With the gains of the first coordinate but the one of its position; what is left of an error
-    dynamics with real poles is stable.
+    It has the gains of the first coordinate except the position gain; error dynamics with real
+    poles stay stable without it.
 
     Args:
         stabilization: Gains of the virtual output.
@@ -188,33 +188,33 @@ def coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> Spa
     return Spare(desired)
 
 
-def left_to_outputs(
+def limit_spare_motion(
     drives: DriveRelation, limits: np.ndarray, solution: DecouplingSolution
 ) -> ca.SX:
-    """Return the highest joint derivative, a posture held back as far as drives demand it.
+    """Return the highest joint derivative, with spare motion within the limits of the drives.
 
-    Between that with which joints come to rest as far as the outputs let them and the one that is
-    asked for, the largest share is taken that drives can do.
+    Between the solution for joints that come to rest and the requested one, the largest share
+    within the limits of the drives is used.
 
     Args:
-        drives: What they do.
+        drives: Relation of the drives.
         limits: Limits of their inputs, shape (N,).
-        solution: What is asked for.
+        solution: Requested solution.
     """
     x, rest = solution.x, solution.rest
     if rest is None:
         return x
-    wanted, least = drives.input(x), drives.input(rest)
-    step, beyond = wanted - least, ca.fabs(wanted) > limits
-    room = ca.DM(limits) - ca.sign(step) * least
-    held_back = ca.logic_and(beyond, step != 0.0)
-    share = where(held_back, room / where(held_back, ca.fabs(step), 1.0), 1.0)
-    # where the outputs alone ask for too much, a posture does not add to it
+    unlimited, least = drives.input(x), drives.input(rest)
+    step, beyond = unlimited - least, ca.fabs(unlimited) > limits
+    reserve = ca.DM(limits) - ca.sign(step) * least
+    limited = ca.logic_and(beyond, step != 0.0)
+    share = where(limited, reserve / where(limited, ca.fabs(step), 1.0), 1.0)
+    # if the outputs alone need too much, a posture does not add to it
     share = ca.fmin(ca.fmax(ca.mmin(share), 0.0), 1.0)
     return where(any_of(beyond), rest + share * (x - rest), x)
 
 
-def judged(
+def find_fault(
     u: LawInputs,
     linearization: Linearization,
     aim: Aim,
@@ -223,15 +223,15 @@ def judged(
     max_alpha: float,
     max_beyond_end: float,
 ) -> ca.SX:
-    """Return the :class:`Fault` that forbids the use of a result, the root cause first.
+    """Return the :class:`Fault` of a result, the root cause first.
 
     Args:
-        u: What the law is told.
+        u: Inputs of the law.
         linearization: The relation between drives and virtual output.
-        aim: What the law wants of the virtual output.
+        aim: Desired motion of the virtual output.
         usable: Whether the decoupling matrix could be inverted, and all results are finite.
-        max_alpha: Where the feasible neighbourhood (3.9) ends for the controller.
-        max_beyond_end: How far the tool may be beyond an end of an open path [m].
+        max_alpha: End of the feasible neighbourhood (3.9) for the controller.
+        max_beyond_end: Largest distance of the tool beyond an end of an open path [m].
     """
     layout = linearization.manifold.layout
     alpha, status = u.manifold_point[layout.alpha], u.manifold_point[layout.status]
@@ -239,13 +239,13 @@ def judged(
     # written so that NaN is a fault
     inside, beyond = alpha < max_alpha, _beyond_ends(linearization, aim, max_beyond_end)
     aligned = aim.angle < _LARGEST_ANGLE
-    told = all_finite(u.state, u.reference, u.integral, u.tau_ext, u.friction, u.posture)
+    finite = all_finite(u.state, u.reference, u.integral, u.tau_ext, u.friction, u.posture)
     return first_of(
         (
             all_of(usable, inside, ca.logic_not(not_converged), aligned, ca.logic_not(beyond)),
             Fault.NONE,
         ),
-        (ca.logic_not(told), Fault.INPUT_NOT_FINITE),
+        (ca.logic_not(finite), Fault.INPUT_NOT_FINITE),
         (not_converged, Fault.PROJECTION_FAILED),
         (aim.angle >= _LARGEST_ANGLE, Fault.ORIENTATION_ERROR),
         (beyond, Fault.BEYOND_END),
@@ -255,7 +255,7 @@ def judged(
 
 
 def _beyond_ends(linearization: Linearization, aim: Aim, allowed: float) -> ca.SX:
-    """Return whether a coordinate is farther beyond an end than is allowed [m]."""
+    """Return whether a coordinate is beyond an end by more than the allowed distance [m]."""
     ends = [coordinate.ends for coordinate in linearization.manifold.coordinates]
     outside = [
         ca.logic_or(aim.Y[k, 0] < first - allowed, aim.Y[k, 0] > last + allowed)

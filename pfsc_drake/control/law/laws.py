@@ -1,4 +1,4 @@
-"""The laws: one record each, with all that depends on which of them is chosen."""
+"""Laws: one record each, with all properties of the law."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,22 +10,22 @@ from pfsc_drake.control.law.actuation import DrivenMotion, DriveState
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 
-# K_s epsilon D_b T_s / D_M, up to which the damping (3.71) only damps; sampled, it is unstable
+# largest K_s epsilon D_b T_s / D_M for pure damping by (3.71); sampled, it is unstable
 # from 2 on. Six axes of pfc_comau_6r leave the path by 0.41 mm at 1.56, by 0.06 mm at 0.3
 FASTEST_DAMPING = 0.3
 
 
 @dataclass
 class ActuationOptions:
-    """What some of the actuation models need besides the robot.
+    """Options of the actuation models.
 
     Attributes:
         sampling_time: Sampling time ``T_s`` of the controller [s] (``visco_elastic``,
             ``elastic``); 0 for a continuous controller.
         boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], shape (N,)
             (``singular_perturbation``).
-        leads_torque: Whether torques lead to the middle of their hold (``rigid``), as those of the
-            sampled elastic laws always do.
+        leads_torque: Whether torques are extrapolated to the middle of their hold (``rigid``), as
+            always with the sampled elastic laws.
     """
 
     sampling_time: float = 1e-3
@@ -35,19 +35,18 @@ class ActuationOptions:
 
 @dataclass(frozen=True)
 class Law:
-    """A law: its actuation model, and what follows from it.
+    """Law: actuation model and its properties.
 
     Attributes:
-        name: Its name in scenarios and calls.
+        name: Name in scenarios and calls.
         relative_degree: ``r``: the virtual output's r-th derivative is affine in the drives.
         drive: ``(robot, state, options)`` to the affine relation between drives and ``q^(r)``;
             refuses robots and options that do not suit the law.
-        demand_order: Highest derivative of the joint coordinates that the drives' torques depend
-            on.
-        lead: Sampling intervals by which the held part of the drive input is extrapolated.
-        can_lead: Whether torques may lead to the middle of their hold by choice.
-        on_motors: Whether the output is that of the motors where joints are elastic.
-        knows_links: Whether the links' side of elastic joints has to be known.
+        demand_order: Highest derivative of the joint coordinates in the drives' torques.
+        lead: Extrapolation of the varying part of the drive input [sampling intervals].
+        can_lead: Whether extrapolation to the middle of the hold is an option.
+        on_motors: Whether the output is a function of the motors if joints are elastic.
+        knows_links: Whether the law needs the links' side of elastic joints.
         inverts_springs: Whether the springs' deflection is part of the drives' motion.
         damps_springs: Whether torques of springs are damped by a fast part (3.71).
         fastest_resonance: Resonance of joints up to which the sampled law is accurate, in rad per
@@ -105,10 +104,9 @@ def _sampling_time(options: ActuationOptions) -> float:
 
 
 def _damping_hint(robot: RobotModel, options: ActuationOptions) -> str:
-    """Return values of ``epsilon D_b`` to begin with.
+    """Return initial values of ``epsilon D_b``.
 
-    They damp each motor against a link that stands still by sqrt(1/2), where sampling allows that
-    much.
+    They damp each motor against a link at rest by sqrt(1/2), if sampling permits.
     """
     elastic = robot.elastic_joints
     if not elastic.any():

@@ -13,13 +13,13 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel
 
-# sampling intervals by which torques lead to the middle of their hold
+# sampling intervals from the begin of a hold to its middle
 _MIDDLE = 0.5
 
 
 @dataclass(frozen=True)
 class Linearization:
-    """The affine relation between the drives and the virtual output's r-th derivative.
+    """Affine relation between the drives and the virtual output's r-th derivative.
 
     ``yhat^(r) = A q^(r) + b`` and ``u = gain q^(r) + drift + offset``.
 
@@ -31,15 +31,14 @@ class Linearization:
             ``state`` is ``[q_J, v_J, q_M, v_M]``, shape (4N,); ``tau_ext`` holds the
             external torques and their derivatives up to order r - 2, shape
             (N max(r - 1, 0),). ``Y`` holds the derivatives 0..r-1 of the virtual output in
-            its columns, shape (m, r), ``motion`` those of the joint coordinates, (N, r).
+            its columns, shape (m, r), ``motion`` the derivatives of the joint coordinates, (N, r).
         relative_degree: ``r``.
-        manifold: The manifold, which lays out its point.
+        manifold: The manifold, with the layout of its point.
         num_joints: ``N``.
-        lead: By how many sampling intervals ``gain q^(r) + drift`` is to be extrapolated:
-            to the middle of the interval (``elastic``; ``rigid`` if that is chosen) or to its end
-            (``visco_elastic``).
-        velocity: Which part of the state is ``q'`` of the motion that is linear: ``v_J``, or
-            ``v_M`` where the law acts on motors.
+        lead: Extrapolation of ``gain q^(r) + drift`` in sampling intervals: to the middle of the
+            interval (``elastic``; ``rigid`` by choice) or to its end (``visco_elastic``).
+        velocity: Part of the state with ``q'`` of the linearized motion: ``v_J``, or ``v_M`` if the
+            law acts on motors.
     """
 
     function: ca.Function
@@ -66,16 +65,16 @@ def linearize(
     manifold: Manifold,
     options: ActuationOptions | None = None,
 ) -> Linearization:
-    """Derive the law that makes a robot follow a manifold.
+    """Derive the linearization of a robot along a manifold.
 
-    For a path it is (3.28), (3.50), (3.57), (3.64); for a point that moves along the path with
-    time, the computed torque law (Sec. 3.8.4).
+    For a path it is (3.28), (3.50), (3.57), (3.64); for a trajectory along the path, the computed
+    torque law (Sec. 3.8.4).
 
     Args:
         robot: The robot.
-        law: Actuation model that the law is made for, a key of ``LAWS``.
-        manifold: What to follow; its order is the relative degree of the law.
-        options: What the actuation model needs besides.
+        law: Actuation model of the law, a key of ``LAWS``.
+        manifold: Manifold to follow; its order is the relative degree of the law.
+        options: Options of the actuation model.
 
     Raises:
         InputError: If the law is unknown, or does not suit the robot or the manifold.
@@ -149,7 +148,7 @@ def decoupling_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
 
     Args:
         robot: The robot.
-        manifold: What to follow; of one that follows time, A is the same at any pace.
+        manifold: Manifold to follow; A does not depend on the speed of one that follows time.
 
     Returns:
         CasADi function ``(q, manifold_point) -> A``, shapes (N,), (size,) and (m, N).
@@ -157,7 +156,7 @@ def decoupling_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
     q, rate = ca.SX.sym("q", robot.dimension), ca.SX.sym("rate", robot.dimension)
     point = ca.SX.sym("manifold_point", manifold.layout.size)
     y, R_e = robot.tool_pose(joint_jets([q, rate]))
-    output = manifold.virtual_output(y, R_e, point, _standing(manifold))
+    output = manifold.virtual_output(y, R_e, point, _references_at_rest(manifold))
     slopes = ca.jacobian(ca.vertcat(*[x.coefficients[1] for x in output]), rate)
     return ca.Function(
         "decoupling", [q, point], ca.cse([ca.densify(slopes)]), ["q", "manifold_point"], ["A"]
@@ -178,16 +177,16 @@ def virtual_output_function(robot: RobotModel, manifold: Manifold) -> ca.Functio
     q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
     point = ca.SX.sym("manifold_point", manifold.layout.size)
     y, R_e = robot.tool_pose(joint_jets([q, v]))
-    output = manifold.virtual_output(y, R_e, point, _standing(manifold))
+    output = manifold.virtual_output(y, R_e, point, _references_at_rest(manifold))
     Y = ca.horzcat(*[ca.vertcat(*[x.derivative(k) for x in output]) for k in range(2)])
     return ca.Function("virtual_output", [q, v, point], [ca.densify(Y)])
 
 
 def tangential_count(manifold: Manifold) -> int:
-    """Return how many tangential coordinates a manifold has."""
+    """Return the number of tangential coordinates of a manifold."""
     return sum(coordinate.kind is Kind.TANGENTIAL for coordinate in manifold.coordinates)
 
 
-def _standing(manifold: Manifold) -> list[Jet]:
-    """Return references of tangential coordinates that stand at zero."""
+def _references_at_rest(manifold: Manifold) -> list[Jet]:
+    """Return references of tangential coordinates at rest at zero."""
     return [Jet([ca.SX(0)] * (manifold.layout.order + 1))] * tangential_count(manifold)

@@ -1,16 +1,16 @@
 """The closed loop of a law and its robot near rest, linear and sampled.
 
-Near rest, and with weight that hardly changes, joints with ``q_M - q_J`` elastic obey::
+Near rest, and with almost constant weight, joints with ``q_M - q_J`` elastic obey::
 
     D_E q_J'' = K_s (q_M - q_J) + K_d (v_M - v_J) - G q_J
     D_M q_M'' = tau_d - K_s (q_M - q_J) - K_d (v_M - v_J) - f_v v_M
 
-with the weight's slope ``G = d g_L / d q``; of a rigid joint motor and link are one. Between two
-ticks ``tau_d`` is held, which integrates exactly. The law answers with
-``tau_d = gain q^(r) + drift + offset``, extrapolated as :class:`FollowingLaw` does it; its slopes
-are differences of its own function :class:`Linearization`, so that no law is written down twice,
-and ``q^(r)`` is what :class:`DecouplingInverse` makes of outputs and posture. The robot that moves
-may differ from the one that the law believes.
+with the weight's slope ``G = d g_L / d q``; motor and link of a rigid joint are equal. Between
+two samples ``tau_d`` is held, which integrates exactly. The law commands
+``tau_d = gain q^(r) + drift + offset``, extrapolated as in :class:`FollowingLaw`; its slopes are
+differences of its own function :class:`Linearization`, so that no law is written down twice, and
+``q^(r)`` is the solution of :class:`DecouplingInverse` for outputs and posture. The actual robot
+may differ from the nominal model of the law.
 """
 
 from dataclasses import dataclass
@@ -27,17 +27,17 @@ from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.robot.robot_model import RobotModel, gravity_torque
 
 _DIFFERENCE = 1e-6
-# reciprocal condition number that a start is never refused for
+# reciprocal condition number below that of any start
 _SINGULAR = 1e-12
 
 
 @dataclass(frozen=True)
 class RestPosture:
-    """Where a robot rests on a manifold.
+    """Rest posture of a robot on a manifold.
 
     Attributes:
         q_J: Joint coordinates, shape (N,).
-        point: The manifold's point there, laid out by the manifold's layout.
+        point: Manifold point there, laid out by the manifold's layout.
     """
 
     q_J: np.ndarray
@@ -45,18 +45,18 @@ class RestPosture:
 
 
 class LoopAtRest:
-    """A law on a robot at rest, with any gains and any factor on masses and stiffnesses.
+    """Loop of a law and a robot at rest, with any gains and any factor on masses and stiffnesses.
 
-    For laws that command torques, and are told of no external ones.
+    For laws that command torques, without external torques as inputs.
 
     Args:
-        robot: The robot, as the law believes it.
+        robot: Nominal model of the robot.
         linearization: The law, of relative degree 2 or more.
-        rest: Where it rests.
+        rest: Rest posture.
         period: Sampling time ``T_s`` [s].
-        posture: What joints beyond the number of outputs do, if there are any.
-        ticks: After how many ticks torques act that are told, which the law knows: it answers to
-            the state that the believed robot has then.
+        posture: Posture control of redundant joints, if there are any.
+        ticks: Delay of the commanded torques in samples, known to the law: it acts on the predicted
+            state of the nominal model.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class LoopAtRest:
     def _differentiate(
         self, law: Linearization, state: np.ndarray, point: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Take the slopes of virtual output and drive input against the measured joint state.
+        """Compute the slopes of virtual output and drive input by the measured joint state.
 
         Returns:
             Decoupling matrix and gain at rest.
@@ -100,26 +100,26 @@ class LoopAtRest:
             return [np.array(y) for y in law.function(x, no_torque, point, *further)]
 
         _, A, _, gain, *_ = results(state)
-        Y, held, offset = np.zeros((4 * n, r, m)), np.zeros((4 * n, n)), np.zeros((4 * n, n))
+        Y, varying, offset = np.zeros((4 * n, r, m)), np.zeros((4 * n, n)), np.zeros((4 * n, n))
         motion = np.zeros((4 * n, r, n))
         for i in range(4 * n):
             shift = np.zeros(4 * n)
             shift[i] = _DIFFERENCE
             plus, minus = results(state + shift), results(state - shift)
             Y[i] = ((plus[0] - minus[0]) / (2.0 * _DIFFERENCE)).T
-            held[i] = ((plus[4] - minus[4]) / (2.0 * _DIFFERENCE)).ravel()
+            varying[i] = ((plus[4] - minus[4]) / (2.0 * _DIFFERENCE)).ravel()
             offset[i] = ((plus[5] - minus[5]) / (2.0 * _DIFFERENCE)).ravel()
             motion[i] = ((plus[6] - minus[6]) / (2.0 * _DIFFERENCE)).T
-        # the point is that of the posture, and what moves with the tool is in the decoupling matrix
+        # the point belongs to the posture, and its motion is in the decoupling matrix
         acts_on_motors = r == 2 and np.any(Y[3 * n :, 1])
         Y[:, 0] = 0.0
         first = 2 * n if acts_on_motors else 0
         Y[first : first + n, 0] = A.T
-        self._Y, self._drift, self._offset, self._motion = Y, held.T, offset.T, motion
+        self._Y, self._drift, self._offset, self._motion = Y, varying.T, offset.T, motion
         return A, gain
 
     def _solve(self, A: np.ndarray, gain: np.ndarray, posture: Posture, q: np.ndarray) -> None:
-        """Find how the drives answer to outputs, desired values and the coordinate of a posture."""
+        """Compute the slopes of the drives by outputs, desired values and a posture coordinate."""
         n, m, inverse = self._n, len(A), DecouplingInverse(_SINGULAR)
         symbol, rest = ca.SX.sym("q", n), [ca.SX(n, 1)] * (self._motion.shape[1])
         expressions = posture_expressions(
@@ -148,14 +148,15 @@ class LoopAtRest:
             else answer + np.outer(self._per_rate, self._slope @ desired)
         )
 
-    def closed(self, gains: LoopGains, mass: float = 1.0, stiffness: float = 1.0) -> np.ndarray:
-        """Return the map of one sampling interval, from right after a tick to right after the next.
+    def closed_loop(
+        self, gains: LoopGains, mass: float = 1.0, stiffness: float = 1.0
+    ) -> np.ndarray:
+        """Return the map of one sampling interval, from just after a sample to just after the next.
 
         Args:
             gains: Gains of all coordinates, and of the posture if there is one.
-            mass: Mass of the robot that moves, in units of the believed one: links' masses and
-                inertias.
-            stiffness: The same of joint stiffnesses.
+            mass: Actual masses and inertias of the links, relative to the nominal ones.
+            stiffness: Actual joint stiffnesses, relative to the nominal ones.
 
         Returns:
             Shape (k, k); the last N variables are the newest drive inputs.
@@ -163,15 +164,16 @@ class LoopAtRest:
         interval, answer, _ = self._parts(gains, mass, stiffness)
         return np.asarray(answer @ interval)
 
-    def pushed(self, gains: LoopGains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what external torques do that the law is not told of.
+    def disturbance_response(self, gains: LoopGains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the response to external torques that are no inputs of the law.
 
         Args:
             gains: Gains of all coordinates, and of the posture if there is one.
 
         Returns:
             ``A``, ``B``, ``C`` of ``x_{k+1} = A x_k + B tau_ext``, ``q_J = C x_k``, the torques
-            [Nm or N] being held over an interval, and ``q_J`` the links' way from rest [rad or m].
+            [Nm or N] constant over an interval, and ``q_J`` the links' deviation from rest [rad or
+            m].
         """
         interval, answer, pushed = self._parts(gains, 1.0, 1.0)
         links = np.zeros((self._n, len(interval)))
@@ -181,18 +183,18 @@ class LoopAtRest:
     def _parts(
         self, gains: LoopGains, mass: float, stiffness: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what an interval does, how the law answers then, and what torques do meanwhile."""
+        """Return maps of an interval, of the law's sample after it, and of torques in between."""
         n, period, ticks = self._n, self._period, self._ticks
         Phi, Gamma, Gamma_ext, C = self._interval(mass, stiffness)
         size = len(Phi)
         error = self._Y[:, 0].T @ C
         v = -np.einsum("km,ikm->mi", gains.outputs.proportional, self._Y) @ C
-        held = self._per_output @ v + self._drift @ C
+        varying = self._per_output @ v + self._drift @ C
         if gains.posture is not None:
-            held = held + self._posture_answer(gains.posture) @ C
-        drive = held + self._offset @ C
+            varying = varying + self._posture_answer(gains.posture) @ C
+        drive = varying + self._offset @ C
         summed = -self._per_output * gains.outputs.integral
-        # variables: motion, held part of the last tick, summed error, drive inputs, oldest first
+        # variables: motion, last varying input, summed error, drive inputs, oldest first
         m = len(error)
         inputs = size + n + m
         count = inputs + (ticks + 1) * n
@@ -200,22 +202,22 @@ class LoopAtRest:
         interval[:size, :size], pushed[:size] = Phi, Gamma_ext
         interval[:size, inputs : inputs + n] = Gamma
         motion, last, sums, sent = np.split(np.eye(count), [size, size + n, inputs])
-        # what is on its way acts on the robot as it is believed
-        seen = motion
+        # commands in transit act on the nominal model
+        state = motion
         if ticks:
             Phi, Gamma, _, _ = self._interval(1.0, 1.0)
-        on_its_way = sent[n:]
-        for told_then in np.split(on_its_way, ticks) if ticks else []:
-            seen = Phi @ seen + Gamma @ told_then
-        now_held = held @ seen + summed @ sums
-        told = drive @ seen + summed @ sums + self._lead * (now_held - last)
-        answer = [motion, now_held, sums + period * error @ seen, on_its_way, told]
+        in_transit = sent[n:]
+        for command in np.split(in_transit, ticks) if ticks else []:
+            state = Phi @ state + Gamma @ command
+        varying_now = varying @ state + summed @ sums
+        newest = drive @ state + summed @ sums + self._lead * (varying_now - last)
+        answer = [motion, varying_now, sums + period * error @ state, in_transit, newest]
         return interval, np.vstack(answer), pushed
 
     def _interval(
         self, mass: float, stiffness: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return what a robot does from tick to tick: ``Phi``, ``Gamma``, ``Gamma_ext``, ``C``."""
+        """Return the robot's map of an interval: ``Phi``, ``Gamma``, ``Gamma_ext``, ``C``."""
         n = self._n
         F, B, B_ext, C = self._plant(mass, stiffness)
         size = len(F)
@@ -228,7 +230,7 @@ class LoopAtRest:
     def _plant(
         self, mass: float, stiffness: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return what the moving robot does.
+        """Return the continuous dynamics of the actual robot.
 
         Returns:
             ``F``, ``B``, ``B_ext``, ``C`` of ``x' = F x + B tau_d + B_ext tau_ext`` and
@@ -236,7 +238,7 @@ class LoopAtRest:
         """
         n, elastic, robot = self._n, self._elastic, self._robot
         soft = np.flatnonzero(elastic)
-        # coordinates z: all links, and the motors that are not one with theirs
+        # coordinates z: all links, and the motors of elastic joints
         motors = np.eye(n, n + len(soft))
         motors[soft] = 0.0
         motors[soft, n + np.arange(len(soft))] = 1.0

@@ -1,4 +1,4 @@
-"""What joints do that the outputs leave free: where they stay, and what pulls them."""
+"""Posture control of redundant joints: reference, weight, and potentials."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,31 +22,30 @@ PostureCoordinate = Callable[[Sequence[Jet]], Jet]
 
 # rad, the range of a joint without limits
 _WHOLE_TURN = 2.0 * np.pi
-# s, with which joints come to rest at their ends
+# s, time constant of joints that come to rest at their ends
 _TO_END = 0.1
 
 
 @dataclass(frozen=True)
 class Posture:
-    """How N joints keep next to a posture reference ``q_0(t)`` as far as the outputs let them.
+    """Tracking of a posture reference ``q_0(t)`` by N joints in the null space of the outputs.
 
-    The desired highest joint derivative is that of linear error dynamics::
+    The desired highest joint derivative follows from linear error dynamics::
 
         w = q_0^(r) - sum_k a_{k+1} (q - q_0)^(k)
 
-    and what the outputs ask for deviates from it as little as possible, judged by a weight. With
-    a coordinate ``c(q)`` of the joints, its error ``c(q) - c(q_0)`` obeys the same linear
-    dynamics exactly, whatever the outputs do, as long as it can move without them.
+    and the solution for the outputs has the least weighted deviation from it. With a coordinate
+    ``c(q)`` of the joints, its error ``c(q) - c(q_0)`` obeys the same linear dynamics exactly,
+    independent of the outputs, as long as it can move without them.
 
     Attributes:
         stabilization: Gains of the joints' deviations from the reference, all of one kind.
         weight: ``W``'s diagonal, shape (N,): a joint of larger weight deviates less; None for
             the robot's inertia in its present posture, rotors included.
-        coordinate: What else is to be kept; None for nothing.
-        speeds: How fast joints may become by all of this together with what the outputs take of
-            them, shape (N,), infinite for any; None to hold nothing back.
-        ends: Lowest and highest joint coordinates to which they may be led, shape (2, N); None for
-            any.
+        coordinate: Further controlled coordinate; None for none.
+        speeds: Largest joint speeds by posture and outputs together, shape (N,), infinite for any;
+            None for no restraint.
+        ends: Lowest and highest joint coordinates for the posture, shape (2, N); None for any.
 
     Raises:
         InputError: If a weight is not positive, or is not one per joint.
@@ -65,7 +64,7 @@ class Posture:
 
     @property
     def settling(self) -> float:
-        """What turns the highest derivative that is asked for into a velocity.
+        """Divisor from the desired highest derivative to a velocity.
 
         ``a_2``, by which ``w`` changes with the joints' velocity; 1 where it is a velocity.
         """
@@ -73,13 +72,13 @@ class Posture:
         return float(gains[1][0]) if len(gains) > 1 else 1.0
 
     def to_ends(self, q: ca.SX) -> ca.SX | None:
-        """Return how fast joints may go upwards and downwards in view of their ends.
+        """Return the largest speeds of joints upwards and downwards in view of their ends.
 
         Args:
             q: Joint coordinates, shape (N, 1).
 
         Returns:
-            Shape (N, 2), or None for as fast as they like.
+            Shape (N, 2), or None for any.
         """
         if self.ends is None:
             return None
@@ -88,22 +87,22 @@ class Posture:
 
     @property
     def scale(self) -> np.ndarray | None:
-        """``S`` with ``S S' = W^-1``, shape (N, N), where it is constant and not the identity."""
+        """``S`` with ``S S' = W^-1``, shape (N, N), if it is constant and not the identity."""
         if self.weight is None or np.all(self.weight == 1.0):
             return None
         return np.diag(1.0 / np.sqrt(self.weight))
 
 
 class PostureExpressions(NamedTuple):
-    """What a posture asks for, as expressions.
+    """Demands of a posture, as expressions.
 
     Attributes:
         desired: Highest joint derivative ``w``, shape (N, 1).
-        rest: What it would be without any place to go, ``-sum_k a_{k+1} q^(k)`` from k = 1 on, by
-            which joints come to rest, shape (N, 1).
+        rest: The same without a goal, ``-sum_k a_{k+1} q^(k)`` from k = 1 on, by which joints come
+            to rest, shape (N, 1).
         weight: ``W``, shape (N, N), if it varies, else empty.
         slope: ``dc/dq`` of the coordinate, shape (N, 1), or empty.
-        rate: ``dc/dq q^(r)`` that the coordinate is to have, shape (1, 1), or empty.
+        rate: Desired ``dc/dq q^(r)`` of the coordinate, shape (1, 1), or empty.
     """
 
     desired: ca.SX
@@ -116,13 +115,13 @@ class PostureExpressions(NamedTuple):
 def posture_expressions(
     posture: Posture, robot: RobotModel, motion: Sequence[ca.SX], reference: Sequence[ca.SX]
 ) -> PostureExpressions:
-    """Return what a posture asks for.
+    """Return the demands of a posture.
 
     Args:
         posture: The posture.
         robot: The robot, N joints.
         motion: Joint coordinates and derivatives, orders 0..r-1, each (N, 1).
-        reference: Those of the posture reference, orders 0..r, each (N, 1).
+        reference: Posture reference and derivatives, orders 0..r, each (N, 1).
     """
     empty, stabilization = ca.SX(0, 1), posture.stabilization
     desired = stabilization.virtual_input(motion, reference, ca.SX(robot.dimension, 1))
@@ -135,26 +134,26 @@ def posture_expressions(
     if posture.coordinate is None:
         return PostureExpressions(desired, rest, weight, empty, empty)
     actual = posture.coordinate(joint_jets([*motion, ca.SX(robot.dimension, 1)]))
-    wanted = posture.coordinate(joint_jets(reference))
+    desired_coordinate = posture.coordinate(joint_jets(reference))
     q = ca.SX.sym("q", robot.dimension)
     angle = posture.coordinate(joint_jets([q, ca.SX(robot.dimension, 1)])).coefficients[0]
     slope = ca.substitute(ca.gradient(angle, q), q, motion[0])
-    rate = wanted.derivative(stabilization.relative_degree) - actual.derivative(
+    rate = desired_coordinate.derivative(stabilization.relative_degree) - actual.derivative(
         stabilization.relative_degree
     )
     for k, gains in enumerate(stabilization.proportional):
-        error = actual.derivative(k) - wanted.derivative(k)
-        if k == 0:  # the shorter way round
+        error = actual.derivative(k) - desired_coordinate.derivative(k)
+        if k == 0:  # the shorter direction
             error = ca.atan2(ca.sin(error), ca.cos(error))
         rate = rate - gains[0] * error
     return PostureExpressions(desired, rest, weight, ca.densify(slope), rate)
 
 
 def range_weight(robot: RobotModel) -> np.ndarray:
-    """Return the weight by which joints deviate in proportion to their ranges, shape (N,).
+    """Return the weight for deviations in proportion to the joint ranges, shape (N,).
 
     Args:
-        robot: The robot; joints without limits count as ones that turn once.
+        robot: The robot; joints without limits count as one revolution.
     """
     lower, upper = robot.gather("position_limits").T
     span = np.where(np.abs(upper - lower) < UNLIMITED, upper - lower, _WHOLE_TURN)
@@ -163,10 +162,10 @@ def range_weight(robot: RobotModel) -> np.ndarray:
 
 POTENTIALS = ("limits", "conditioning")
 
-# of the limits' potential, by how much it steepens: its second derivative is 4 times that of the
-# middle at a limit
+# steepening of the limits' potential: its second derivative at a limit is 4 times that in the
+# middle
 _STEEPENING = 0.5
-# of the conditioning's gradient, up to which it grows [rad]
+# largest gradient of the conditioning [rad]
 _LARGEST_PULL = 1.0
 
 
@@ -174,21 +173,21 @@ _LARGEST_PULL = 1.0
 def free_motion_function(
     robot: RobotModel, manifold: Manifold, potential: str = "", *, inertial: bool = False
 ) -> ca.Function:
-    """Return what decides how a posture may move, and how it is pulled, ``-dV/dq``.
+    """Return the null space of a posture, and the pull of its potential, ``-dV/dq``.
 
     ``limits``: ``V = sum h^2 (x^2 + x^4 / 2) / 2`` over the joints with limits, x being the
     distance from the middle over half the range h: near the middle a spring of stiffness one, at
     a limit four times as stiff. Joints without limits are not pulled.
 
     ``conditioning``: ``V = -log(det(A A')) / 2``, the manipulability of the outputs (rows in m
-    and rad) on the manifold as it is. Near singular postures its gradient g grows over all
-    bounds; ``g / sqrt(1 + |g|^2)`` is used.
+    and rad) on the present manifold. Near singular postures its gradient g is unbounded;
+    ``g / sqrt(1 + |g|^2)`` is used.
 
     Args:
         robot: The robot.
-        manifold: What it follows.
+        manifold: Followed manifold.
         potential: One of ``POTENTIALS``, or empty for none.
-        inertial: Whether motions are weighed by the robot's inertia.
+        inertial: Whether the weight is the robot's inertia.
 
     Returns:
         CasADi function ``(q, manifold_point) -> (A, pull, weight)``, shapes (m, N), (N,) [rad or

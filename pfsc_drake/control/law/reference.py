@@ -1,4 +1,4 @@
-"""Reference motions along a path, and a start at the tool without a jump."""
+"""Reference motions along a path, and a smooth start at the tool."""
 
 from collections.abc import Sequence
 from math import comb
@@ -38,7 +38,7 @@ def rest_to_rest(
 
     Raises:
         InputError: If there are fewer than two points, a limit is not positive, or a part of the
-            motion is too short beside the whole for its time to be told.
+            motion is too short to be resolved in time.
     """
     for name, value in {"velocity": velocity, "acceleration": acceleration}.items():
         if not (np.isfinite(value) and value > 0.0):
@@ -57,7 +57,7 @@ def rest_to_rest(
             if not times[-2] < times[-1] < np.inf:
                 raise InputError(
                     f"reference: a part of the motion takes {duration:.3g} s from "
-                    f"t = {times[-2]:.6g} s on, which no clock can tell; allowed: velocity, "
+                    f"t = {times[-2]:.6g} s on, below the resolution of time; allowed: velocity, "
                     "acceleration and dwell closer to the length of the motion"
                 )
 
@@ -97,7 +97,7 @@ def _move(
 def straight_lines(
     places: Sequence[Sequence[float]], velocity: float, acceleration: float, dwell: float = 0.0
 ) -> PiecewisePolynomialCurve:
-    """Return a C^4 motion of several coordinates along straight lines, resting at every place.
+    """Return a C^4 motion of several coordinates along straight lines, with rests at all points.
 
     Args:
         places: Coordinates to visit, each of the same number [m]; the first is the start.
@@ -109,44 +109,46 @@ def straight_lines(
         A curve of as many dimensions over time [s], starting at t = 0.
 
     Raises:
-        InputError: If fewer than two places differ, the motion is far too long or short, or places
+        InputError: If fewer than two points differ, the motion is far too long or short, or points
             have different numbers of coordinates.
     """
-    table = _checked_places(places)
-    # the coordinate that moves most keeps the limits, the others move in proportion
+    table = _check_points(places)
+    # the coordinate with the longest distance is limited, the others move in proportion
     largest = np.abs(np.diff(table, axis=0)).max(axis=1)
-    way = np.concatenate([[0.0], np.cumsum(largest)])
-    along = rest_to_rest(way.tolist(), velocity=velocity, acceleration=acceleration, dwell=dwell)
+    distances = np.concatenate([[0.0], np.cumsum(largest)])
+    along = rest_to_rest(
+        distances.tolist(), velocity=velocity, acceleration=acceleration, dwell=dwell
+    )
     middles = (along.breakpoints[:-1] + along.breakpoints[1:]) / 2.0
     progress = along.derivatives(middles, 0)[:, 0, 0]
-    leg = np.clip(np.searchsorted(way, progress) - 1, 0, len(largest) - 1)
+    leg = np.clip(np.searchsorted(distances, progress) - 1, 0, len(largest) - 1)
     direction = np.diff(table, axis=0) / np.where(largest > 0.0, largest, 1.0)[:, None]
     coefficients = along.coefficients * direction[leg][:, None, :]
-    coefficients[:, 0] += table[leg] - way[leg][:, None] * direction[leg]
+    coefficients[:, 0] += table[leg] - distances[leg][:, None] * direction[leg]
     return PiecewisePolynomialCurve(along.breakpoints, coefficients, closed=False)
 
 
 def together(
     *motions: tuple[Sequence[float], float, float, float],
 ) -> PiecewisePolynomialCurve:
-    """Return motions of several coordinates that start at the same time, each at its own pace.
+    """Return motions of several coordinates that start together, each with its own duration.
 
     Args:
         motions: For each coordinate points, velocity, acceleration and dwell as for
-            :func:`rest_to_rest`; what ends earlier rests.
+            :func:`rest_to_rest`; coordinates that end earlier rest.
 
     Returns:
         A curve of as many dimensions over time [s], starting at t = 0.
 
     Raises:
-        InputError: If fewer than two places differ, or the motion is far too long or short.
+        InputError: If fewer than two points differ, or the motion is far too long or short.
     """
     single = [
         rest_to_rest(points, velocity=velocity, acceleration=acceleration, dwell=dwell)
         for points, velocity, acceleration, dwell in motions
     ]
     breakpoints = np.unique(np.concatenate([motion.breakpoints for motion in single]))
-    # times that are one but for rounding
+    # times that are equal up to rounding
     apart = np.diff(breakpoints, append=np.inf) > 1e-9 * breakpoints[-1]
     breakpoints = breakpoints[apart]
     breakpoints[0] = 0.0
@@ -156,27 +158,27 @@ def together(
             piece = int(np.searchsorted(motion.breakpoints, begin + 1e-9, side="right")) - 1
             if piece < len(motion.coefficients):
                 own = motion.coefficients[piece, :, 0]
-                table[i, :, k] = _shifted(own, begin - motion.breakpoints[piece])
+                table[i, :, k] = _shift(own, begin - motion.breakpoints[piece])
             else:
                 table[i, 0, k] = motion.derivatives(motion.breakpoints[-1:], 0)[0, 0, 0]
     return PiecewisePolynomialCurve(breakpoints, table, closed=False)
 
 
-def _shifted(coefficients: np.ndarray, step: float) -> np.ndarray:
-    """Return the coefficients of a polynomial about a point a step further."""
+def _shift(coefficients: np.ndarray, step: float) -> np.ndarray:
+    """Return the coefficients of a polynomial about a shifted point."""
     orders = range(len(coefficients))
     moved = [[comb(k, j) * step ** (k - j) if k >= j else 0.0 for k in orders] for j in orders]
     return np.array(moved) @ coefficients
 
 
-def _checked_places(places: Sequence[Sequence[float]]) -> np.ndarray:
-    sizes = {len(place) for place in places}
-    if len(places) < 2 or len(sizes) != 1 or not np.all(np.isfinite(np.concatenate(places))):
+def _check_points(points: Sequence[Sequence[float]]) -> np.ndarray:
+    sizes = {len(point) for point in points}
+    if len(points) < 2 or len(sizes) != 1 or not np.all(np.isfinite(np.concatenate(points))):
         raise InputError(
-            f"reference places: {[list(place) for place in places]}; two or more of as many "
+            f"reference places: {[list(point) for point in points]}; two or more of as many "
             "finite numbers each are needed"
         )
-    return np.array(places, dtype=float)
+    return np.array(points, dtype=float)
 
 
 # from 0 to 1 on a unit interval with four derivatives that vanish at both ends, so that the
@@ -186,17 +188,17 @@ _HIGHEST_ORDER = 4
 
 
 class Transition:
-    """What is left of the distance at the start, ``s(t)``, from 1 to 0 with derivatives.
+    """Transition ``s(t)`` from 1 to 0 with derivatives: remaining share of the initial distance.
 
-    A reference ``y_d(t) + s(t) (y(0) - y_d(0))`` starts where ``y(0)`` is, at rest if ``y_d`` is,
-    and is ``y_d`` from ``duration`` on.
+    A reference ``y_d(t) + s(t) (y(0) - y_d(0))`` starts at ``y(0)``, at rest if ``y_d`` is, and is
+    equal to ``y_d`` from ``duration`` on.
 
     Args:
-        duration: How long it takes [s].
+        duration: Duration of the transition [s].
         order: Highest derivative that is needed, at most 4.
 
     Attributes:
-        duration: How long it takes [s].
+        duration: Duration of the transition [s].
         order: Highest derivative.
 
     Raises:
@@ -220,8 +222,7 @@ class Transition:
         """Return ``s`` and its derivatives, shape (order + 1,) [1, 1/s, ..].
 
         Args:
-            time: Since the start [s], number or expression; earlier is the start, later than the
-                duration its end.
+            time: Time since the start [s], number or expression; limited to 0 .. ``duration``.
         """
         x = ca.fmin(ca.fmax(time / self.duration, 0.0), 1.0)
         s = ca.DM.zeros(self.order + 1)
@@ -231,26 +232,26 @@ class Transition:
 
 
 class SmoothStart(Block):
-    """Lets a reference start where the tool is, and go over to the wanted one, see Transition.
+    """Start of a reference at the tool, with a transition to the desired one, see Transition.
 
         y_p(t) = y_d(t) + s(t) (y(0) - y_d(0))
 
     Ports:
-        desired_reference (input): Derivatives 0..order of the wanted reference ``y_d`` by rows,
+        desired_reference (input): Derivatives 0..order of the desired reference ``y_d`` by rows,
             shape ((order + 1) m,).
-        manifold_state (input): Derivatives 0.. of the virtual output y by rows, m each, which is
-            read at the start only.
+        manifold_state (input): Derivatives 0.. of the virtual output y by rows, m each, used
+            at the start only.
         own_time (input, optional): Time of the reference and its derivatives, shape (order + 1,)
-            [s, 1, 1/s, ..]: where the reference waits, the transition waits, too. That of the
+            [s, 1, 1/s, ..]: while the reference waits, the transition waits, too. Time of the
             clock if not connected.
         reference (output): Derivatives 0..order of ``y_p`` by rows, shape ((order + 1) m,).
 
     State:
-        distance: ``y(0) - y_d(0)``, shape (m,); a tool that is nowhere has none. begin: Tick at
-        the start, or own time then [s].
+        distance: ``y(0) - y_d(0)``, shape (m,); zero without a tool position. begin: Sample of the
+        start, or own time then [s].
 
     Args:
-        duration: How long the transition takes [s].
+        duration: Duration of the transition [s].
         order: Highest derivative.
         num_outputs: m.
         state_size: State size of ``manifold_state``.
@@ -274,7 +275,7 @@ class SmoothStart(Block):
         self.states = {"distance": num_outputs, "begin": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted states are zero."""
         distance = u.manifold_state[: self._m] - u.desired_reference[: self._m]
         begin = t if u.own_time is None else u.own_time[0]
         return {"distance": where(is_finite(distance), distance, 0.0), "begin": begin}

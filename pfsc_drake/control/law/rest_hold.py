@@ -1,16 +1,16 @@
-"""Constant torques for drives that stick while the reference rests.
+"""Constant torques for sticking drives while the reference rests.
 
-With a motor that sticks (stiffness k and damping c of its presliding), an elastic joint of link
+With a sticking motor (stiffness k and damping c of its presliding), an elastic joint of link
 inertia M and motor inertia D under the exact law with the characteristic polynomial
 ``p(s) = s^4 + a_3 s^3 + a_2 s^2 + a_1 s + a_0`` obeys::
 
     p(s) + (k + c s) / D (s^2 + w^2) = 0,   w^2 = K_s / M
 
-For large k one pair of its roots goes to ``+-j w``, the link that swings on a motor at rest, with
-the real part ``D (a_3 w^2 - a_1) / (2 k)``: it is unstable where ``w^2 > a_1 / a_3``, which is 130
+For large k one pair of its roots goes to ``+-j w``, a link that oscillates on its motor, with the
+real part ``D (a_3 w^2 - a_1) / (2 k)``: it is unstable where ``w^2 > a_1 / a_3``, which is 130
 rad/s for poles at -60, -60, -250 and -350 1/s. A friction observer of rate L adds
-``D L Re p(j w) / (2 k w^2)``. No gains that a robot can bear are right for every stiffness k;
-constant torques are: what sticks is then passive.
+``D L Re p(j w) / (2 k w^2)``. No practicable gains stabilize every stiffness k; constant torques
+do: a sticking drive is then passive.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ from pfsc_drake.blocks.cases import where
 
 # derivatives of the reference below which it rests, in SI units
 _RESTS = 1e-6
-# rates of a posture [rad/s or m/s], and of a frame that carries the manifold [m/s, 1/s], below
-# which they rest: a posture comes to its end slowly, and a frame is measured
+# rates of a posture [rad/s or m/s], and of the manifold's frame [m/s, 1/s], below which they rest:
+# a posture settles slowly, and a frame is measured
 _POSTURE_RESTS, _FRAME_RESTS = 1e-4, 5e-3
 # position of a motor before the reference rests [rad or m]
 _NOWHERE = 1e9
@@ -34,12 +34,12 @@ _TAKEN_BACK = 0.5
 
 
 def reference_rests(motion: Any, posture_rate: Any | None, frame_rate: Any | None) -> Any:
-    """Return whether a robot is to rest.
+    """Return whether the references are at rest.
 
     Args:
         motion: Derivatives 1..r of the reference [m or rad, per s, ..].
         posture_rate: First derivative of the posture reference, if there is one [rad/s or m/s].
-        frame_rate: That of a frame that carries the manifold, if there is one [m/s, 1/s].
+        frame_rate: First derivative of the manifold's frame, if it moves [m/s, 1/s].
     """
     rests = _largest(motion) < _RESTS
     for rate, bound in ((posture_rate, _POSTURE_RESTS), (frame_rate, _FRAME_RESTS)):
@@ -50,23 +50,23 @@ def reference_rests(motion: Any, posture_rate: Any | None, frame_rate: Any | Non
 
 @dataclass(frozen=True, eq=False)
 class RestHold:
-    """Holds the mean torques once the reference rests and the motors do not get on.
+    """Hold of the mean torques while the reference rests and the motors do not move.
 
-    The motors do not get on where their mean position of ``settling`` ticks, however they shake
-    meanwhile, is within ``drift`` of that before. Then the mean torques of these ticks are
-    held. A motor that has just stopped is at the edge of sliding on, as its drive overcomes all
-    of the friction: half of that is taken back over the next ``settling`` ticks, so that friction
-    can bear forces in both directions. What shakes has to stay within ``shaking`` of the mean
-    until then, and within ``window`` from then on. In the tick in which the reference, a motor
-    or what carries the manifold moves the law goes on. So a force that moves no motor is left to
-    friction.
+    The motors do not move if their mean position over ``settling`` samples, independent of
+    oscillations, is within ``drift`` of the mean before. Then the mean torques of these samples
+    are held. A motor that has just stopped is about to slide, as its drive overcomes all of the
+    friction: half of the friction torque is taken back over the next ``settling`` samples, so that
+    friction balances forces in both directions. Oscillations must stay within ``shaking`` of the
+    mean until then, and within ``window`` from then on. From the first sample on in which the
+    reference, a motor or the manifold's frame moves, the law is active again. So a force that moves
+    no motor is balanced by friction.
 
     Attributes:
-        coulomb: ``f_c`` as it is believed, shape (N,) [Nm or N].
-        drift: Largest change of a mean position of a motor that does not get on [rad or m].
+        coulomb: Nominal ``f_c``, shape (N,) [Nm or N].
+        drift: Largest change of a mean position of a motor at rest [rad or m].
         shaking: Largest displacement of a motor that comes to rest [rad or m].
-        window: Largest displacement of one at rest [rad or m].
-        settling: Ticks of a mean, 2 or more.
+        window: Largest displacement of a motor at rest [rad or m].
+        settling: Samples of a mean, 2 or more.
         largest_error: Mean error of the virtual output up to which torques are held [m or rad].
         largest_change: Change of the error since then up to which they are held [m or rad].
     """
@@ -82,8 +82,8 @@ class RestHold:
     def states(self, num_joints: int, num_outputs: int) -> dict[str, int]:
         """Return the sizes of the states.
 
-        Those are means of motor positions, torques of drives and of friction, and errors, since
-        ``rest_ticks``; and where the motors rested before.
+        These are means of motor positions, torques of drives and of friction, and errors, since
+        ``rest_ticks``; and the previous rest positions of the motors.
 
         Args:
             num_joints: N.
@@ -95,18 +95,18 @@ class RestHold:
     def step(
         self, x: Values, q_M: Any, rests: Any, error: Any, drive: Any, friction: Any
     ) -> tuple[Any, Any, dict[str, Any]]:
-        """Return whether torques are held, those that the drives get, and the new states.
+        """Return whether torques are held, the drive torques, and the new states.
 
         Args:
             x: States, named as in :meth:`states`.
             q_M: Motor positions, shape (N, 1) [rad or m].
-            rests: Whether the robot is to rest, see :func:`reference_rests`.
+            rests: Whether the references are at rest, see :func:`reference_rests`.
             error: Error of the virtual output, shape (m, 1) [m or rad].
-            drive: What the law tells the drives, shape (N, 1) [Nm or N].
-            friction: What it overcomes of friction by that, shape (N, 1) [Nm or N].
+            drive: Command of the law, shape (N, 1) [Nm or N].
+            friction: Friction torque in this command, shape (N, 1) [Nm or N].
         """
         ticks, settling = x.rest_ticks, self.settling
-        # first the means of settling ticks, then as many in which friction is taken back
+        # first the means of settling samples, then as many in which friction is taken back
         window = where(ticks >= 2 * settling, self.window, self.shaking)
         sticks = _largest(q_M - x.rest_before) < window
         if np.isfinite(self.largest_change):
@@ -131,12 +131,12 @@ class RestHold:
         share = ca.fmin((ticks - settling) / settling, 1.0)
         coulomb = ca.DM(self.coulomb)
         overcome = ca.fmin(ca.fmax(x.rest_friction, -coulomb), coulomb)
-        held = x.rest_drive - _TAKEN_BACK * share * overcome
+        constant = x.rest_drive - _TAKEN_BACK * share * overcome
         states = means | {
             "rest_before": where(goes_on, before, where(whole, position, _NOWHERE)),
             "rest_ticks": where(goes_on, ca.fmin(ticks + 1.0, 2 * settling), 0.0),
         }
-        return holds, where(holds, held, drive), states
+        return holds, where(holds, constant, drive), states
 
 
 def _largest(values: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Safe state of the drives: stop, and hold the robot where it has come to rest."""
+"""Safe state of the drives: controlled stop, and hold at rest."""
 
 import enum
 from collections.abc import Callable
@@ -23,9 +23,9 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 # s, of the shortest stop
 _SHORTEST = 0.05
-# of smoothstep: its largest slope over its mean
+# largest slope of smoothstep over its mean
 _PEAK = 1.5
-# share of the torque limit that braking is granted however much gravity takes
+# least share of the torque limit for braking, independent of gravity
 _LEAST_SHARE = 0.1
 # s, from the planned end of a stop until brakes are requested
 _SETTLING = 0.2
@@ -41,13 +41,13 @@ class StopCategory(enum.IntEnum):
 
     @property
     def explanation(self) -> str:
-        """One phrase for people."""
+        """Explanation in one phrase."""
         return _CATEGORIES[self]
 
 
 _CATEGORIES = {
     StopCategory.NONE: "no stop",
-    StopCategory.BRAKES: "close the brakes now, and take the power off once they hold",
+    StopCategory.BRAKES: "close the brakes now, and switch the power off once they hold",
     StopCategory.CONTROLLED: "controlled stop, then brakes",
     StopCategory.HOLD: "controlled stop, held by the drives",
 }
@@ -55,12 +55,12 @@ _CATEGORIES = {
 
 @dataclass(frozen=True)
 class SafeState:
-    """How a robot is stopped and held, see :class:`SafeStop`.
+    """Parameters of stop and hold, see :class:`SafeStop`.
 
     Attributes:
-        damping: Damping of every drive at least [Nm s/rad], shape (N,).
+        damping: Least damping of every drive [Nm s/rad], shape (N,).
         bandwidth: ``omega`` of the position hold [rad/s].
-        effort_share: Part of the drives' limits that braking is planned with, up to 1.
+        effort_share: Share of the drives' limits for planned braking, up to 1.
         has_brakes: Whether the robot has holding brakes, which are requested after the stop.
     """
 
@@ -70,13 +70,13 @@ class SafeState:
     has_brakes: bool = False
 
     def check(self, num_joints: int) -> None:
-        """Refuse what is out of range.
+        """Refuse parameters out of range.
 
         Args:
             num_joints: N.
 
         Raises:
-            InputError: If something is.
+            InputError: If a parameter is out of range.
         """
         damping = np.asarray(self.damping)
         if damping.shape != (num_joints,) or not np.all((damping >= 0.0) & np.isfinite(damping)):
@@ -93,7 +93,7 @@ class SafeState:
 
 
 class SafeStop(Block):
-    """Stops a robot along a trajectory of its joints, and holds it at the trajectory's end.
+    """Controlled stop along a joint trajectory, and hold at its end.
 
     From the state at the fault all joints slow down in proportion, ``q_J,r' = v_0 s'(t)`` with
     ``s'`` from 1 to 0 in the time T that the drives need for the momentum ``p = (D_E + D_M) v_0``
@@ -102,43 +102,43 @@ class SafeStop(Block):
         tau_d = tau_J + D_M a_r + d v_r + K_p (q_M,r - q_M) + K_v (v_M,r - v_M)
         tau_J = D_E a_r + n_E,   q_M,r = q_J,r + tau_J / K_s + (its error at the fault) s'
 
-    with everything believed, ``K_p = D omega^2``, ``K_v = 2 D omega`` of the joint's whole
-    inertia D, within what sampling bears and up to ``sqrt(K_s (D - D_M))``, where the
-    springs' swinging dies out fastest. At rest that is (constant) gravity compensation and a
-    PD law on the motors, which is stable for rigid and elastic joints alike; the torque is
-    continuous where the motion ends.
+    by the nominal model, ``K_p = D omega^2``, ``K_v = 2 D omega`` of the joint's whole inertia D,
+    within the limits of sampling and up to ``sqrt(K_s (D - D_M))``, where oscillations of the
+    springs decay fastest. At rest it is (constant) gravity compensation and a PD law on the
+    motors, which is stable for rigid and elastic joints alike; the torque is continuous at the end
+    of the motion.
 
-    Each joint is held by what is still measured of it. Where the motor's position is lost, its
-    velocity is integrated and drawn to what the link's position says; where its velocity is, the
-    position is differentiated; of a rigid joint either side does. Of an elastic joint
-    of which only the link is seen the motor is simulated, on its spring and with some damping,
-    and half the gains act on that. A joint of which nothing is measured gets
-    ``tau_J`` alone: its weight is compensated, but only a brake holds it. A value that is not
-    finite is used again when it is back; one that was found implausible is not.
+    Each joint is held by its remaining measurements. If the motor's position is lost, its
+    velocity is integrated and corrected by the link's position; if its velocity is lost, the
+    position is differentiated; for a rigid joint either side suffices. If only the link of an
+    elastic joint is measured, the motor is simulated, on its spring and with some damping, and half
+    the gains act on it. A joint without any measurement gets ``tau_J`` alone: its weight is
+    compensated, but only a brake holds it. A value that is NaN or infinite is used again when it
+    returns; an implausible one is not.
 
-    ``stop_category`` is that of IEC 60204-1: 1 during a stop of a robot with brakes, 2 of one
-    without, which the drives hold; 0 requests the brakes at once: 0.2 s after the planned end of
-    the stop where there are brakes, and in any case once nothing has held a joint for 50 ms. The
-    drives go on, also while brakes hold.
+    ``stop_category`` follows IEC 60204-1: 1 during a stop of a robot with brakes, 2 without
+    brakes, held by the drives; 0 requests the brakes immediately: 0.2 s after the planned end of
+    the stop if there are brakes, and in any case after 50 ms without any measurement of a joint.
+    The drives stay active, also while brakes hold.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         fault (input): Nonzero from the fault on, shape (1,).
-        suspects (input): What of the state is found implausible now, nonzero if so, shape (4N,).
+        suspects (input): Implausible components of the state, nonzero if so, shape (4N,).
         torque (output): Torques of the drives, within their limits, shape (N,) [Nm or N]; zero
             without a fault.
         stop_category (output): A :class:`StopCategory`, shape (1,), -1 without a fault.
-        ignored (output): What of the state is not used any more, nonzero if so, shape (4N,). It
-            depends on the state alone.
+        ignored (output): Components of the joint state that are no longer used, nonzero if so,
+            shape (4N,). It depends on the state alone.
 
     State:
-        Whether the robot is ``stopping``, and what :class:`StopMemory` names; without a fault
-        nothing but the last state.
+        Whether the robot is ``stopping``, and the fields of :class:`StopMemory`; without a fault
+        only the last state.
 
     Args:
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model of the robot, N joints.
         limits: Magnitude limits of the drives, shape (N,) [Nm or N].
-        settings: How to stop and hold.
+        settings: Parameters of stop and hold.
         period: Sampling time [s].
 
     Raises:
@@ -151,7 +151,7 @@ class SafeStop(Block):
         self, robot: RobotModel, limits: np.ndarray, settings: SafeState, period: float
     ) -> None:
         settings.check(robot.dimension)
-        # after a fault nothing is asked by what parameters it would be another
+        # the stop does not depend on symbolic parameters
         n, robot = robot.dimension, robot.numeric
         joints = Joints.of(robot, np.asarray(limits), settings.damping)
         self._start = starting_function(robot, joints, settings.effort_share, period)
@@ -172,15 +172,15 @@ class SafeStop(Block):
         self.states = {"stopping": 1} | self._sizes
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted states are zero."""
         return {"last": where(is_finite(u.joint_state), u.joint_state, 0.0)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         before = StopMemory(*[getattr(x, name) for name in self._sizes])
         fresh = ca.vertcat(*self._start(x.last, u.joint_state, u.suspects))
-        begun = ca.if_else(x.stopping, ca.vertcat(*before), fresh, True)
-        parts = self._split(begun)
+        memory = ca.if_else(x.stopping, ca.vertcat(*before), fresh, True)
+        parts = self._split(memory)
         stop = ca.vertcat(*self._step(*parts.values(), u.joint_state, u.suspects))
         n = self.outputs["torque"].size
         idle = ca.vertcat(ca.DM(n, 1), *before._replace(last=u.joint_state))
@@ -193,11 +193,11 @@ class SafeStop(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the next states; omitted states do not change."""
         return {"stopping": u.fault != 0.0} | self._split(y.later)
 
     def _category(self, fault: Any, stopping: Any, memory: StopMemory) -> Any:
-        """Return the stop category, of the memory of a stop that has begun before."""
+        """Return the stop category from the memory of the stop."""
         controlled = StopCategory.CONTROLLED if self._has_brakes else StopCategory.HOLD
         due = memory.unheld >= UNHELD
         if self._has_brakes:
@@ -219,13 +219,13 @@ def starting_function(
     """Return ``(last, state, suspects) -> (elapsed, .., last)`` at the instant of a fault.
 
     The results are the fields of :class:`StopMemory`; ``last`` is the state one period before, as
-    far as known, ``state`` is measured now, and ``suspects`` tells what of it is implausible,
+    far as known, ``state`` is measured now, and ``suspects`` marks its implausible components,
     nonzero if so, each (4N,).
 
     Args:
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model of the robot, N joints.
         joints: Constants of its joints.
-        effort_share: Part of the drives' limits that braking is planned with, up to 1.
+        effort_share: Share of the drives' limits for planned braking, up to 1.
         period: Sampling time [s].
     """
     n = robot.dimension
@@ -268,7 +268,7 @@ def _state_at_fault(
     deflection: Callable[[ca.SX], ca.SX],
     period: float,
 ) -> list[ca.SX]:
-    """Return ``q_J, v_J, q_M, v_M``, each (N,), from what is measured or was a moment ago."""
+    """Return ``q_J, v_J, q_M, v_M``, each (N,), from the measurement or the sample before."""
     n = state.shape[0] // 4
     now, suspect = ca.vertsplit(state, n), ca.vertsplit(suspects, n)
     before = ca.vertsplit(where(is_finite(last), last, 0.0), n)
@@ -281,7 +281,7 @@ def _state_at_fault(
     ]
     found = [where(ok, x, e) for ok, x, e in zip(good, now, expected, strict=True)]
     only = [ca.logic_and(suspect[k], ca.logic_not(suspect[(k + 2) % 4])) for k in range(4)]
-    # what was implausible may have been so for a while: then the other side knows better
+    # an implausible value may have been wrong for a while: the other side is better
     bend = deflection(where(only[0], found[2], found[0]))
     found[0] = where(only[0], found[2] - bend, found[0])
     found[2] = where(only[2], found[0] + bend, found[2])
@@ -294,8 +294,8 @@ def _state_at_fault(
 
 
 def _stopping_time(momentum: ca.SX, weight: ca.SX, limits: ca.DM, effort_share: float) -> ca.SX:
-    """Return T [s], in which the drives can take the momentum off beside the weight."""
-    # the weight helps to brake what moves up
+    """Return the time T [s] in which the drives can stop the momentum beside the weight."""
+    # the weight helps to brake upward motion
     granted = effort_share * limits + ca.sign(momentum) * weight
     available = ca.fmax(granted, _LEAST_SHARE * limits)
     return ca.fmax(_SHORTEST, ca.mmax(_PEAK * ca.fabs(momentum) / available))

@@ -1,4 +1,4 @@
-"""The following law from tick to tick."""
+"""Following law as a block with states."""
 
 from typing import Any
 
@@ -14,46 +14,46 @@ from pfsc_drake.control.manifolds.moving_frame import MovingFrameManifold
 
 
 class SampledLaw(Block):
-    """A :class:`FollowingLaw` with what it remembers.
+    """A :class:`FollowingLaw` with its states.
 
     With the virtual output ``yhat`` and relative degree r the closed loop is
     ``e^(r) + a_r e^(r-1) + ... + a_1 e + a_0 int e = 0``, ``e = yhat - yhat_p``.
 
-    The integral is held while a drive is at its limit or torques are held. After a fault nothing
-    is remembered any more.
+    The integral is constant while a drive is at its limit or torques are held. After a fault the
+    states do not change.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        manifold_point (input): Where on the manifold the tool is.
-        relation (input): What drives do to the virtual output, from :class:`ExactLinearization`.
+        manifold_point (input): Point of the manifold closest to the tool.
+        relation (input): Relation of drives and virtual output, from :class:`ExactLinearization`.
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,).
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
             Only for r > 1.
-        friction_torque (input, optional): ``tau_f`` that the drives are to overcome besides
-            [Nm or N], shape (N,); zero if not connected. Only for r > 1.
+        friction_torque (input, optional): ``tau_f`` to be compensated [Nm or N], shape (N,); zero
+            if not connected. Only for r > 1.
         posture_reference (input): Derivatives 0..r of the posture reference by rows, shape
-            ((r + 1) N,); only of a law for more joints than outputs.
-        stopping (input): Nonzero from a fault on, shape (1,); acts on what is remembered.
+            ((r + 1) N,); only for redundant joints.
+        stopping (input): Nonzero from a fault on, shape (1,); acts on the next states.
         evaluation (output): Laid out by the law's ``layout``.
         manifold_state (output): Derivatives 0..r-1 of ``yhat`` by rows, shape (r m,).
         virtual_input (output): ``v``, shape (m,).
-        fault (output): The law's own, shape (1,).
+        fault (output): Fault of the law, shape (1,).
         input_fault (output): The same if an input is not finite, else 0, shape (1,).
-        reference_velocity (output): Joint velocities that the reference asked for at the last
-            tick, shape (N,) [rad/s or m/s], zero before; only of a law that tells them. It
-            depends on the state alone: what is told the law may depend on it.
+        reference_velocity (output): Joint velocities of the reference at the last sample, shape
+            (N,) [rad/s or m/s], zero before; only of a law with them. It depends on the state
+            alone: inputs of the law may depend on it.
 
     State:
         ``integral`` of the error, shape (m,); ``held``, the part of the drive input that is
         extrapolated over the hold, shape (N,), and whether it is ``known``; virtual ``output`` of
-        the last tick, shape (m,); ``reference_velocity``, if the law tells it; those of
+        the last sample, shape (m,); ``reference_velocity``, if the law has it; states of
         :class:`RestHold`, with a hold.
 
     Args:
         law: The law.
         period: Sampling time [s].
-        hold: Holds the torques of drives that stick; they follow the law if omitted.
+        hold: Hold of the torques of sticking drives; none if omitted.
     """
 
     def __init__(self, law: FollowingLaw, period: float, hold: RestHold | None = None) -> None:
@@ -84,28 +84,28 @@ class SampledLaw(Block):
         if hold is not None:
             self.states |= hold.states(n, m)
             self.inner = {"holds": 1} | {f"next_{k}": size for k, size in hold.states(n, m).items()}
-        self._tells_velocity = layout.reference_velocity.stop > layout.reference_velocity.start
-        if self._tells_velocity:
+        self._has_velocity = layout.reference_velocity.stop > layout.reference_velocity.start
+        if self._has_velocity:
             self.outputs["reference_velocity"] = Port(n, "rad/s or m/s")
             self.states["reference_velocity"] = n
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         law, layout = self._law, self._law.layout
-        told = {
+        arguments = {
             "state": u.joint_state,
             "manifold_point": u.manifold_point,
             "relation": u.relation,
             "reference": u.reference,
             "integral": x.integral,
-            "last_held": x.held,
+            "last_varying_input": x.held,
             "known": x.known,
             "last_output": x.output,
             "tau_ext": getattr(u, "tau_ext", None),
             "friction": getattr(u, "friction_torque", None),
             "posture": getattr(u, "posture_reference", None),
         }
-        connected = {name: value for name, value in told.items() if value is not None}
+        connected = {name: value for name, value in arguments.items() if value is not None}
         result = law.function(**connected)["result"]
         fault = result[layout.status.start]
         outputs = {
@@ -115,7 +115,7 @@ class SampledLaw(Block):
             "fault": fault,
             "input_fault": where(fault == Fault.INPUT_NOT_FINITE, fault, Fault.NONE),
         }
-        if self._tells_velocity:
+        if self._has_velocity:
             outputs["reference_velocity"] = x.reference_velocity
         if self._hold is not None:
             m, n = x.output.shape[0], x.held.shape[0]
@@ -130,21 +130,23 @@ class SampledLaw(Block):
             if isinstance(manifold, MovingFrameManifold):
                 frame_rate = manifold.frame_rate(u.manifold_point)
             rests = reference_rests(u.reference[m:], posture_rate, frame_rate)
-            holds, drive, kept = self._hold.step(x, q_M, rests, error, drive, friction)
+            holds, drive, next_states = self._hold.step(x, q_M, rests, error, drive, friction)
             outputs["evaluation"] = ca.vertcat(drive, result[layout.drive.stop :])
-            outputs |= {"holds": holds} | {f"next_{name}": value for name, value in kept.items()}
+            outputs |= {"holds": holds} | {
+                f"next_{name}": value for name, value in next_states.items()
+            }
         return outputs
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the next states; omitted states do not change."""
         law, layout = self._law, self._law.layout
         m = x.output.shape[0]
         output, saturated = y.manifold_state[:m], y.evaluation[layout.status.stop - 1]
-        # where the point moves with time, the virtual output is the error
+        # if the point moves with time, the virtual output is the error
         follows_time = law.linearization.manifold.follows_time
         error = output if follows_time else output - u.reference[:m]
         later = {
-            "held": y.evaluation[layout.held],
+            "held": y.evaluation[layout.varying_input],
             "known": ca.DM(1),
             "output": output,
         }
@@ -153,19 +155,19 @@ class SampledLaw(Block):
             later["integral"] = x.integral + where(waits, 0.0, self._period * error)
         if self._hold is not None:
             later |= {name: getattr(y, f"next_{name}") for name in self._hold.states(1, 1)}
-        if self._tells_velocity:
+        if self._has_velocity:
             later["reference_velocity"] = y.evaluation[layout.reference_velocity]
         return {name: where(u.stopping, getattr(x, name), new) for name, new in later.items()}
 
 
 class LawReport(Block):
-    """What a tick came to, for logs: a law's result with the fault and what drives were told.
+    """Result of a sample for logs: result of the law with fault and commands to the drives.
 
     Ports:
         evaluation (input): Laid out by the law's ``layout``.
-        fault (input): What stops the robot, if anything, shape (1,).
-        command (input): What the drives are told, shape (N,).
-        law (output): The evaluation with both of them in their places.
+        fault (input): Fault that stops the robot, shape (1,), 0 for none.
+        command (input): Commands to the drives, shape (N,).
+        law (output): The evaluation with fault and commands.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
 
     Args:

@@ -1,4 +1,4 @@
-"""What laws that take joints for stiff make of soft ones, near rest.
+"""Errors of laws of stiff joints on elastic joints, near rest.
 
 Joints of stiffness ``K_s`` carry the links by ``tau_J = K_s (q_M - q_J) = D_E q_J''``, and motors
 obey ``D_M q_M'' = tau_d - tau_J``; weight is constant near rest, and speeds are small. The tool's
@@ -47,8 +47,8 @@ def soft_joints(
         robot: A robot with elastic joints, as many as outputs or more.
         q_J: Joint coordinates, shape (N,).
         oriented: Whether the tool's orientation matters.
-        tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
-        yaw_axis: Axis in the world about which alone its turn matters, shape (3,), or None.
+        tool_axis: Axis in the tool frame about which it may rotate, shape (3,), or None.
+        yaw_axis: Only axis in the world about which its rotation matters, shape (3,), or None.
     """
     q = ca.SX.sym("q", robot.dimension)
     J_q = task_jacobian(robot, q, oriented=oriented, tool_axis=tool_axis, yaw_axis=yaw_axis)
@@ -58,10 +58,10 @@ def soft_joints(
 
 
 def bending(joints: SoftJoints) -> float:
-    """Return by how much the joints bend under slow acceleration of the tool point [s^2].
+    """Return the bending of the joints under slow acceleration of the tool point [s^2].
 
-    That is the largest deviation [m] per acceleration [m/s^2] of a law that acts on the motors:
-    ``J (q_J - q_M) = -J K_s^-1 D_E J^-1 y''``, whatever its gains.
+    It is the largest deviation [m] per acceleration [m/s^2] of a law that acts on the motors:
+    ``J (q_J - q_M) = -J K_s^-1 D_E J^-1 y''``, independent of its gains.
     """
     compliance = joints.J @ (joints.D_E / joints.K_s[:, None]) @ np.linalg.pinv(joints.J)
     return float(np.linalg.norm(compliance[:3, :3], 2))
@@ -73,23 +73,22 @@ def composite_law_error(
     proportional: np.ndarray,
     posture: np.ndarray | None = None,
 ) -> float:
-    """Return the largest error that slow (3.70) plus fast law (3.71) leave [s^2].
+    """Return the largest error with slow (3.70) plus fast law (3.71) [s^2].
 
     Under ``tau_d = (D_E + D_M) J^-1 v - epsilon D_b tau_J'`` with
     ``v = y_p'' - a_2 e' - a_1 e`` the joints obey::
 
         D_M K_s^-1 D_E q'''' + epsilon D_b D_E q''' + (D_E + D_M) q'' = (D_E + D_M) J^-1 v
 
-    so that ``y'' = W(s) v``, and the error ``e = y - y_p`` answers to the wanted acceleration by
-    ``(s^2 + W (a_2 s + a_1))^-1 (W - 1)``; stiff joints give ``W = 1``. What joints do beside the
-    tool's motion is held with gains of its own.
+    so that ``y'' = W(s) v``, and the error ``e = y - y_p`` responds to the desired acceleration by
+    ``(s^2 + W (a_2 s + a_1))^-1 (W - 1)``; stiff joints give ``W = 1``. Null-space motion of the
+    joints is controlled with gains of its own.
 
     Args:
         joints: The joints.
         damping: Diagonal of ``epsilon D_b`` [s], shape (N,).
         proportional: ``a_1`` [1/s^2] and ``a_2`` [1/s] of the coordinates, shape (2, m).
-        posture: The same of the joints beside the tool's motion, shape (2, N), where there are
-            more than the tool needs.
+        posture: The same for null-space motion of the joints, shape (2, N), with redundant joints.
 
     Returns:
         Largest deviation of the tool point [m] per harmonic acceleration [m/s^2], over all

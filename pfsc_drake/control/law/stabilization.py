@@ -1,4 +1,4 @@
-"""Stabilization of the integrator chains that exact linearization leaves."""
+"""Stabilization of the integrator chains after exact linearization."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ class CoordinateGains:
     ``s^r + a_r s^(r-1) + ... + a_1`` (times s, plus ``a_0``, with an integral part),
     see (3.34), (3.61), (3.67), (3.86).
 
-    A free coordinate is held nowhere: ``a_1`` is zero, and the error of its velocity obeys
-    ``s^(r-1) + a_r s^(r-2) + ... + a_2``. So a hand leads a tool along a path on a robot that can
-    be moved at its links, without a sensor (Tab. 5.2).
+    The position of a free coordinate is not controlled: ``a_1`` is zero, and the error of its
+    velocity obeys ``s^(r-1) + a_r s^(r-2) + ... + a_2``. So an operator guides a tool along a path
+    on a backdrivable robot, without a sensor (Tab. 5.2).
 
     Attributes:
         proportional: ``a_1 .. a_r`` in the dissertation's order, 1/s^r .. 1/s.
         integral: ``a_0`` [1/s^(r+1)]; 0 for none.
-        is_free: Whether ``a_1`` is zero on purpose.
+        is_free: Whether the coordinate is free.
     """
 
     proportional: tuple[float, ...]
@@ -33,7 +33,7 @@ class CoordinateGains:
 
     @property
     def polynomial(self) -> np.ndarray:
-        """Characteristic polynomial, highest power first; of a free coordinate, the velocity's."""
+        """Characteristic polynomial, highest power first; of the velocity for a free coordinate."""
         tail = [*self.proportional[: 0 if self.is_free else None : -1]]
         return np.array([1.0, *tail, self.integral] if self.integral else [1.0, *tail])
 
@@ -42,16 +42,22 @@ class CoordinateGains:
         """Poles of the error dynamics [1/s]."""
         return np.roots(self.polynomial)
 
+    @property
+    def rightmost_pole(self) -> complex:
+        """Slowest pole, or the most unstable one [1/s]."""
+        poles = self.poles
+        return complex(poles[np.argmax(poles.real)])
+
 
 def gains_from_poles(
     poles: Sequence[float | complex], integral_pole: float = 0.0
 ) -> CoordinateGains:
-    """Return the gains that place r poles, and one more where there is an integral part.
+    """Return the gains for r poles, and one more with an integral part.
 
     Args:
-        poles: Without the integral part's [1/s].
-        integral_pole: Integral pole of the integral part, which takes constant errors away at this
-            rate [1/s]; 0 for none.
+        poles: Poles without the integral part [1/s].
+        integral_pole: Pole of the integral part, which removes constant errors at this rate [1/s];
+            0 for none.
 
     Raises:
         InputError: If there are no poles, or complex ones do not come in conjugate pairs.
@@ -69,12 +75,12 @@ def gains_from_poles(
 
 
 def check_gains(gains: CoordinateGains, relative_degree: int, name: str) -> None:
-    """Refuse gains that do not make the error vanish.
+    """Refuse gains of error dynamics that are not stable.
 
     Args:
         gains: Gains of one coordinate.
-        relative_degree: ``r`` of the law they are for.
-        name: What they belong to, for the message.
+        relative_degree: ``r`` of the law.
+        name: Name of the coordinate, for the message.
 
     Raises:
         InputError: If their number is not r, the polynomial is not Hurwitz, or a free coordinate
@@ -92,7 +98,7 @@ def check_gains(gains: CoordinateGains, relative_degree: int, name: str) -> None
         )
     if not np.all(np.isfinite(gains.polynomial)):
         raise InputError(f"{name}: gains {list(gains.polynomial)} must be finite numbers")
-    rightmost = gains.poles[np.argmax(gains.poles.real)]
+    rightmost = gains.rightmost_pole
     if rightmost.real >= 0.0:
         raise InputError(
             f"{name}: gains a_0 = {gains.integral:g}, a_1.. = "
@@ -102,7 +108,7 @@ def check_gains(gains: CoordinateGains, relative_degree: int, name: str) -> None
 
 
 class Stabilization:
-    """The linear control law of all coordinates (3.33), (3.52), (3.61), (3.67), (3.86).
+    """Linear control law of all coordinates (3.33), (3.52), (3.61), (3.67), (3.86).
 
     Args:
         gains: Gains of each of the m coordinates.
@@ -143,9 +149,9 @@ class LoopGains(NamedTuple):
     """All gains of a law.
 
     Attributes:
-        outputs: Outputs of the virtual output's m coordinates.
-        posture: Posture of the N joints' deviations from the posture reference, where there are
-            more joints than outputs.
+        outputs: Gains of the virtual output's m coordinates.
+        posture: Gains of the N joints' deviations from the posture reference, for redundant
+            joints.
     """
 
     outputs: Stabilization

@@ -1,4 +1,4 @@
-"""One tick of a robot that is being stopped and held, as a function."""
+"""One sample of stop and hold of a robot, as a function."""
 
 from typing import Any, NamedTuple
 
@@ -10,39 +10,38 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 
-# largest part of a velocity that sampled damping may take off in one period
+# largest share of a velocity that sampled damping may remove in one period
 _LARGEST_STEP = 0.3
-# 1/s, by which an integrated motor position is drawn to what the link side says
+# 1/s, correction rate of an integrated motor position by the link side
 _CORRECTION = 10.0
 # weight of the newest difference quotient of a position
 _NEWEST = 0.6
-# of the damping where the velocity is differentiated, which takes its time
+# share of the damping with a differentiated velocity, which is late
 _DIFFERENTIATED = 0.5
-# of the gains where only the link side of an elastic joint is seen
+# share of the gains with measurements of only the link side of an elastic joint
 _FAR_SIDE = 0.5
-# s, the longest time for which a joint may be held by nothing until brakes are requested
+# s, longest time without control of a joint until brakes are requested
 UNHELD = 0.05
-# damping ratio by which a motor that is not seen is thought to follow its link
+# damping ratio of a simulated motor that follows its link
 _FOLLOWING = 0.3
 
 
 class StopMemory(NamedTuple):
-    """What is remembered of a stop of N joints.
+    """Memory of a stop of N joints.
 
     Attributes:
-        elapsed: Since the fault [s], shape (1,).
+        elapsed: Time since the fault [s], shape (1,).
         duration: Duration of the stop [s], shape (1,).
         q_0: Position of the links at the fault, shape (N,).
         v_0: Their velocity, shape (N,).
-        offset: By how much the motors were beside their reference at the fault, shape (N,).
-        offset_rate: The same of their velocity, shape (N,).
+        offset: Deviation of the motors from their reference at the fault, shape (N,).
+        offset_rate: Deviation of their velocity, shape (N,).
         inertia: Diagonal of ``D_E + D_M`` at the fault, shape (N,).
-        position: Position of the motors, as far as it is integrated, shape (N,).
+        position: Integrated position of the motors, shape (N,).
         rate: Rate of their position, differentiated, shape (N,).
-        unheld: For how long nothing has held some joint, of which nothing is measured [s],
-            shape (1,).
-        ignored: What of the state is not to be believed, nonzero if so, shape (4N,).
-        last: State of the last tick, shape (4N,).
+        unheld: Time without control of a joint for lack of measurements [s], shape (1,).
+        ignored: Implausible components of the state, nonzero if so, shape (4N,).
+        last: State of the last sample, shape (4N,).
     """
 
     elapsed: Any
@@ -60,7 +59,7 @@ class StopMemory(NamedTuple):
 
     @classmethod
     def sizes(cls, num_joints: int) -> dict[str, int]:
-        """Return how many elements each has.
+        """Return the sizes of the fields.
 
         Args:
             num_joints: N.
@@ -73,13 +72,13 @@ class Joints(NamedTuple):
     """Constants of the joints, each of shape (N,).
 
     Attributes:
-        elastic: Whether a joint is, 1 or 0.
-        stiffness: [Nm/rad or N/m], 0 of a rigid joint.
-        compliance: Its inverse, 0 of a rigid joint.
+        elastic: Whether a joint is elastic, 1 or 0.
+        stiffness: Stiffness [Nm/rad or N/m], 0 of a rigid joint.
+        compliance: Inverse of the stiffness, 0 of a rigid joint.
         D_M: Inertia of the motors [kg m^2 or kg].
         viscous: Friction of the motors [Nm s/rad or N s/m].
         limits: Limits of the drives' torques [Nm or N].
-        damping: Damping of every drive at least [Nm s/rad or N s/m].
+        damping: Least damping of every drive [Nm s/rad or N s/m].
     """
 
     elastic: ca.DM
@@ -92,12 +91,12 @@ class Joints(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotModel, limits: np.ndarray, damping: np.ndarray) -> "Joints":
-        """Return those of a robot.
+        """Return the constants of a robot.
 
         Args:
             robot: The robot.
             limits: Limits of its drives' torques [Nm or N], shape (N,).
-            damping: Damping of every drive at least [Nm s/rad or N s/m], shape (N,).
+            damping: Least damping of every drive [Nm s/rad or N s/m], shape (N,).
         """
         elastic = robot.elastic_joints
         stiffness = np.where(elastic, robot.K_s, 0.0)
@@ -113,11 +112,11 @@ def stopping_step(
     """Return ``(elapsed, .., last, state, suspects) -> (drive, elapsed, .., last)``.
 
     See :class:`SafeStop`; ``elapsed, .., last`` are the fields of :class:`StopMemory`, now and one
-    period later. ``drive`` are the drives' torques within their limits, shape (N,); of a state
-    that is not finite only the memory tells.
+    period later. ``drive`` are the drives' torques within their limits, shape (N,); NaN or
+    infinite components of the state only affect the memory.
 
     Args:
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model of the robot, N joints.
         joints: Constants of its joints.
         bandwidth: ``omega`` of the position hold [rad/s].
         period: Sampling time [s].
@@ -130,9 +129,9 @@ def stopping_step(
     far = joints.elastic * good[0] * (1.0 - good[2]) * (1.0 - good[3])
 
     T = memory.duration
-    way, fading, slope = _stop(ca.fmin(memory.elapsed / T, 1.0))
+    distance, fading, slope = _stop(ca.fmin(memory.elapsed / T, 1.0))
     v_0 = memory.v_0
-    q_r, v_r, a_r = memory.q_0 + v_0 * (T * way), v_0 * fading, v_0 * (slope / T)
+    q_r, v_r, a_r = memory.q_0 + v_0 * (T * distance), v_0 * fading, v_0 * (slope / T)
     tau_J = inverse_dynamics(robot, q_r, v_r, a_r)
     reference = q_r + tau_J * joints.compliance + fading * memory.offset
     rate_r = v_r + fading * memory.offset_rate
@@ -140,27 +139,27 @@ def stopping_step(
 
     q_M, v_M, share, braking = _motors(memory, now, good, far, joints)
     K_p, K_v = _gains(memory.inertia, joints, bandwidth, period)
-    wanted = forward + share * K_p * (reference - q_M) + braking * K_v * (rate_r - v_M)
-    drive = ca.fmin(ca.fmax(wanted, -joints.limits), joints.limits)
+    unlimited = forward + share * K_p * (reference - q_M) + braking * K_v * (rate_r - v_M)
+    drive = ca.fmin(ca.fmax(unlimited, -joints.limits), joints.limits)
 
-    # of the link's position, with the spring's deflection as it is planned
+    # by the link's position, with the planned deflection of the spring
     away = ca.if_else(good[0], now[0] + (reference - q_r) - q_M, 0.0)
     drawn = ca.if_else(good[2], 0.0, period * _CORRECTION * away)
     simulated = v_M + period * _motor_acceleration(drive, now, q_M, v_M, joints)
     position = ca.if_else(far, q_M + period * simulated, q_M + period * v_M + drawn)
-    # rigid joints have their motors' positions on either side
+    # rigid joints measure their motors' positions on either side
     own = ca.logic_or(good[2], joints.elastic)
     newest = ca.if_else(own, now[2] - last[2], now[0] - last[0]) / period
     rate = memory.rate + _NEWEST * (newest - memory.rate)
     rate = ca.if_else(far, simulated, ca.if_else(is_finite(rate), rate, 0.0))
 
-    # a joint that is seen again within the longest time is held again
-    is_held = ca.logic_and(ca.mmin(share) > 0.0, memory.unheld < UNHELD)
+    # a joint that is measured again within the longest time is controlled again
+    is_controlled = ca.logic_and(ca.mmin(share) > 0.0, memory.unheld < UNHELD)
     after = memory._replace(
         elapsed=memory.elapsed + period,
         position=position,
         rate=rate,
-        unheld=ca.if_else(is_held, 0.0, memory.unheld + period),
+        unheld=ca.if_else(is_controlled, 0.0, memory.unheld + period),
         ignored=ca.fmax(memory.ignored, suspects),
         last=state,
     )
@@ -177,36 +176,36 @@ def inverse_dynamics(robot: RobotModel, q: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:
     """Return ``tau_J``, shape (N,).
 
     Args:
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model of the robot, N joints.
         q: Joint coordinates, shape (N,).
-        v: Their velocities, shape (N,).
-        a: Their accelerations, shape (N,).
+        v: Joint velocities, shape (N,).
+        a: Joint accelerations, shape (N,).
     """
     motion = [Jet.from_derivatives([q[i], v[i], a[i]]) for i in range(robot.dimension)]
     return ca.vertcat(*[jet.coefficients[0] for jet in robot.inverse_dynamics(motion)])
 
 
 def _stop(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return way, rate and slope of a stop at a part of its time: rate 1 - 3 x^2 + 2 x^3."""
+    """Return distance, rate and slope of a stop at a share of its time: rate 1 - 3 x^2 + 2 x^3."""
     return x - x**3 + 0.5 * x**4, 1.0 - 3.0 * x**2 + 2.0 * x**3, 6.0 * (x**2 - x)
 
 
 def _gains(inertia: ca.SX, joints: Joints, omega: float, period: float) -> tuple[ca.SX, ca.SX]:
     """Return ``K_p`` [Nm/rad] and ``K_v`` [Nm s/rad], each (N,)."""
     damping = ca.fmax(2.0 * omega * inertia, joints.damping)
-    # what a torque that is held over a period moves at once
+    # inertia that a torque accelerates within a period
     nearest = ca.if_else(joints.elastic, joints.D_M, inertia)
     K_v = ca.fmin(damping, _LARGEST_STEP * nearest / period)
-    # a motor that is all but clamped lets the link swing on its spring
-    swinging = ca.sqrt(joints.stiffness * ca.fmax(inertia - joints.D_M, 0.0))
-    K_v = ca.if_else(joints.elastic, ca.fmin(K_v, swinging), K_v)
+    # a nearly clamped motor does not damp the link on its spring
+    oscillating = ca.sqrt(joints.stiffness * ca.fmax(inertia - joints.D_M, 0.0))
+    K_v = ca.if_else(joints.elastic, ca.fmin(K_v, oscillating), K_v)
     return inertia * ca.fmin(omega, K_v / (2.0 * inertia)) ** 2, K_v
 
 
 def _motor_acceleration(
     torque: ca.SX, now: list[ca.SX], q_M: ca.SX, v_M: ca.SX, joints: Joints
 ) -> ca.SX:
-    """Return the acceleration of motors that are not seen, shape (N,)."""
+    """Return the acceleration of simulated motors, shape (N,)."""
     D_M = ca.if_else(joints.D_M > 0.0, joints.D_M, ca.inf)
     damping = 2.0 * _FOLLOWING * ca.sqrt(joints.stiffness * joints.D_M)
     following = damping * (v_M - ca.if_else(is_finite(now[1]), now[1], 0.0))
@@ -227,10 +226,10 @@ def _motors(
     position = ca.if_else(rigid * has_q_J, q_J, memory.position)
     position = ca.if_else(has_q_M, q_M, position)
     near, by_link = ca.logic_or(has_q_M, rigid * has_q_J), rigid * has_v_J
-    told = ca.logic_or(has_v_M, by_link)
+    has_velocity = ca.logic_or(has_v_M, by_link)
     velocity = ca.if_else(has_v_M, v_M, ca.if_else(by_link, v_J, memory.rate))
-    known = ca.logic_or(told, near)
+    known = ca.logic_or(has_velocity, near)
     velocity = ca.if_else(ca.logic_or(known, far), velocity, 0.0)
     share = ca.if_else(known, 1.0, _FAR_SIDE * far)
-    braking = ca.if_else(told, 1.0, ca.if_else(near, _DIFFERENTIATED, _FAR_SIDE * far))
+    braking = ca.if_else(has_velocity, 1.0, ca.if_else(near, _DIFFERENTIATED, _FAR_SIDE * far))
     return position, velocity, share, braking

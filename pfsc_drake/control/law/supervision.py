@@ -1,4 +1,4 @@
-"""What contradicts itself in a measurement of joints; joints and drives at their limits."""
+"""Supervision of joints and drives: implausible measurements, limits, and chatter."""
 
 import math
 from dataclasses import dataclass, field
@@ -15,32 +15,32 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, largest_speeds
 from pfsc_drake.yaml.rules import NotNegative, Parameters, Range
 
-# 1/s, by which differences of what is compared are forgotten, and ways beside a position that rests
+# 1/s, forgetting rate of differences, and of travel beside a constant position
 _FORGETTING, _FORGETTING_RESTS = 20.0, 2.0
-# part of the tolerance that tells a jump within a tick, or a rest for some ticks
-_AT_ONCE = 0.5
-# how far a spring may be bent, over what the drive's limit bends it
+# share of the tolerance for a jump within a sample, or a constant value for some samples
+_JUMP_SHARE = 0.5
+# largest deflection of a spring, relative to that at the drive's limit
 _BENDING = 2.0
 
 
 @dataclass
 class SupervisionParameters(Parameters):
-    """What of the joints is watched.
+    """Parameters of the supervision of joints and drives.
 
     Attributes:
-        tolerance: By how much positions and integrated velocities of a joint may differ
-            [rad or m]; 0 to compare nothing.
+        tolerance: Largest difference of positions and integrated velocities of a joint [rad or m];
+            0 for no comparison.
         resolution: Resolution of the measured positions [rad or m], shape (N,) or one for all;
             widens the tolerance by twice its value.
-        filter_time: By which measured velocities are late [s]; widens it by twice the way that a
-            joint makes in that time at its present speed.
+        filter_time: Delay of measured velocities [s]; widens the tolerance by twice the travel of a
+            joint in that time at its present speed.
         joint_limits: Whether a joint at its limit is a fault.
-        saturation_time: How long a drive may be at its limit [s], half of the time that it is not
-            being taken off; 0 for ever.
-        chatter_turns: How many turns from one limit to the other are chatter, see
+        saturation_time: Longest time of a drive at its limit [s], minus half of the time that it is
+            not; 0 for no limit.
+        chatter_turns: Number of changes from one limit to the other that is chatter, see
             :class:`~pfsc_drake.control.law.supervision.DriveWatch`; 0 for none.
-        overspeed: Share of its largest speed by which a joint may be faster; infinite if no speed
-            is a fault.
+        overspeed: Tolerated excess of a joint's largest speed, as a share of it; infinite for no
+            limit.
     """
 
     tolerance: NotNegative = 2e-3
@@ -53,50 +53,50 @@ class SupervisionParameters(Parameters):
 
 
 class Supervision(Block):
-    """Finds measured values of joints that contradict each other, and joints beyond their limits.
+    """Detection of inconsistent measurements of joints, and of joints beyond their limits.
 
-    Of every joint four signals tell the same motion: positions and integrated velocities of
-    link and motor. From tick to tick each adds to a leaky sum (by 20 1/s), so that offsets
+    Four signals of every joint describe the same motion: positions and integrated velocities of
+    link and motor. From sample to sample each adds to a leaky sum (by 20 1/s), so that offsets
     between them do not count. Position and velocity of one side must agree up to the tolerance;
-    the sides up to what the drive's torque, twice, bends the spring of an elastic joint. A
-    velocity that is late by ``filter_time`` lags behind by ``filter_time (v - v_m)``, where v_m is
+    both sides up to twice the deflection of the spring at the drive's limit. A velocity with a
+    delay ``filter_time`` lags behind by ``filter_time (v - v_m)``, where v_m is
     its mean with the same forgetting: the tolerance is wider by twice the larger of both, each
     up to the speed that is a fault.
 
-    A position that rests to the last bit must not do so while its velocity tells of more way than
-    the tolerance, which here is forgotten by 2 1/s: so it is found also where the joint is slow.
+    A position must not be constant to the last bit while its integrated velocity exceeds the
+    tolerance, with a forgetting rate of 2 1/s: so a frozen position of a slow joint is found, too.
 
-    Of a side that disagrees with itself the position is suspected if it jumped, by half the
-    tolerance within this tick, or if it has rested, to the last bit, while the velocity told of
-    half the tolerance; else the velocity. If the sides disagree, but none with itself, the one
-    that has moved less is taken for frozen, if it rests to the last bit. If both disagree with
-    themselves, their velocities are suspected.
+    If position and velocity of one side disagree, the position is suspected if it jumped by half
+    the tolerance within this sample, or if it was constant to the last bit while the integrated
+    velocity reached half the tolerance; otherwise the velocity. If only the sides disagree, the one
+    that has moved less is considered frozen, if it is constant to the last bit. If both sides are
+    inconsistent, their velocities are suspected.
 
-    So a position that jumps or freezes, and a velocity that jumps or freezes, are found as soon
-    as position and integrated velocity part by the tolerance: a jump of a position in the same
-    tick, of a velocity by ``dv`` after ``tolerance / dv``. What cannot be found: a value that
-    is frozen at rest, as long as the joint rests; drifts slower than tolerance times 20 1/s, or
-    2 1/s beside a position that rests.
+    So a position or a velocity that jumps or freezes is found as soon as position and integrated
+    velocity differ by the tolerance: a jump of a position in the same sample, a jump of a velocity
+    by ``dv`` after ``tolerance / dv``. Not detectable are values that freeze at rest, as long as
+    the joint rests, and drifts slower than tolerance times 20 1/s, or 2 1/s beside a constant
+    position.
 
-    A joint is too fast if link or motor is, by its velocity as by the way since the last tick: one
-    of the two alone may be a sensor's error, which the comparison above finds.
+    A joint is too fast if link or motor is, both by its velocity and by its travel since the last
+    sample: one of the two alone may be a sensor error, which the comparison above finds.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        ignored (input): What is not compared any more, nonzero if so, shape (4N,).
+        ignored (input): Components without comparison, nonzero if so, shape (4N,).
         fault (output): MEASUREMENT_IMPLAUSIBLE, JOINT_LIMIT, JOINT_SPEED or NONE, shape (1,).
-        suspects (output): 1 where a component of the state is not to be believed, shape (4N,).
+        suspects (output): 1 for implausible components of the state, shape (4N,).
 
     State:
-        joint_state of the ``last`` tick, and whether there was one (``known``); the leaky ``sums``
-        of the four ways, shape (4N,); for how many ticks each value was ``unchanged``, shape
-        (4N,); the ways by velocity since the positions of link and motor rest (``unseen``), shape
-        (2N,).
+        joint_state of the ``last`` sample, and whether it exists (``known``); the leaky ``sums``
+        of the four signals, shape (4N,); the number of samples each value was ``unchanged``, shape
+        (4N,); the integrated velocity while the positions of link and motor are constant
+        (``unseen``), shape (2N,).
 
     Args:
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model of the robot, N joints.
         limits: Limits of the drives' torques [Nm or N], shape (N,).
-        parameters: What is watched.
+        parameters: Parameters of the supervision.
         period: Sampling time [s].
 
     Raises:
@@ -127,7 +127,7 @@ class Supervision(Block):
         self.states = {"last": 4 * n, "known": 1} | self.inner
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
+        """Return the initial states; omitted states are zero."""
         return {"last": where(is_finite(u.joint_state), u.joint_state, 0.0)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -137,7 +137,7 @@ class Supervision(Block):
         return dict(zip(("fault", "suspects", *self.inner), results, strict=True))
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the next states; omitted states do not change."""
         later = {name: getattr(y, name) for name in self.inner}
         return {"last": u.joint_state, "known": 1.0} | later
 
@@ -164,11 +164,11 @@ def _supervision_function(
     unchanged = where(state == last, steady + known, 0.0)
     rests = ca.vertsplit(unchanged, n)
     ways, steps = [], []
-    for k, (x, x_0, way) in enumerate(zip(now, before, sums, strict=True)):
+    for k, (x, x_0, travel) in enumerate(zip(now, before, sums, strict=True)):
         step = x - x_0 if k % 2 == 0 else period / 2.0 * (x + x_0)
         steps.append(where(known, step, 0.0))
-        moved = way + steps[-1]
-        # what is no number contradicts nothing
+        moved = travel + steps[-1]
+        # NaN and infinity count as no motion
         ways.append(where(is_finite(moved), moved, 0.0))
     used = [
         ca.logic_and(is_finite(x), skip == 0.0)
@@ -176,15 +176,15 @@ def _supervision_function(
     ]
     allowed = largest_speeds(robot) * (1.0 + parameters.overspeed)
     tolerances, unseen, overlooked = [], [], []
-    for side, way in zip((0, 2), ca.vertsplit(hidden, n), strict=True):
+    for side, travel in zip((0, 2), ca.vertsplit(hidden, n), strict=True):
         fast = ca.fmin(_recent_speed(now[side + 1], ways[side + 1]), allowed)
         late = parameters.filter_time * fast
         tolerances.append(parameters.tolerance + 2.0 * (late + resolution))
-        further = np.exp(-_FORGETTING_RESTS * period) * way + steps[side + 1]
+        further = np.exp(-_FORGETTING_RESTS * period) * travel + steps[side + 1]
         rest = ca.logic_and(rests[side] > 0, used[side + 1])
         unseen.append(where(ca.logic_and(rest, is_finite(further)), further, 0.0))
         overlooked.append(ca.fabs(unseen[-1]) > tolerances[-1])
-    q_J, v_J, q_M, v_M = _substituted(ways, used)
+    q_J, v_J, q_M, v_M = _substitute(ways, used)
     wrong_J = ca.logic_or(ca.fabs(q_J - v_J) > tolerances[0], overlooked[0])
     wrong_M = ca.logic_or(ca.fabs(q_M - v_M) > tolerances[1], overlooked[1])
     link, motor = (q_J + v_J) / 2.0, (q_M + v_M) / 2.0
@@ -195,15 +195,15 @@ def _supervision_function(
     suspects = []
     for side, wrong in ((0, wrong_J), (2, wrong_M)):
         slip, change = steps[side] - steps[side + 1], now[side + 1] - before[side + 1]
-        at_once = _AT_ONCE * tolerances[side // 2]
-        # a velocity that jumped has let them part in the ticks before, too
-        agreed = ca.fabs(sums[side] - sums[side + 1]) < at_once / 2.0
+        jump = _JUMP_SHARE * tolerances[side // 2]
+        # a velocity that jumped also caused differences in the samples before
+        agreed = ca.fabs(sums[side] - sums[side + 1]) < jump / 2.0
         sudden = period * ca.fabs(change) < ca.fabs(slip)
-        jumped = (ca.fabs(slip) > at_once) * agreed * sudden
-        rested = period * rests[side] * ca.fabs(now[side + 1]) > at_once
+        jumped = (ca.fabs(slip) > jump) * agreed * sudden
+        rested = period * rests[side] * ca.fabs(now[side + 1]) > jump
         of_position = (1 - both) * ca.fmax(ca.fmax(jumped, rested), overlooked[side // 2])
         suspects += [wrong * of_position, wrong * (1 - of_position)]
-    # joints that bend by more than they should move on both sides
+    # excessively deflected joints move on both sides
     still = [(rests[side] > 0) * (rests[side + 1] > 0) for side in (0, 2)]
     frozen = [
         neither * apart * moved_less * rest for moved_less, rest in zip(less, still, strict=True)
@@ -224,7 +224,7 @@ def _supervision_function(
         otherwise=Fault.NONE,
     )
     decay = np.exp(-_FORGETTING * period)
-    sums = ca.vertcat(*[decay * way for way in ways])
+    sums = ca.vertcat(*[decay * travel for travel in ways])
     results = [fault, suspect, sums, unchanged, ca.vertcat(*unseen)]
     return ca.Function(
         "supervision",
@@ -236,18 +236,18 @@ def _supervision_function(
     )
 
 
-def _recent_speed(v: ca.SX, way: ca.SX) -> ca.SX:
-    """Return how fast joints move or have moved, shape (N,).
+def _recent_speed(v: ca.SX, travel: ca.SX) -> ca.SX:
+    """Return the present or recent speed of joints, shape (N,).
 
     Args:
-        v: Velocities, shape (N,); what is no number is none.
-        way: Their leaky sums, shape (N,).
+        v: Velocities, shape (N,); NaN and infinity count as 0.
+        travel: Their leaky sums, shape (N,).
     """
-    return ca.fmax(where(is_finite(v), ca.fabs(v), 0.0), _FORGETTING * ca.fabs(way))
+    return ca.fmax(where(is_finite(v), ca.fabs(v), 0.0), _FORGETTING * ca.fabs(travel))
 
 
-def _substituted(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:
-    """Return four signals, each (N,); what is not used agrees with its side, or with the other."""
+def _substitute(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:
+    """Return four signals, each (N,), with unused ones replaced by their side or the other one."""
     means = []
     for side in (0, 2):
         count = used[side] + used[side + 1]
@@ -258,40 +258,39 @@ def _substituted(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:
     return [where(used[k], ways[k], link if k < 2 else motor) for k in range(4)]
 
 
-# s, in which turns are forgotten
+# s, time constant of the number of turns
 DRIVE_MEMORY = 0.2
-# ticks at a limit that one tick within the limits makes up for
+# samples at a limit that one sample within the limits compensates
 _FORGIVEN = 0.5
 
 
 class DriveWatch(Block):
-    """Finds drives that are at their limits for too long, or at both of them in turns.
+    """Detection of drives at their limits for too long, or alternating between them.
 
-    Saturation: each drive's ticks at a limit are counted, and taken off by half a tick when it is
-    within. So drives that go from limit to limit and back are found as well.
+    Saturation: each drive's samples at a limit are counted, minus half of the samples within the
+    limits. So drives that alternate between the limits are found as well.
 
-    Chatter: a loop that has become unstable in the frequencies of its own sampling asks for more
-    torque at every turn until the drives give all they have, one way and the other: it stays in
-    bounds, and no drive is at one limit for long. So the turns are counted, from one limit to the
-    other; in between, a drive may be anywhere. They are forgotten with a time constant of 0.2 s, so
-    that a drive that swings at f Hz counts ``0.4 f`` in the end, beyond ``chatter_turns`` for all f
-    above ``2.5 chatter_turns`` Hz. A reversal at full torque, even with an overshoot, has one or
-    two.
+    Chatter: a loop that is unstable near its sampling frequency demands growing torque until the
+    drives alternate between their limits: the motion stays bounded, and no drive is at one limit
+    for long. So changes from one limit to the other are counted; in between, a drive may be
+    anywhere. The number is forgotten with a time constant of 0.2 s, so that a drive that oscillates
+    at f Hz finally counts ``0.4 f``, beyond ``chatter_turns`` for all f above
+    ``2.5 chatter_turns`` Hz. A reversal at full torque, even with an overshoot, has one or two
+    changes.
 
     Ports:
-        drive (input): What the drives are told, shape (N,).
-        stopping (input): Nonzero where they are told so after a fault, which does not count, shape
-            (1,).
-        fault (output): DRIVE_SATURATED, DRIVE_CHATTERS or NONE, shape (1,), of the ticks before:
-            it depends on the state alone.
+        drive (input): Commands to the drives, shape (N,).
+        stopping (input): Nonzero for commands after a fault, which do not count, shape (1,).
+        fault (output): DRIVE_SATURATED, DRIVE_CHATTERS or NONE, shape (1,), of the samples
+            before: it depends on the state alone.
 
     State:
-        Of each drive: ``ticks`` at a limit; at which ``side`` it was last, -1, 0 or 1; its
+        For each drive: ``ticks`` at a limit; ``side`` of its last limit, -1, 0 or 1; its
         ``turns``, each of shape (N,).
 
     Args:
-        limits: Limits of what drives are told, shape (N,).
-        parameters: How much is too much.
+        limits: Limits of the commands, shape (N,).
+        parameters: Parameters of the supervision.
         period: Sampling time [s].
     """
 
@@ -317,7 +316,7 @@ class DriveWatch(Block):
         return {"fault": fault}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the next states; omitted states do not change."""
         at_limit = ca.fabs(u.drive) >= self._limits
         side = where(at_limit, ca.sign(u.drive), 0.0)
         counted = {

@@ -1,4 +1,4 @@
-"""Guidance that moves: transversal references that swing with time (5.1), (5.2)."""
+"""Oscillating virtual fixtures: transversal references that oscillate with time (5.1), (5.2)."""
 
 import math
 from collections.abc import Sequence
@@ -16,16 +16,16 @@ from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive, Range
 
 @dataclass
 class Swing(Parameters):
-    """A transversal coordinate's reference ``A s(t) sin(2 pi f (t - begin))``.
+    """Oscillation of a transversal reference, ``A s(t) sin(2 pi f (t - begin))``.
 
-    So the manifold that the tool is held on moves along its own normals, as a circle does whose
-    radius changes, ``xi_p = e' Delta sigma_t(t)``.
+    So the manifold moves along its own normals, like a circle of varying radius,
+    ``xi_p = e' Delta sigma_t(t)``.
 
     Attributes:
         coordinate: Number of the transversal coordinate, from 1.
         amplitude: A [m].
         frequency: f [Hz].
-        begin: Until when it rests [s].
+        begin: Begin of the oscillation [s].
         ramp: Time in which s rises from 0 to 1, with four continuous derivatives [s].
     """
 
@@ -36,18 +36,18 @@ class Swing(Parameters):
     ramp: Positive = 0.5
 
 
-class SwingingReference:
-    """The sum of several swings with its derivatives.
+class OscillatingReference:
+    """Sum of several oscillations with its derivatives.
 
     Args:
-        swings: Which.
+        swings: The oscillations.
         first: Row of the first transversal coordinate among the outputs.
         transversal: Number of transversal coordinates.
         outputs: Number m of outputs.
         order: Highest derivative r, at most 4.
 
     Raises:
-        InputError: If a swing is of a coordinate that is not there.
+        InputError: If an oscillation has a coordinate that does not exist.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class SwingingReference:
         """Return derivatives 0..r by rows, shape (r + 1, m) [m, m/s, ..].
 
         Args:
-            time: [s], number or expression.
+            time: Time [s], number or expression.
         """
         columns = [ca.DM.zeros(self._order + 1)] * self._outputs
         for swing, rise in zip(self._swings, self._rises, strict=True):
@@ -87,20 +87,20 @@ class SwingingReference:
         return ca.horzcat(*columns)
 
 
-class SwingingManifold(Block):
-    """Adds swings to a reference.
+class OscillatingManifold(Block):
+    """Reference with oscillations.
 
     Ports:
         desired_reference (input): Derivatives 0..r of m outputs by rows, shape ((r + 1) m,).
-        reference (output): The same with the swings, shape ((r + 1) m,).
+        reference (output): The same with the oscillations, shape ((r + 1) m,).
 
     Args:
-        swings: What is added.
+        swings: The oscillations.
         size: (r + 1) m.
         period: Sampling time [s].
     """
 
-    def __init__(self, swings: SwingingReference, size: int, period: float) -> None:
+    def __init__(self, swings: OscillatingReference, size: int, period: float) -> None:
         self._swings, self._period = swings, period
         self.inputs, self.states = {"desired_reference": Port(size)}, {}
         self.outputs = {"reference": Port(size)}
@@ -114,30 +114,30 @@ class SwingingManifold(Block):
 _SAMPLES = 2001
 
 
-class SwingingCourse:
-    """A course ``A s(t) sin(2 pi f (t - begin))`` over a region's clock, see :class:`Swing`.
+class OscillatingMotion:
+    """Motion ``A s(t) sin(2 pi f (t - begin))`` over a region's clock, see :class:`Swing`.
 
     Args:
         amplitude: A [m], or [rad].
         frequency: f [Hz].
-        begin: Until when it rests [s].
+        begin: Begin of the oscillation [s].
         ramp: Time in which s rises from 0 to 1 [s].
 
     Attributes:
         largest_rate: A bound of its absolute rate [m/s], or [rad/s].
 
     Raises:
-        InputError: A number that is none of a swing.
+        InputError: If a number is out of range, see :class:`Swing`.
     """
 
     def __init__(
         self, amplitude: float, frequency: float, *, begin: float = 0.0, ramp: float = 0.5
     ) -> None:
         unit = Swing(amplitude=1.0, frequency=frequency, begin=begin, ramp=ramp)
-        self._unit = SwingingReference([unit], first=0, transversal=1, outputs=1, order=0)
+        self._unit = OscillatingReference([unit], first=0, transversal=1, outputs=1, order=0)
         self._amplitude = amplitude
         clock = ca.SX.sym("clock")
-        moving = SwingingReference([unit], first=0, transversal=1, outputs=1, order=2).at(clock)
+        moving = OscillatingReference([unit], first=0, transversal=1, outputs=1, order=2).at(clock)
         times, step = np.linspace(begin, begin + ramp, _SAMPLES, retstep=True)
         _, rates, bends = np.abs(ca.Function("moving", [clock], [moving])(times[None]).full())
         # between two samples it changes by half a step at most

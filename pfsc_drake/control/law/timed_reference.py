@@ -1,4 +1,4 @@
-"""Motion along a manifold over time: planned, at the pace of an override, or streamed."""
+"""Motion along a manifold over time: planned, with a speed override, or streamed."""
 
 import math
 from dataclasses import dataclass
@@ -16,24 +16,24 @@ from pfsc_drake.geometry.curves.polynomial import PieceTable
 from pfsc_drake.jets import Jet, compose
 from pfsc_drake.yaml.rules import Parameters, Positive
 
-# of the pace that was planned; backwards likewise
-FASTEST_PACE = 1.5
+# of the planned speed; backwards likewise
+LARGEST_SCALING = 1.5
 
 
 class TimedReference(Block):
-    """References of the virtual output, ``yhat_p = (eta_p(s), 0, ..)``, over time s.
+    """Reference of the virtual output, ``yhat_p = (eta_p(s), 0, ..)``, over time s.
 
     Transversal and rotational references are zero. Before the motion and after it the reference
     rests.
 
     With an override w the motion's own time s runs w times as fast as the clock: 0 stops it, up to
-    1.5 it is faster, below zero it goes back. A filter of order r, with r equal poles
-    ``-bandwidth``, makes of w what the law can follow::
+    1.5 it is faster, below zero it moves backwards. A filter of order r, with r equal poles
+    ``-bandwidth``, makes w smooth enough for the law::
 
         s' = z_1,   (d/dt / bandwidth + 1)^r z_1 = w
 
-    so that s, and with it the reference, has r continuous derivatives however w jumps. The path is
-    never left: only the progress on it changes. What is not a number counts as 0.
+    so that s, and with it the reference, has r continuous derivatives for any jumps of w. The tool
+    stays on the path: only its progress changes. NaN or infinity counts as 0.
 
     Ports:
         override (input, optional): w, shape (1,), limited to -1.5 .. 1.5; 1 if not connected.
@@ -75,13 +75,13 @@ class TimedReference(Block):
         self.states = {"pace": order + 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start.
+        """Return the initial states.
 
-        What is left out is zero; a motion starts at the pace that is asked for.
+        Omitted states are zero; a motion starts with the requested speed scaling.
         """
         if u.override is None:
             return {}
-        start = [t * self._period, _pace(u.override), *[0.0] * (self._order - 1)]
+        start = [t * self._period, _limited_scaling(u.override), *[0.0] * (self._order - 1)]
         return {"pace": ca.vertcat(*start)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -105,17 +105,19 @@ class TimedReference(Block):
         return {"reference": ca.vec(rows.T)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the next states; omitted states do not change."""
         if u.override is None:
             return {}
-        s, *rates = ca.vertsplit(ca.DM(self._step) @ ca.vertcat(x.pace, _pace(u.override)))
+        s, *rates = ca.vertsplit(
+            ca.DM(self._step) @ ca.vertcat(x.pace, _limited_scaling(u.override))
+        )
         return {"pace": ca.vertcat(ca.fmin(ca.fmax(s, self._begin), self._end), *rates)}
 
 
-def _pace(override: Any) -> Any:
-    """Return the pace that is asked for, within what is allowed."""
+def _limited_scaling(override: Any) -> Any:
+    """Return the requested speed scaling, limited to the allowed range."""
     number = where(ca.fabs(override) < ca.inf, override, 0.0)
-    return ca.fmin(ca.fmax(number, -FASTEST_PACE), FASTEST_PACE)
+    return ca.fmin(ca.fmax(number, -LARGEST_SCALING), LARGEST_SCALING)
 
 
 def _derivatives(curve: PiecewisePolynomialCurve, order: int) -> PieceTable:
@@ -141,12 +143,12 @@ def _filter_step(order: int, bandwidth: float, period: float) -> np.ndarray:
 
 @dataclass
 class StreamLimits(Parameters):
-    """How fast a tool goes to way points that come one after the other.
+    """Limits of the motion to successive waypoints.
 
     Attributes:
         velocity: Largest speed V [m/s].
         acceleration: Largest acceleration A [m/s^2].
-        bandwidth: Bandwidth of the filter that makes it smooth enough for the law [1/s].
+        bandwidth: Bandwidth of the smoothing filter for the law [1/s].
     """
 
     velocity: Positive = 0.1
@@ -155,26 +157,26 @@ class StreamLimits(Parameters):
 
 
 class StreamedReference(Block):
-    """Reference of the arc length towards the last way point that has come.
+    """Reference of the arc length towards the last received waypoint.
 
-    A point p on the path goes to the last way point g with a speed v that each tick changes by
-    ``A T`` at most, to the largest from which it can still stop there::
+    A point p on the path moves to the last waypoint g with a speed v that changes by ``A T`` at
+    most in each sample, up to the largest from which it can still stop there::
 
         v+ = min(V, v + A T, A (sqrt(T^2 + 2 c / A) - T)),   c = g - p - T v / 2
         p+ = p + T (v + v+) / 2
 
     so that always ``p + T v / 2 + v^2 / (2 A) <= g``. The reference follows p through r equal lags,
-    ``(d/dt / bandwidth + 1)^r y = p``, exactly between ticks. Their impulse response is positive
-    and its integral is 1: y is a mean of where p has been, and so are its rates. Hence y has r
-    continuous derivatives whenever way points come, is never beyond the last one, nor faster than
-    V, nor accelerated more than A. When the stream runs dry it comes to rest there. Transversal and
-    rotational references are zero.
+    ``(d/dt / bandwidth + 1)^r y = p``, exactly between samples. Their impulse response is
+    positive and its integral is 1: y is a mean of past p, and so are its rates. Hence y has r
+    continuous derivatives whenever waypoints are received, is never beyond the last one, nor faster
+    than V, nor accelerated more than A. Without further waypoints it comes to rest at the last one.
+    Transversal and rotational references are zero.
 
     Ports:
-        goal (input): Arc length of the last way point [m], shape (1,). What is no number, or less
-            than one before, changes nothing: way points come one behind the other.
+        goal (input): Arc length of the last waypoint [m], shape (1,). NaN, infinity, or a smaller
+            value than before is ignored: waypoints are in order.
         speed (input, optional): Largest speed from now on [m/s], shape (1,), limited to 0 .. V; V
-            if not connected. What is no number counts as 0.
+            if not connected. NaN or infinity counts as 0.
         reference (output): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,)
             [m, m/s, ...].
 
@@ -182,12 +184,12 @@ class StreamedReference(Block):
         goal: g [m]. place: ``[p, v]`` [m, m/s]. filtered: Derivatives 0..r-1 of y, shape (r,).
 
     Args:
-        limits: How fast it goes.
+        limits: Limits of the motion.
         order: r, of the highest derivative.
         num_outputs: m.
         period: Sampling time T [s].
-        start: Where it rests at first [m].
-        end: Where the path ends [m]; way points beyond it are taken for its end.
+        start: Initial position at rest [m].
+        end: End of the path [m]; waypoints beyond it count as its end.
     """
 
     def __init__(
@@ -209,7 +211,7 @@ class StreamedReference(Block):
         self.states = {"goal": 1, "place": 2, "filtered": order}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero; at rest."""
+        """Return the initial states, at rest; omitted states are zero."""
         start = ca.DM(self._start)
         rest = ca.DM.zeros(self._order - 1)
         return {
@@ -226,47 +228,47 @@ class StreamedReference(Block):
         return {"reference": ca.vec(ca.horzcat(eta, ca.densify(rest)).T)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the next states; omitted states do not change."""
         goal = ca.fmax(x.goal, ca.fmin(where(is_finite(u.goal), u.goal, x.goal), self._end))
         speed = self._speed(x, u, goal)
         acceleration = (speed - x.place[1]) / self._period
         after = self._step @ ca.vertcat(x.filtered, x.place, acceleration)
-        # rounding must not lead beyond it
-        place = ca.fmin(after[self._order], goal)
+        # rounding must not exceed the goal
+        position = ca.fmin(after[self._order], goal)
         return {
             "goal": goal,
-            "place": ca.vertcat(place, speed),
+            "place": ca.vertcat(position, speed),
             "filtered": after[: self._order],
         }
 
     def _speed(self, x: Values, u: Values, goal: Any) -> Any:
         """Return ``v+``."""
         A, T = self._limits.acceleration, self._period
-        place, speed = ca.vertsplit(x.place)
-        left = ca.fmax(goal - place - T * speed / 2.0, 0.0)
+        position, speed = ca.vertsplit(x.place)
+        left = ca.fmax(goal - position - T * speed / 2.0, 0.0)
         fastest = allowed_speed(self._limits, u.speed)
-        wanted = ca.fmin(ca.fmin(fastest, speed + A * T), speed_to_stop(left, A, T))
-        return ca.fmax(wanted, ca.fmax(speed - A * T, 0.0))
+        speed_limit = ca.fmin(ca.fmin(fastest, speed + A * T), speed_to_stop(left, A, T))
+        return ca.fmax(speed_limit, ca.fmax(speed - A * T, 0.0))
 
 
-def allowed_speed(limits: StreamLimits, asked: Any) -> Any:
+def allowed_speed(limits: StreamLimits, requested: Any) -> Any:
     """Return the largest speed from now on [m/s].
 
     Args:
         limits: Its limit V.
-        asked: What is asked for besides [m/s], or None; what is no number counts as 0.
+        requested: Requested speed [m/s], or None; NaN or infinity counts as 0.
     """
     fastest = ca.DM(limits.velocity)
-    if asked is None:
+    if requested is None:
         return fastest
-    return ca.fmin(ca.fmax(where(is_finite(asked), asked, 0.0), 0.0), fastest)
+    return ca.fmin(ca.fmax(where(is_finite(requested), requested, 0.0), 0.0), fastest)
 
 
 def speed_to_stop(left: Any, acceleration: float, period: float) -> Any:
-    """Return the largest speed at the end of a period from which there is room to stop [m/s].
+    """Return the largest speed at the end of a period from which a stop is possible [m/s].
 
     Args:
-        left: Way left, less what half a period at the speed before takes [m], not negative.
+        left: Remaining distance minus half a period at the speed before [m], not negative.
         acceleration: A [m/s^2].
         period: T [s].
     """

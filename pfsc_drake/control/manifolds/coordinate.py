@@ -1,4 +1,4 @@
-"""What a coordinate of a manifold is."""
+"""Coordinates of a manifold: their kinds, names and ends."""
 
 import enum
 import math
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 class Kind(enum.Enum):
-    """What a coordinate of a manifold means; the value is its symbol in the dissertation."""
+    """Kind of a manifold's coordinate; the value is its symbol in the dissertation."""
 
     TANGENTIAL = "eta"
     TRANSVERSAL = "xi"
@@ -26,7 +26,7 @@ class Coordinate:
         name: Its name.
         kind: Its kind, which decides gains, compliance and unit.
         force: Name of the generalized force along it.
-        ends: Where what is followed ends [m], an open path; infinite where nothing ends.
+        ends: First and last value on an open path [m]; infinite without ends.
     """
 
     name: str

@@ -51,7 +51,7 @@ def path_axes(point: Any, layout: PathPointLayout) -> Any:
         layout: Layout of ``point``.
     """
     slope, e_perp = point[layout.position][3:6], point[layout.normal]
-    # a path that stands still has no direction, which is not finite
+    # where the derivative vanishes there is no direction: NaN
     e_par = slope / ca.norm_2(slope)
     return ca.horzcat(e_par, e_perp, ca.cross(e_par, e_perp))
 
@@ -62,7 +62,7 @@ def turning_force(torque: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX
     The tool's angular velocity is ``omega = omega_d + R_d T_ZYX(phi) phi'`` with
     ``omega_d = (omega_d / eta') eta'``: on a path whose orientation turns by
     ``omega_d / eta'`` [rad/m], a torque does work along eta too. (3.41) has no such
-    term, because there the rotational coordinates are those of ``omega`` itself.
+    term, because there the rotational coordinates belong to ``omega`` itself.
 
     Args:
         torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
@@ -76,8 +76,8 @@ def turning_force(torque: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX
 def turning_along_path(force: ca.SX, point: ca.SX, layout: PathPointLayout, xi: ca.SX) -> ca.SX:
     """Return the force along eta of a tool beside a path whose frame turns about it [N].
 
-    With ``w = psi' / |sigma'|`` [rad/m], the frame's turn per length of the path, a tool that keeps
-    its transversal coordinates moves by ``w (xi_1 e_cross - xi_2 e_perp) eta'`` besides.
+    With ``w = psi' / |sigma'|`` [rad/m], the frame's turn per length of the path, a tool of
+    constant transversal coordinates also moves by ``w (xi_1 e_cross - xi_2 e_perp) eta'``.
 
     Args:
         force: Force on the tool at the tool point, world axes [N], shape (3,).
@@ -190,7 +190,7 @@ def rotational_force(mu_d: ca.SX, phi: ca.SX, alignment: np.ndarray | None = Non
 
     Args:
         mu_d: Torque on the tool about the tool point ``R_d' mu`` (3.45), in the axes of the
-            reference orientation [Nm], shape (3,); where an axis alone matters, that of
+            reference orientation [Nm], shape (3,); if only an axis is controlled, from
             :func:`torque_across_axis`.
         phi: ``phi_pd``, angles of ``R_d' R_p`` (3.43) [rad], shape (3,), or (2,) of an axis.
         alignment: The rotation C of :func:`orientation_error`, or None.
@@ -213,13 +213,13 @@ def torque_across_axis(torque: ca.SX, R_d: ca.SX, phi: ca.SX, alignment: np.ndar
 
     The two angles of an axis move with the angular velocity across it, whatever the tool's turn
     about it, so that torques about the axis do no work on them: with the map B from the tool's
-    twist to the rates of the coordinates, wrenches ``B' tau`` have none, and of any other wrench
-    this leaves the part that is one.
+    twist to the rates of the coordinates, wrenches ``B' tau`` have no such part, and any other
+    wrench is projected onto them.
 
     Args:
         torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
         R_d: Reference orientation, shape (3, 3).
-        phi: The two angles of the axis where the tool is to be [rad], shape (2,).
+        phi: The two desired angles of the axis [rad], shape (2,).
         alignment: The rotation C of :func:`orientation_error`, shape (3, 3).
     """
     cos_2 = ca.cos(phi[1])

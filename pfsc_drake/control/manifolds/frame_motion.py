@@ -1,4 +1,4 @@
-"""What carries a manifold: the motion of its frame, as known, as differenced, or as planned."""
+"""Motion of a manifold's frame: from joints, by differences of poses, or from a plan."""
 
 import math
 from typing import Any
@@ -14,14 +14,14 @@ from pfsc_drake.control.manifolds.moving_frame import (
     frame_jets,
     frame_size,
     frame_vector,
-    seen_from,
+    relative_to,
 )
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 
 
 class FlangeFrame(Block):
-    """The motion of a robot's tool frame, from that of its joints.
+    """Motion of a robot's tool frame, from the motion of its joints.
 
     Ports:
         joint_jet (input): Joint coordinates and derivatives 1..r by rows, shape ((r + 1) N,)
@@ -30,12 +30,12 @@ class FlangeFrame(Block):
             shape (12 (k + 1),).
 
     Args:
-        robot: The robot, as it is believed.
+        robot: The controller's model of the robot.
         relative_degree: ``r`` of its law.
         order: ``k``, at most r.
-        placement: Where its base is believed to be, ``X_WB`` times the inverse of that in the
-            robot's model: ``[p, R by rows]``, shape (12,); where the model has it, if omitted.
-        highest: Highest derivative that is told, the others being zero; by default all are told.
+        placement: Nominal pose of its base, ``X_WB`` times the inverse of the base pose in the
+            robot's model: ``[p, R by rows]``, shape (12,); the model's pose if omitted.
+        highest: Highest derivative that is evaluated, the others being zero; by default all.
     """
 
     def __init__(
@@ -58,10 +58,10 @@ class FlangeFrame(Block):
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         rows = ca.vertsplit(self._motion(u.joint_jet[: self._size]), POSE_SIZE)
-        placed = [_turned(self._R, row) for row in rows]
+        placed = [_rotate_pose(self._R, row) for row in rows]
         placed[0] = ca.vertcat(placed[0][:3] + self._p, placed[0][3:])
-        untold = [ca.DM.zeros(POSE_SIZE)] * (len(placed) - 1 - self._highest)
-        return {"frame_jet": ca.vertcat(*placed[: self._highest + 1], *untold)}
+        padding = [ca.DM.zeros(POSE_SIZE)] * (len(placed) - 1 - self._highest)
+        return {"frame_jet": ca.vertcat(*placed[: self._highest + 1], *padding)}
 
 
 @once_per_content()
@@ -83,19 +83,19 @@ def flange_motion_function(robot: RobotModel, order: int) -> ca.Function:
     return ca.Function("flange_motion", [joints], ca.cse([frame]), ["joint_jet"], ["frame_jet"])
 
 
-def _turned(R: Any, pose: Any) -> Any:
+def _rotate_pose(R: Any, pose: Any) -> Any:
     """Return ``R p`` and ``R R_WC`` of a pose or of a derivative of one, shape (12,)."""
     rotation = R @ ca.reshape(pose[3:], 3, 3).T
     return ca.vertcat(R @ pose[:3], ca.vec(rotation.T))
 
 
 class DifferencedFrame(Block):
-    """The motion of a frame as its measured poses let one guess it, for comparison.
+    """Motion of a frame by differences of its measured poses, for comparison.
 
     Ports:
-        frame_jet (input): Of which the pose alone is used, shape (12 (k + 1),).
-        differenced (output): The pose, and its backward differences in place of derivatives: the
-            i-th that of i / 2 ticks ago.
+        frame_jet (input): Motion of the frame; only the pose is used, shape (12 (k + 1),).
+        differenced (output): The pose, and its backward differences in place of derivatives; the
+            i-th lags by i / 2 ticks.
 
     State:
         ``poses`` of the last k ticks, the oldest first, shape (12 k,).
@@ -113,7 +113,7 @@ class DifferencedFrame(Block):
         self.states = {"poses": POSE_SIZE * max(order, 1)}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start: that the frame rested."""
+        """Return the initial state: a frame at rest."""
         return {"poses": ca.repmat(u.frame_jet[:POSE_SIZE], max(self._order, 1), 1)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -128,43 +128,43 @@ class DifferencedFrame(Block):
         return {"differenced": ca.vertcat(*rows)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the state at the next tick; omitted parts stay."""
         return {"poses": ca.vertcat(x.poses[POSE_SIZE:], u.frame_jet[:POSE_SIZE])}
 
 
 class PlannedFrame(Block):
-    """A frame where it is measured to be, with the derivatives of where it was planned to be.
+    """Frame of a measured pose with the derivatives of its plan.
 
     Ports:
-        frame_jet (input): Of which the pose alone is used, shape (12 (k + 1),).
+        frame_jet (input): Motion of the frame; only the pose is used, shape (12 (k + 1),).
         planned (input): Derivatives 0..k of the plan, shape (12 (k + 1),).
         mixed (output): The measured pose, and the plan's derivatives.
 
     Args:
         order: Highest derivative k, of which those above ``highest`` are taken to be zero.
-        highest: Highest derivative that is taken from the plan.
+        highest: Highest derivative from the plan.
     """
 
     def __init__(self, order: int, highest: int) -> None:
-        self._told = POSE_SIZE * (min(highest, order) + 1)
+        self._planned_size = POSE_SIZE * (min(highest, order) + 1)
         size = frame_size(order)
         self.inputs = {"frame_jet": Port(size), "planned": Port(size)}
         self.outputs, self.states = {"mixed": Port(size)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        planned = u.planned[POSE_SIZE : self._told]
-        untold = ca.DM.zeros(u.planned.shape[0] - self._told)
-        return {"mixed": ca.vertcat(u.frame_jet[:POSE_SIZE], planned, untold)}
+        planned = u.planned[POSE_SIZE : self._planned_size]
+        padding = ca.DM.zeros(u.planned.shape[0] - self._planned_size)
+        return {"mixed": ca.vertcat(u.frame_jet[:POSE_SIZE], planned, padding)}
 
 
-class SeenTool(Block):
-    """Where a tool is in a frame that moves.
+class RelativeTool(Block):
+    """Pose of a tool relative to a moving frame.
 
     Ports:
         tool_pose (input): ``[y_t, R_e by rows]`` in the world, shape (12,) [m, 1].
         frame_jet (input): See :func:`frame_jets`.
-        seen (output): ``[y_C, R_Ce by rows]`` in the frame, shape (12,) [m, 1].
+        relative_pose (output): ``[y_C, R_Ce by rows]`` in the frame, shape (12,) [m, 1].
 
     Args:
         order: Highest derivative in ``frame_jet``.
@@ -172,19 +172,19 @@ class SeenTool(Block):
 
     def __init__(self, order: int) -> None:
         self.inputs = {"tool_pose": Port(POSE_SIZE, "m, 1"), "frame_jet": Port(frame_size(order))}
-        self.outputs, self.states = {"seen": Port(POSE_SIZE, "m, 1")}, {}
+        self.outputs, self.states = {"relative_pose": Port(POSE_SIZE, "m, 1")}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         tool, frame = frame_jets(u.tool_pose), frame_jets(u.frame_jet[:POSE_SIZE])
-        return {"seen": frame_vector(*seen_from(*frame, *tool))}
+        return {"relative_pose": frame_vector(*relative_to(*frame, *tool))}
 
 
 class FramedPoint(Block):
-    """The point of a manifold with the motion of the frame that carries it.
+    """Point of a manifold together with the motion of the frame that carries it.
 
     Ports:
-        manifold_point (input): Of the manifold in its frame.
+        manifold_point (input): Point of the manifold in its frame.
         frame_jet (input): See :func:`frame_jets`.
         framed_point (output): Laid out by :class:`FramedLayout`.
 

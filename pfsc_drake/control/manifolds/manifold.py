@@ -1,4 +1,4 @@
-"""What a law needs to know of a manifold, and of what finds the place on it."""
+"""Interfaces of manifolds and projections to the control laws."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -17,19 +17,19 @@ __all__ = [
     "Coordinate",
     "Kind",
     "Manifold",
-    "PlaceLayout",
-    "PlaceManifold",
     "PointLayout",
+    "ProjectedManifold",
+    "ProjectionLayout",
     "indices",
     "manifold_force_function",
 ]
 
 
 class PointLayout(Protocol):
-    """Where the quantities of a manifold's point lie in a flat array of floats.
+    """Layout of a manifold's point in a flat array of floats.
 
-    The point is what a projector, or whatever else finds the place on the manifold, tells the
-    law at each tick.
+    The point is the output of a projector, or of another source of the manifold's coordinates, to
+    the law at each tick.
     """
 
     @property
@@ -49,12 +49,12 @@ class PointLayout(Protocol):
         """A :class:`~pfsc_drake.geometry.ProjectionStatus`, [1]."""
 
 
-class PlaceLayout(PointLayout, Protocol):
+class ProjectionLayout(PointLayout, Protocol):
     """Layout of the point of a manifold that the tool is projected onto."""
 
     @property
     def theta(self) -> slice:
-        """Parameters of the nearest point."""
+        """Parameters of the closest point."""
 
     @property
     def eta(self) -> slice:
@@ -66,14 +66,14 @@ class PlaceLayout(PointLayout, Protocol):
 
     @property
     def memory(self) -> slice:
-        """What tells the next projection where to begin."""
+        """Initial values of the next projection."""
 
 
 class Manifold(Protocol):
-    """A map from the tool's motion to coordinates that a law makes linear.
+    """Map from the tool's motion to coordinates that a law makes linear.
 
     Attributes:
-        name: In one word.
+        name: Name, one word.
         coordinates: The m coordinates of the virtual output, in order.
         layout: Layout of the manifold's point.
         follows_time: Whether the point moves with time, so that the virtual output is the error
@@ -91,7 +91,7 @@ class Manifold(Protocol):
 
     @property
     def tool(self) -> ToolOrientation:
-        """What of the tool's orientation there are coordinates for."""
+        """Controlled part of the tool's orientation."""
 
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return the coordinates of a moving tool, m scalar jets of the order of ``y``.
@@ -112,7 +112,7 @@ class Manifold(Protocol):
         Args:
             wrench: ``[force, torque]`` on the tool at the tool point, world axes, shape (6,).
             point: The manifold's point.
-            reference: Virtual output that the tool is to have, shape (m,), for the
+            reference: Desired virtual output, shape (m,), for the
                 orientation that torques are resolved in, and for the distance from a manifold
                 whose lever arms change with it.
             with_turning: Whether torques act along tangential coordinates where the
@@ -127,11 +127,11 @@ class Manifold(Protocol):
         """
 
 
-class PlaceManifold(Manifold, Protocol):
-    """A manifold that the tool is projected onto, in whose coordinates its place is told."""
+class ProjectedManifold(Manifold, Protocol):
+    """Manifold that the tool is projected onto."""
 
     @property
-    def layout(self) -> PlaceLayout:
+    def layout(self) -> ProjectionLayout:
         """Layout of the manifold's point."""
 
     @property
@@ -139,7 +139,7 @@ class PlaceManifold(Manifold, Protocol):
         """Whether there is an orientation to follow."""
 
     def orientation(self, points: np.ndarray) -> np.ndarray:
-        """Return the orientation that belongs to places, shape (samples, 3, 3).
+        """Return the orientation at points of the manifold, shape (samples, 3, 3).
 
         Args:
             points: Shape (samples, layout.size), all finite.
@@ -147,7 +147,7 @@ class PlaceManifold(Manifold, Protocol):
 
 
 def indices(coordinates: Sequence[Coordinate], kind: Kind) -> slice:
-    """Return where the coordinates of a kind stand; they are neighbours.
+    """Return the indices of the coordinates of a kind, which are contiguous.
 
     Args:
         coordinates: Coordinates of a manifold.
@@ -190,7 +190,7 @@ class ToolKinematics(Block):
 
     Args:
         robot: The robot.
-        of_motors: Whether the pose is that of the motor coordinates q_M, for laws that
+        of_motors: Whether the pose belongs to the motor coordinates q_M, for laws that
             act on them.
     """
 
@@ -206,64 +206,64 @@ class ToolKinematics(Block):
         return {"tool_pose": self._pose(u.joint_state[self._part])}
 
 
-class PlaceEvaluator(Protocol):
-    """A manifold next to a point, as functions."""
+class ProjectionEvaluator(Protocol):
+    """Functions for the projection of a point onto a manifold."""
 
     @property
-    def layout(self) -> PlaceLayout:
+    def layout(self) -> ProjectionLayout:
         """Layout of the manifold's point."""
 
     @property
     def evaluate(self) -> ca.Function:
-        """``(y_t, memory) -> manifold_point``: what is next to a point, from the last place on."""
+        """``(y_t, memory) -> manifold_point``: projection, started from the last one."""
 
     @property
     def find(self) -> ca.Function:
-        """``y_t -> memory``: the nearest place on all of the manifold."""
+        """``y_t -> memory``: the closest point of the whole manifold."""
 
 
 class Projector(Block):
     """Orthogonal projection onto a manifold, (3.6), (4.9).
 
-    Its memory is the place of the last tick, from which Newton's iteration (3.72), (4.48) starts;
-    at self-intersections it keeps the branch, and in closed directions it counts the rounds. Of a
-    path that is the parameter ``theta*``, unwrapped, alone: arc length and parallel transport frame
-    are functions of it, so that neither drifts nor depends on the speed.
+    Newton's iteration (3.72), (4.48) starts from the projection of the last tick, the memory. It
+    follows its branch through self-intersections and counts revolutions in closed directions. For a
+    path the memory is only the unwrapped parameter ``theta*``: arc length and parallel transport
+    frame are functions of it, so that neither drifts nor depends on the speed.
 
     Ports:
         tool_pose (input): ``[y_t, R_e]``, shape (12,); see :class:`ToolKinematics`.
         manifold_point (output): The manifold next to the tool, laid out by ``layout``.
 
     State:
-        place: The part ``layout.memory`` of the last point. It starts at the nearest place on all
-        of the manifold, and stays where it is while the tool is nowhere.
+        place: The part ``layout.memory`` of the last point. It starts at the closest point of the
+        whole manifold, and is unchanged while the tool's position is NaN or infinite.
 
     Args:
         evaluator: The manifold.
-        start: What is added to the place that is found at the start, such as the lengths that a
-            motion along a surface begins with; nothing if omitted.
+        start: Added to the initial memory, such as the initial lengths of a motion along a surface;
+            zero if omitted.
 
     Attributes:
         layout: Layout of the manifold's point.
     """
 
-    def __init__(self, evaluator: PlaceEvaluator, start: np.ndarray | None = None) -> None:
+    def __init__(self, evaluator: ProjectionEvaluator, start: np.ndarray | None = None) -> None:
         self.layout, self._evaluator = evaluator.layout, evaluator
         memory = self.layout.memory
         self.inputs = {"tool_pose": Port(12, "m, 1")}
         self.outputs = {"manifold_point": Port(self.layout.size)}
-        self.states = {"place": memory.stop - memory.start}
-        self._start = np.zeros(self.states["place"]) if start is None else start
+        self.states = {"projection": memory.stop - memory.start}
+        self._start = np.zeros(self.states["projection"]) if start is None else start
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the start; what is left out is zero."""
-        return {"place": self._evaluator.find(u.tool_pose[:3]) + ca.DM(self._start)}
+        """Return the initial state; omitted parts are zero."""
+        return {"projection": self._evaluator.find(u.tool_pose[:3]) + ca.DM(self._start)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        return {"manifold_point": self._evaluator.evaluate(u.tool_pose[:3], x.place)}
+        return {"manifold_point": self._evaluator.evaluate(u.tool_pose[:3], x.projection)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
-        place = y.manifold_point[self.layout.memory]
-        return {"place": where(all_finite(place), place, x.place)}
+        """Return the state at the next tick; omitted parts stay."""
+        memory = y.manifold_point[self.layout.memory]
+        return {"projection": where(all_finite(memory), memory, x.projection)}

@@ -1,4 +1,4 @@
-"""A path or surface that moves: its frame is carried by something whose motion is known."""
+"""Moving path or surface: its frame is carried by a robot, turntable or conveyor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,11 +49,11 @@ def frame_vector(position: Jet, rotation: Jet) -> Any:
     return ca.vertcat(*[ca.vertcat(p, ca.vec(R.T)) for p, R in both])
 
 
-def seen_from(position: Jet, rotation: Jet, y: Jet, R_e: Jet) -> tuple[Jet, Jet]:
-    """Return a tool's motion as it is seen from a frame C that moves.
+def relative_to(position: Jet, rotation: Jet, y: Jet, R_e: Jet) -> tuple[Jet, Jet]:
+    """Return a tool's motion relative to a moving frame C.
 
-    ``y_C = R_WC' (y_t - p_WC)`` and ``R_Ce = R_WC' R_e``, products of jets: velocity, Coriolis and
-    centrifugal terms, and all that belongs to higher orders, are in them.
+    ``y_C = R_WC' (y_t - p_WC)`` and ``R_Ce = R_WC' R_e``, products of jets, which include velocity,
+    Coriolis and centrifugal terms, and their counterparts of higher orders.
 
     Args:
         position: ``p_WC`` [m], vector jet.
@@ -70,7 +70,7 @@ def seen_from(position: Jet, rotation: Jet, y: Jet, R_e: Jet) -> tuple[Jet, Jet]
 
 @dataclass(frozen=True)
 class FramedLayout:
-    """Layout of the point of a manifold that is carried: the manifold's own, then its frame.
+    """Layout of a moving manifold's point: the manifold's own, then its frame.
 
     Attributes:
         own: Layout of the manifold's point in its frame C.
@@ -105,21 +105,21 @@ class FramedLayout:
 
 
 class MovingFrameManifold:
-    """A manifold in a frame C that moves in the world, as another manifold.
+    """Manifold in a frame C that moves in the world, as another manifold.
 
-    The virtual output is that of the tool's motion seen from C. With the frame's motion known up to
-    its derivative of order r, the output's r-th derivative is affine in the joints' as ever,
-    ``yhat^(r) = A q^(r) + b``: what the frame does is in b, and nothing is differenced. The frame
-    may be carried by another robot, a turntable or a conveyor.
+    The virtual output belongs to the tool's motion relative to C. With the frame's motion known up
+    to its derivative of order r, the output's r-th derivative remains affine in the joints',
+    ``yhat^(r) = A q^(r) + b``: the frame's motion is part of b, and nothing is differenced. The
+    frame may be carried by another robot, a turntable or a conveyor.
 
-    Coordinates, lengths and angles are those of the manifold in C; a ``yaw_axis`` is one of C.
+    Coordinates, lengths and angles belong to the manifold in C; a ``yaw_axis`` is fixed in C.
 
     Args:
         own: The manifold in C.
 
     Attributes:
-        name: That of the manifold, in a frame.
-        coordinates: Those of the manifold.
+        name: The manifold's name with ``_in_frame``.
+        coordinates: The manifold's coordinates.
         follows_time: Whether its point moves along it with time.
         layout: The manifold's layout, and the frame.
     """
@@ -133,13 +133,13 @@ class MovingFrameManifold:
 
     @property
     def tool(self) -> ToolOrientation:
-        """What of the tool's orientation there are coordinates for."""
+        """Controlled part of the tool's orientation."""
         return self.own.tool
 
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
-        """Return the manifold's coordinates of the tool as it is seen from the frame."""
-        place, frame = self._split(point)
-        return self.own.virtual_output(*seen_from(*frame_jets(frame), y, R_e), place, lead)
+        """Return the manifold's coordinates of the tool's motion relative to the frame."""
+        own_point, frame = self._split(point)
+        return self.own.virtual_output(*relative_to(*frame_jets(frame), y, R_e), own_point, lead)
 
     def force(
         self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
@@ -148,15 +148,15 @@ class MovingFrameManifold:
 
         Their power is the wrench's on the tool's motion relative to the frame.
         """
-        place, frame = self._split(point)
+        own_point, frame = self._split(point)
         R_CW = _rotation(frame).T
         turned = ca.vertcat(R_CW @ wrench[:3], R_CW @ wrench[3:])
-        return self.own.force(turned, place, reference, with_turning=with_turning)
+        return self.own.force(turned, own_point, reference, with_turning=with_turning)
 
     def axes(self, point: Any) -> Any:
         """Return the directions of the translational coordinates in the world, shape (3, 3)."""
-        place, frame = self._split(point)
-        return _rotation(frame) @ self.own.axes(place)
+        own_point, frame = self._split(point)
+        return _rotation(frame) @ self.own.axes(own_point)
 
     def frame_rate(self, point: Any) -> Any:
         """Return the first derivative of ``[p_WC, R_WC]``, shape (12,) [m/s, 1/s].

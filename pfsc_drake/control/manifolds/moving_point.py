@@ -1,4 +1,4 @@
-"""Trajectory tracking: a point that moves along a path with time, and the tool against it."""
+"""Trajectory tracking: errors of the tool against a point that moves along a path with time."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +10,12 @@ from pfsc_drake import jets
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.control.manifolds.forces import force_components
 from pfsc_drake.control.manifolds.orientation import quaternion_rotation
-from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, transported, turned
+from pfsc_drake.control.manifolds.path import (
+    PathGeometry,
+    PathManifold,
+    rotate_components,
+    transport,
+)
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.jets import Jet
 
@@ -19,8 +24,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     """Return the errors ``y_t - sigma_t(theta_d(t))`` and the angles of ``R_d' R_e``.
 
     The classical counterpart of the path coordinates (Sec. 3.8.4): the reference point
-    is given by time, ``theta_d' = eta_d' / |sigma'|``, whatever the tool does. The errors are
-    told in the parallel transport frame of that point, so that they have the gains of the
+    depends on time only, ``theta_d' = eta_d' / |sigma'|``, not on the tool. The errors are
+    resolved in the parallel transport frame of that point, so that they have the gains of the
     path coordinates whose names they share.
 
     Args:
@@ -42,11 +47,13 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     error = y - jets.compose(path.position, theta_d)
     tangent = jets.compose(path.position[1:], theta_d)
     e_par = tangent / jets.sqrt(jets.dot(tangent, tangent))
-    e_perp = transported(path.normal, e_par)
+    e_perp = transport(path.normal, e_par)
     axes = (e_par, e_perp, jets.cross(e_par, e_perp))
     position = [jets.dot(axis, error) for axis in axes]
     if path.turn:
-        position[1:] = turned(position[1:], jets.compose([ca.SX(0), *path.turn], theta_d))
+        position[1:] = rotate_components(
+            position[1:], jets.compose([ca.SX(0), *path.turn], theta_d)
+        )
     if not path.quaternion:
         return position
     R_d = quaternion_rotation(jets.compose(path.quaternion, theta_d))
@@ -54,7 +61,7 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
 
 
 class MovingPoint(PathManifold):
-    """The point that moves along a path with time, as a manifold.
+    """Point that moves along a path with time, as a manifold.
 
     Its coordinates are the errors of :func:`trajectory_errors`, in the order of a path's
     coordinates and named like them.
@@ -82,7 +89,7 @@ _SAMPLES, _STEPS = 2001, 6
 
 
 class TrajectoryPoint(Block):
-    """The path at the arc length that time prescribes, in place of the tool's projection.
+    """Path at the arc length that the reference prescribes, in place of the tool's projection.
 
     Ports:
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,);
@@ -114,8 +121,8 @@ class TrajectoryPoint(Block):
 
     def _parameter(self, eta: ca.MX) -> ca.MX:
         """Return the parameter with an arc length, by Newton's method from a table."""
-        laps = ca.floor(eta / self._length)
-        within = eta - (laps * self._length if np.isfinite(self._length) else 0.0)
+        revolutions = ca.floor(eta / self._length)
+        within = eta - (revolutions * self._length if np.isfinite(self._length) else 0.0)
         lengths, parameters = ca.MX(ca.DM(self._eta)), ca.MX(ca.DM(self._theta))
         k = ca.low(lengths, within, {"lookup_mode": "binary"})
         share = (within - lengths[k]) / (lengths[k + 1] - lengths[k])
@@ -124,4 +131,4 @@ class TrajectoryPoint(Block):
             point = self._at(theta)
             slope = point[self.layout.position][3:6]
             theta += (within - point[self.layout.eta]) / ca.norm_2(slope)
-        return theta + laps * self._period
+        return theta + revolutions * self._period

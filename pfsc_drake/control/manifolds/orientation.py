@@ -1,6 +1,6 @@
 """Orientation of a tool against a reference on jets: three angles, two of its axis, or its yaw.
 
-Or its own Euler angles against those of the reference, as the analytic Jacobian has them:
+Alternatively the difference of Euler angles, as of the analytic Jacobian:
 ``phi = Phi(R_e) - Phi(R_d)``, whose rates are ``T^-1(Phi_e) omega_e - T^-1(Phi_d) omega_d`` with T
 of (2.15), so that the rows of the decoupling matrix are those of (2.16) where the reference rests.
 """
@@ -20,16 +20,16 @@ def orientation_error(R_e: Jet, R_d: Jet, alignment: np.ndarray | None = None) -
 
     A factor that scales all entries of ``R_d`` alike cancels.
 
-    Where only an axis of the tool matters, ``R_d C`` and ``R_e C`` take the place of ``R_d`` and
+    If only an axis of the tool is controlled, ``R_d C`` and ``R_e C`` replace ``R_d`` and
     ``R_e``, with the constant rotation C whose first column is the axis in the tool frame. The
-    third angle then is a turn about the axis and is left out; the others depend on the first
-    column of ``C' R_d' R_e C`` alone, the direction of the axis. Small ones are those by which it
-    turns about the third and the second column of ``R_d C``.
+    third angle then is a turn about the axis and is omitted; the others depend on the first
+    column of ``C' R_d' R_e C`` alone, the direction of the axis. Small ones are rotations about
+    the third and the second column of ``R_d C``.
 
     Args:
         R_e: Tool orientation, matrix jet.
         R_d: Reference orientation, matrix jet, times any positive scalar signal.
-        alignment: The rotation C, shape (3, 3), or None if all of the orientation matters.
+        alignment: The rotation C, shape (3, 3), or None for the whole orientation.
 
     Returns:
         3 scalar jets [rad], 2 of an axis.
@@ -85,10 +85,11 @@ def quaternion_rotation(q: Jet) -> Jet:
 
 
 def euler_difference(R_e: Jet, R_d: Jet, convention: str) -> list[Jet]:
-    """Return the Euler angles of ``R_e`` less those of ``R_d``, between -pi and pi each.
+    """Return the Euler angles of ``R_e`` minus those of ``R_d``, between -pi and pi each.
 
-    Each angle is that of a point in a plane, and the difference that between two points, so that
-    it does not jump where an angle does. A factor that scales all entries of ``R_d`` alike cancels.
+    Each angle is the polar angle of a point in a plane, and the difference the angle between two
+    points, so that it does not jump where an angle does. A factor that scales all entries of
+    ``R_d`` alike cancels.
     Not defined where the second angle of either is at an end of its range.
 
     Args:
@@ -106,16 +107,16 @@ def euler_difference(R_e: Jet, R_d: Jet, convention: str) -> list[Jet]:
 
 
 def euler_torque(torque: ca.SX, R_d: ca.SX, phi: ca.SX, convention: str) -> tuple[ca.SX, ca.SX]:
-    """Return what a torque does with the turn of the reference, and along the angles.
+    """Return the parts of a torque in the turn of the reference, and along the angles.
 
     ``omega_e = T(Phi_e) (phi' + Phi_d')`` and ``Phi_d' = T^-1(Phi_d) omega_d``: the power of a
-    torque mu is that of ``T'(Phi_e) mu`` along ``phi``, and that of ``T^-T(Phi_d) T'(Phi_e) mu``
-    in the turn of the reference.
+    torque mu is the power of ``T'(Phi_e) mu`` along ``phi``, plus the power of
+    ``T^-T(Phi_d) T'(Phi_e) mu`` in the turn of the reference.
 
     Args:
         torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
         R_d: Reference orientation, shape (3, 3).
-        phi: Angles that the tool is to have against the reference [rad], shape (3,).
+        phi: Desired angles of the tool against the reference [rad], shape (3,).
         convention: ``zyx`` or ``zyz``.
 
     Returns:
@@ -168,7 +169,7 @@ _YAW = (Coordinate("phi", Kind.ROTATIONAL, "tau_phi"),)
 
 
 class ToolOrientation:
-    """All of a tool's orientation, the direction of an axis of it, or its turn about the vertical.
+    """Controlled part of a tool's orientation: all, the direction of an axis, or a turn.
 
     Args:
         oriented: Whether there is an orientation to follow.
@@ -176,10 +177,10 @@ class ToolOrientation:
             shape (3,); None if more of the tool does.
         yaw_axis: The axis about which alone the tool's turn follows the orientation, such as the
             vertical of an SCARA, world axes, of any length, shape (3,); None if more does.
-        euler: ``zyx`` or ``zyz``, if the coordinates are to be the Euler angles of the tool less
-            those of the reference, see :mod:`~pfsc_drake.control.manifolds.orientation`; None
+        euler: ``zyx`` or ``zyz`` for the Euler angles of the tool minus those of the reference as
+            coordinates, see :mod:`~pfsc_drake.control.manifolds.orientation`; None
             for the ZYX angles of ``R_d' R_e``.
-        manifold: What to call what has the orientation in errors.
+        manifold: Name of the manifold in error messages.
 
     Attributes:
         alignment: Rotation whose first column is the tool's axis, shape (3, 3), or None, see
@@ -190,7 +191,7 @@ class ToolOrientation:
             turn.
 
     Raises:
-        InputError: If an axis has no direction, or no orientation to follow, or several are given,
+        InputError: If an axis has no direction, or no orientation to follow, or several are set,
             or the convention is unknown.
     """
 
@@ -203,16 +204,16 @@ class ToolOrientation:
         euler: str | None = None,
         manifold: str = "manifold",
     ) -> None:
-        given = {"tool axis": tool_axis, "yaw axis": yaw_axis}
-        said = [f"{name} {list(axis)}" for name, axis in given.items() if axis is not None]
+        axes = {"tool axis": tool_axis, "yaw axis": yaw_axis}
+        choices = [f"{name} {list(axis)}" for name, axis in axes.items() if axis is not None]
         if euler is not None:
-            said.append(f"Euler angles {euler}")
-        if said and not oriented:
-            raise InputError(f"{said[0]}: the {manifold} has no orientation to follow")
-        if len(said) > 1:
-            raise InputError(f"{' and '.join(said)}: one of them at most")
+            choices.append(f"Euler angles {euler}")
+        if choices and not oriented:
+            raise InputError(f"{choices[0]}: the {manifold} has no orientation to follow")
+        if len(choices) > 1:
+            raise InputError(f"{' and '.join(choices)}: one of them at most")
         if euler not in (None, *_ANGLES):
-            raise InputError(f"{said[0]}: unknown; allowed are {', '.join(_ANGLES)}")
+            raise InputError(f"{choices[0]}: unknown; allowed are {', '.join(_ANGLES)}")
         self.euler = euler
         self.alignment = None if tool_axis is None else rotation_to_axis(tool_axis)
         self.yaw_axis = None if yaw_axis is None else rotation_to_axis(yaw_axis)[:, 0]

@@ -41,7 +41,7 @@ class PathGeometry:
         quaternion: Quaternion (w, x, y, z) of the reference orientation, of any
             positive norm, and its derivatives by theta, orders 0..r, each (4, 1);
             empty for arms that have no orientation to follow.
-        tool: What of the tool's orientation matters.
+        tool: Controlled part of the tool's orientation.
         turn: Derivatives 1..r by theta of the angle about the tangent by which ``e_perp`` turns
             against parallel transport [rad], scalars; empty where it does not.
     """
@@ -78,10 +78,10 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     ``eta' = |sigma'| theta'`` (3.13). ``xi`` are the projections of
     ``y_t - sigma`` on the parallel transport frame, whose derivatives are
     ``xi_i' = e_i . y_t'`` (3.16), (3.17); ``e_perp' = -(e_par' . e_perp) e_par``
-    (3.4), primes being time derivatives. A given frame, which turns about the tangent by the angle
-    ``psi``, sees them turned by it. ``phi`` are the ZYX Euler angles of
-    ``R_d' R_e``, see (3.43)-(3.47), or what else :class:`ToolOrientation` has; that the reference
-    orientation moves with the progress on the path sits in their derivatives.
+    (3.4), primes being time derivatives. In a prescribed frame, which turns about the tangent by
+    the angle ``psi``, they are turned by it. ``phi`` are the ZYX Euler angles of
+    ``R_d' R_e``, see (3.43)-(3.47), or others of :class:`ToolOrientation`; their derivatives
+    include the motion of the reference orientation along the path.
 
     Args:
         y: Tool point ``y_t`` [m], vector jet of order r >= 1.
@@ -96,7 +96,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     speed = jets.sqrt(jets.dot(tangent, tangent))
     eta = (speed * theta.differentiate()).integrate(path.eta)
     e_par = tangent / speed
-    e_perp = transported(path.normal, e_par)
+    e_perp = transport(path.normal, e_par)
     offset = y.coefficients[0] - path.position[0]
     velocity = y.differentiate()
     xi = [
@@ -104,14 +104,14 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
         for e in (e_perp, jets.cross(e_par, e_perp))
     ]
     if path.turn:
-        xi = turned(xi, jets.compose([ca.SX(0), *path.turn], theta))
+        xi = rotate_components(xi, jets.compose([ca.SX(0), *path.turn], theta))
     if not path.quaternion:
         return [eta, *xi]
     R_d = quaternion_rotation(jets.compose(path.quaternion, theta))
     return [eta, *xi, *path.tool.error(R_e, R_d)]
 
 
-def transported(normal: ca.SX, e_par: Jet) -> Jet:
+def transport(normal: ca.SX, e_par: Jet) -> Jet:
     """Return the parallel transport (3.4) of a normal vector along the moving tangent."""
     if e_par.order == 0:
         return Jet([normal])
@@ -119,18 +119,18 @@ def transported(normal: ca.SX, e_par: Jet) -> Jet:
     return jets.solve_ode(lambda e: -(e_par * jets.dot(turning, e)), normal, e_par.order)
 
 
-def turned(xi: Sequence[Jet], psi: Jet) -> list[Jet]:
+def rotate_components(xi: Sequence[Jet], psi: Jet) -> list[Jet]:
     """Return the components of a vector in axes that are turned by the angle ``psi``."""
     sin, cos = jets.sin_cos(psi)
     return [cos * xi[0] + sin * xi[1], cos * xi[1] - sin * xi[0]]
 
 
 class PathManifold:
-    """A path as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
+    """Path as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
 
     Its coordinates are arc length, two transversal ones and, with orientation, the three ZYX
-    angles of the tool, the two of an axis of it, about which the tool may then turn as it likes, or
-    the one of its turn about an axis in space, such as an SCARA has.
+    angles of the tool, the two of an axis of it, about which the tool may then turn freely, or
+    the one of its turn about an axis in space, such as of an SCARA.
 
     Args:
         order: Relative degree r of the law, 1 to 5.
@@ -140,12 +140,12 @@ class PathManifold:
         yaw_axis: The axis about which alone the tool's turn follows the orientation, world axes,
             of any length, shape (3,); None if more does.
         euler: ``zyx`` or ``zyz`` for differences of Euler angles, see :class:`ToolOrientation`.
-        turning: Whether ``e_perp`` is given with the path, such as the normal of a surface that
-            the path lies on, rather than transported in parallel.
-        length: Length of an open path [m], at whose ends a tool stays; None of one that has none.
+        turning: Whether ``e_perp`` is prescribed with the path, such as the normal of a surface
+            that the path lies on, rather than transported in parallel.
+        length: Length of an open path [m], at whose ends a tool stops; None without ends.
 
     Attributes:
-        tool: What of the tool's orientation matters.
+        tool: Controlled part of the tool's orientation.
 
     Raises:
         InputError: If the order is out of range, or an axis has no direction, or no orientation
@@ -171,7 +171,7 @@ class PathManifold:
         )
         self.layout = PathPointLayout(order, oriented, turning)
         eta, *across = _TRANSLATIONAL
-        # those of a point that moves with time are errors, which have no ends
+        # coordinates of a point that moves with time are errors, which have no ends
         if length is not None and not self.follows_time:
             eta = replace(eta, ends=(0.0, length))
         self.coordinates = (eta, *across, *self.tool.coordinates)
@@ -186,7 +186,7 @@ class PathManifold:
         return quaternion_to_matrix(points[:, self.layout.quaternion][:, :4])
 
     def geometry(self, point: ca.SX) -> PathGeometry:
-        """Return the parts of a path point as the maps need them."""
+        """Return the parts of a path point for the maps."""
         layout = self.layout
         quaternion = ca.vertsplit(point[layout.quaternion], 4) if layout.oriented else []
         return PathGeometry(
@@ -208,13 +208,13 @@ class PathManifold:
         """Return (3.41) for the translational coordinates, (3.44) and (3.45) for the angles.
 
         Their power ``tau . yhat'`` is ``f . y_t' + mu . (omega - omega_d)``: the power of the
-        wrench, the rotation being that relative to the path's orientation. Where the frame turns
-        with eta, the tool is taken to be where the reference tells. With
+        wrench, with the rotation relative to the path's orientation. Where the frame turns
+        with eta, the tool is assumed at its reference. With
         ``with_turning`` :func:`turning_force` is added to the tangential one; the power is then
-        ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. Where
-        only an axis of the tool matters, all of this holds for torques across it, where only its
-        turn about an axis in space does, for torques about that one; what else acts moves none of
-        the coordinates and has no part in the forces.
+        ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. If
+        only an axis of the tool is controlled, this holds for torques across it; if only its turn
+        about an axis in space is, for torques about that axis. Other torques move no coordinate
+        and do not contribute to the forces.
         """
         force, torque, layout = wrench[:3], wrench[3:], self.layout
         translational = force_along_path(force, point, layout)
@@ -230,12 +230,12 @@ class PathManifold:
     def rotational_force(self, torque: ca.SX, point: ca.SX, phi: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the torque that acts on the angles, shape (3,), and the forces along them [Nm].
 
-        Of differences of Euler angles it is the torque in the turn of the reference.
+        With differences of Euler angles it is the torque in the turn of the reference.
 
         Args:
             torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
             point: Path point.
-            phi: Angles that the tool is to have [rad], shape (3,), (2,) or (1,).
+            phi: Desired angles of the tool [rad], shape (3,), (2,) or (1,).
         """
         if self.tool.yaw_axis is not None:
             return self.tool.yaw_torque(torque)

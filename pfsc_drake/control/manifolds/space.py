@@ -1,4 +1,4 @@
-"""All of space as a manifold: a tool that is led freely, with an orientation to keep."""
+"""All of space as a manifold: a freely guided tool with a constant reference orientation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,14 +28,14 @@ _TRANSLATIONAL = tuple(
 
 @dataclass(frozen=True)
 class SpacePointLayout:
-    """Where the quantities of a point in space lie in a flat array of floats.
+    """Layout of a point in space in a flat array of floats.
 
     | field        | length | meaning                                                   |
     |--------------|--------|-----------------------------------------------------------|
     | `position`   | 3      | tool point, its coordinates and parameters in one, m       |
-    | `alpha`      | 1      | 0: no place is outside the feasible neighbourhood         |
+    | `alpha`      | 1      | 0: no point is outside the feasible neighbourhood         |
     | `status`     | 1      | a `ProjectionStatus`                                      |
-    | `quaternion` | 4      | of the orientation to keep, w first; empty if there is none |
+    | `quaternion` | 4      | reference orientation, w first; empty if there is none    |
 
     Args:
         order: Relative degree r of the law that reads it.
@@ -76,21 +76,21 @@ class SpacePointLayout:
 class SpaceManifold:
     """All of space as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
 
-    Its coordinates are those of the tool point along the world's axes, all of them tangential, and,
+    Its coordinates are the tool point's along the world's axes, all of them tangential, and,
     with orientation, the ZYX angles of ``R_d' R_e`` against one ``R_d``, the two of an axis of
     the tool, or the one of its turn about an axis in space.
 
     Args:
         order: Relative degree r of the law.
         quaternion: Quaternion of ``R_d`` (w, x, y, z), shape (4,); None for no orientation.
-        tool_axis: The axis that alone keeps the orientation, in the tool frame, of any length,
+        tool_axis: The axis that alone follows the orientation, in the tool frame, of any length,
             shape (3,); None if the whole tool does.
-        yaw_axis: The axis about which alone the tool's turn keeps the orientation, world axes,
+        yaw_axis: The axis about which alone the tool's turn follows the orientation, world axes,
             of any length, shape (3,); None if more does.
         euler: ``zyx`` or ``zyz`` for differences of Euler angles, see :class:`ToolOrientation`.
 
     Attributes:
-        tool: What of the tool's orientation matters.
+        tool: Controlled part of the tool's orientation.
 
     Raises:
         InputError: If an axis has no direction, or no orientation to follow.
@@ -124,19 +124,19 @@ class SpaceManifold:
 
     @property
     def is_oriented(self) -> bool:
-        """Whether there is an orientation to keep."""
+        """Whether there is a reference orientation."""
         return self.layout.oriented
 
     @cached_property
     def evaluate(self) -> ca.Function:
-        """``(y_t, memory) -> manifold_point``, see :class:`PlaceEvaluator`."""
+        """``(y_t, memory) -> manifold_point``, see :class:`ProjectionEvaluator`."""
         y, memory = ca.SX.sym("y_t", 3), ca.SX.sym("memory", 3)
         point = ca.vertcat(y, *self._point[3:].tolist())
         return ca.Function("space_point", [y, memory], [point])
 
     @cached_property
     def find(self) -> ca.Function:
-        """``y_t -> memory``, see :class:`PlaceEvaluator`."""
+        """``y_t -> memory``, see :class:`ProjectionEvaluator`."""
         y = ca.SX.sym("y_t", 3)
         return ca.Function("space_place", [y], [y])
 
@@ -147,7 +147,7 @@ class SpaceManifold:
         return point
 
     def orientation(self, points: np.ndarray) -> np.ndarray:
-        """Return the orientation to keep, shape (samples, 3, 3)."""
+        """Return the reference orientation, shape (samples, 3, 3)."""
         return quaternion_to_matrix(points[:, self.layout.quaternion])
 
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:

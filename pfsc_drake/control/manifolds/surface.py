@@ -45,7 +45,7 @@ class SurfaceGeometry:
             norm, up to order r, each (4, 1); empty if it has none.
         offset: Rotation of the tool against the surface's frame, shape (3, 3); None if the
             frame's own axes are not the reference orientation.
-        tool: What of the tool's orientation matters.
+        tool: Controlled part of the tool's orientation.
     """
 
     eta: ca.SX
@@ -134,8 +134,8 @@ def surface_coordinates(y: Jet, R_e: Jet, surface: SurfaceGeometry) -> list[Jet]
 
     ``eta' = Sigma theta'`` (4.15): the components of the projected point's velocity along ``t_1``
     and ``e_perp x t_1``. ``xi' = e_perp . y_t'`` (4.18). ``phi`` are the ZYX Euler angles of
-    ``R_d' R_e``, as for paths; that the reference orientation moves with the point on the surface
-    sits in their derivatives.
+    ``R_d' R_e``, as for paths; their derivatives include the motion of the reference orientation
+    along the surface.
 
     Args:
         y: Tool point ``y_t`` [m], vector jet of order r >= 1.
@@ -164,16 +164,16 @@ def surface_coordinates(y: Jet, R_e: Jet, surface: SurfaceGeometry) -> list[Jet]
 
 
 class SurfaceManifold:
-    """A surface as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
+    """Surface as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
 
-    Its coordinates are two tangential ones, lengths in orthogonal directions of which the first is
-    that of theta_1, the distance along the normal, and, with orientation, the three ZYX angles of
-    the tool, the two of an axis of it, about which the tool may then turn as it likes, or the one
+    Its coordinates are two tangential ones, lengths along theta_1 and orthogonal to it, the
+    distance along the normal, and, with orientation, the three ZYX angles of
+    the tool, the two of an axis of it, about which the tool may then turn freely, or the one
     of its turn about an axis in space.
 
     Args:
         order: Relative degree r of the law, 1 to 5.
-        orientation: ``"given"`` by the point's quaternion; ``"normal"``: that of the surface's
+        orientation: ``"given"`` by the point's quaternion; ``"normal"``: the surface's
             frame ``[t_1, e_perp x t_1, e_perp]``; None for none.
         offset: Rotation from the surface's frame to the tool's reference orientation ``R_d``, such
             as lead and tilt, shape (3, 3); the identity by default. Only for ``"normal"``.
@@ -184,7 +184,7 @@ class SurfaceManifold:
         euler: ``zyx`` or ``zyz`` for differences of Euler angles, see :class:`ToolOrientation`.
 
     Attributes:
-        tool: What of the tool's orientation matters.
+        tool: Controlled part of the tool's orientation.
         offset: The rotation, or None if the orientation is not the frame's.
 
     Raises:
@@ -230,13 +230,13 @@ class SurfaceManifold:
         return self.offset is not None or self.layout.oriented
 
     def orientation(self, points: np.ndarray) -> np.ndarray:
-        """Return the reference orientation of places, shape (samples, 3, 3)."""
+        """Return the reference orientation at points, shape (samples, 3, 3)."""
         if self.offset is None:
             return quaternion_to_matrix(points[:, self.layout.quaternion][:, :4])
         return np.array([self.axes(point).full() for point in points]) @ self.offset
 
     def geometry(self, point: ca.SX) -> SurfaceGeometry:
-        """Return the parts of a surface point as the maps need them."""
+        """Return the parts of a surface point for the maps."""
         layout = self.layout
         return SurfaceGeometry(
             eta=point[layout.eta],
@@ -255,12 +255,12 @@ class SurfaceManifold:
     ) -> ca.SX:
         """Return (4.32) for the translational coordinates, (3.44) and (3.45) for the angles.
 
-        Their power ``tau . yhat'`` is that of the wrench, the rotation being that relative to the
-        surface's orientation; with ``with_turning`` it is all of the wrench's power, and
-        ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. Where only an axis of the tool matters,
-        this holds for torques across it, where only its turn about an axis in space does, for
-        torques about that one. The tool is taken to be at the reference's distance xi
-        from the surface.
+        Their power ``tau . yhat'`` is the wrench's, with the rotation relative to the surface's
+        orientation; with ``with_turning`` it is all of the wrench's power, and
+        ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. If only an axis of the tool is
+        controlled, this holds for torques across it; if only its turn about an axis in space is,
+        for torques about that axis. The tool is assumed at the reference's distance xi from the
+        surface.
         """
         force, torque = wrench[:3], wrench[3:]
         plane = tangent_plane(point, self.layout)

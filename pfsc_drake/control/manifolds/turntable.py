@@ -1,4 +1,4 @@
-"""A workpiece on a turntable: axes one on the other, and a frame that is measured some time ago."""
+"""Workpiece on a turntable: stacked axes, and compensation of a frame's measurement delay."""
 
 import math
 from collections.abc import Sequence
@@ -17,33 +17,33 @@ from pfsc_drake.jets import Jet
 
 @dataclass(frozen=True)
 class TurntableAxes:
-    """Revolute axes one on the other, and what the last one carries.
+    """Stacked revolute axes, and the workpiece on the last one.
 
-    At angles zero all axes of coordinates are parallel to those of the base.
+    At angles zero the axes of all frames are parallel to the base's.
 
     Attributes:
-        base: Where the table stands ``[p_WB, R_WB by rows]`` [m, 1], shape (12,).
-        directions: Of the N axes in the base's axes at zero, unit vectors, shape (N, 3).
+        base: Pose of the table ``[p_WB, R_WB by rows]`` [m, 1], shape (12,).
+        directions: Directions of the N axes in the base's axes at zero, unit vectors, shape (N, 3).
         points: A point of each, from the base at zero [m], shape (N, 3).
-        carried: The workpiece's frame from the base at zero, ``[p_BC, R_BC by rows]``, shape (12,).
+        workpiece: Its frame from the base at zero, ``[p_BC, R_BC by rows]``, shape (12,).
     """
 
     base: np.ndarray
     directions: np.ndarray
     points: np.ndarray
-    carried: np.ndarray
+    workpiece: np.ndarray
 
     def frame(self, angles: Sequence[Jet]) -> tuple[Jet, Jet]:
         """Return ``p_WC`` and ``R_WC`` as jets of the order of the angles'.
 
-        Each axis turns what it carries about its point a: ``x -> a + R(q) (x - a)``, with
+        Each axis turns its load about its point a: ``x -> a + R(q) (x - a)``, with
         ``R(q) = 1 + sin q K + (1 - cos q) K^2`` and K the cross product by its direction.
 
         Args:
-            angles: Of the axes, the first one at the base [rad].
+            angles: Angles of the axes, the first one at the base [rad].
         """
         order = angles[0].order
-        p, R = _constants(self.carried, order)
+        p, R = _constants(self.workpiece, order)
         both = zip(angles, self.directions, self.points, strict=True)
         for angle, direction, point in reversed(list(both)):
             turn, a = _turn(angle, direction), ca.DM(point)
@@ -86,7 +86,7 @@ def turntable_motion_function(axes: TurntableAxes, order: int) -> ca.Function:
 
 
 class TurntableFrame(Block):
-    """The motion of what a turntable carries: angles as measured, derivatives as commanded.
+    """Motion of a turntable's workpiece: angles as measured, derivatives as commanded.
 
     Ports:
         measured (input): Angles of the axes [rad], shape (N,).
@@ -94,18 +94,18 @@ class TurntableFrame(Block):
         frame_jet (output): Derivatives 0..k of ``[p_WC, R_WC by rows]``, see :func:`frame_jets`.
 
     Args:
-        axes: The table, as it is believed to stand.
+        axes: The controller's model of the table.
         order: Highest derivative k, of which those above ``highest`` are taken to be zero.
-        highest: Highest derivative that is told.
+        highest: Highest derivative that is evaluated.
     """
 
     def __init__(self, axes: TurntableAxes, order: int, highest: int) -> None:
-        self._n, self._told = len(axes.directions), min(highest, order)
-        self._motion = turntable_motion_function(axes, self._told)
-        self._rest = POSE_SIZE * (order - self._told)
+        self._n, self._highest = len(axes.directions), min(highest, order)
+        self._motion = turntable_motion_function(axes, self._highest)
+        self._rest = POSE_SIZE * (order - self._highest)
         self.inputs = {
             "measured": Port(self._n, "rad"),
-            "planned": Port(self._n * (order + 1), "rad, rad/s, ..", optional=self._told == 0),
+            "planned": Port(self._n * (order + 1), "rad, rad/s, ..", optional=self._highest == 0),
         }
         self.outputs = {"frame_jet": Port(frame_size(order), "m, 1, per s, ..")}
         self.states = {}
@@ -113,27 +113,27 @@ class TurntableFrame(Block):
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         angles = u.measured
-        if self._told:
-            angles = ca.vertcat(angles, u.planned[self._n : self._n * (self._told + 1)])
+        if self._highest:
+            angles = ca.vertcat(angles, u.planned[self._n : self._n * (self._highest + 1)])
         return {"frame_jet": ca.vertcat(self._motion(angles), ca.DM.zeros(self._rest))}
 
 
 class AdvancedFrame(Block):
-    """A frame where it is now, from where it was when it was measured.
+    """Present motion of a frame, extrapolated from a delayed measurement.
 
-    A message that took the time d has derivatives of d ago. Taylor's formula leads them on::
+    A message delayed by d has derivatives of d ago. Taylor's formula extrapolates them::
 
         f^(k)(t) = sum_j f^(k + j)(t - d) d^j / j!,   k + j <= r
 
     The pose is off by the derivative of order r + 1 times ``d^(r+1) / (r+1)!`` then.
 
     Ports:
-        frame_jet (input): Derivatives 0..r as they were, see :func:`frame_jets`.
-        advanced (output): The same as they are.
+        frame_jet (input): Delayed derivatives 0..r, see :func:`frame_jets`.
+        advanced (output): Present derivatives.
 
     Args:
         order: Highest derivative r.
-        delay: Time d that the message took [s].
+        delay: Delay d of the message [s].
     """
 
     def __init__(self, order: int, delay: float) -> None:
@@ -145,8 +145,8 @@ class AdvancedFrame(Block):
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
         rows, d = ca.vertsplit(u.frame_jet, POSE_SIZE), self._delay
-        led = [
+        advanced = [
             sum(row * (d**j / math.factorial(j)) for j, row in enumerate(rows[k:]))
             for k in range(self._order + 1)
         ]
-        return {"advanced": ca.vertcat(*led)}
+        return {"advanced": ca.vertcat(*advanced)}

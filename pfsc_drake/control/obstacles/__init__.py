@@ -1,1 +1,1 @@
-"""Obstacles that move: progress along a path waits for them, and elbows give way."""
+"""Moving obstacles: progress along a path waits for them, and the null space avoids them."""

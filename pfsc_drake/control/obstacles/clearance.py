@@ -1,4 +1,4 @@
-"""How far an arm is from obstacles, when they can be near, and where they are expected."""
+"""Distances of an arm from measured, reachable and predicted positions of obstacles."""
 
 import itertools
 from collections.abc import Sequence
@@ -16,15 +16,15 @@ from pfsc_drake.geometry.segments import between_nearest, from_nearest, to_segme
 
 @dataclass(frozen=True)
 class Foresight:
-    """How far obstacles are foreseen.
+    """Prediction of obstacles at constant velocity.
 
-    An obstacle measured at p with velocity v some time ago is expected at ``p + v (age + t)``,
+    An obstacle with the measured position p and velocity v is predicted at ``p + v (age + t)``,
     within a radius that grows by ``spread t``.
 
     Attributes:
-        age: Of what is measured [s].
-        horizon: Until when [s].
-        spread: By how much it may be beside, for each second ahead [m/s].
+        age: Age of the measurement [s].
+        horizon: Prediction horizon [s].
+        spread: Growth rate of the uncertainty radius [m/s].
     """
 
     age: float
@@ -38,15 +38,15 @@ def nearness_function(
 ) -> ca.Function:
     """Return ``(points, obstacles) -> (near, until)`` of an arm in one posture.
 
-    ``near`` is its distance from the obstacles where they are measured, between surfaces [m],
-    ``until`` the time until one of them may be nearer than ``spent`` whatever it does [s].
+    ``near`` is its distance from the measured obstacles, between surfaces [m], ``until`` the
+    earliest time at which one of them can be nearer than ``spent`` [s].
 
     Args:
         shapes: K obstacles.
-        reach: How they can move.
-        spent: Distance that is spent for the margin and for what is not known [m].
-        points: P, of the arm's outline.
-        radius: Of its capsules [m].
+        reach: Bounds of their motion.
+        spent: Distance for the margin and uncertainties [m].
+        points: Number P of points of the arm's outline.
+        radius: Radius of the arm's capsules [m].
     """
     arm, obstacles = ca.SX.sym("points", 3 * points), ca.SX.sym("obstacles", 6 * len(shapes))
     links = list(itertools.pairwise(ca.vertsplit(arm, 3)))
@@ -71,15 +71,15 @@ def foresight_function(
 ) -> ca.Function:
     """Return ``(points, obstacles, arrival) -> ahead`` of an arm in one posture.
 
-    ``ahead`` is the least distance from where obstacles are expected from the arm's arrival on [s]
-    until the horizon, between surfaces [m]. How much an obstacle has spread is told by where on
-    its way it is nearest.
+    ``ahead`` is the least distance from the predicted obstacles between the arm's arrival [s] and
+    the horizon, between surfaces [m]. The spread is that at the nearest point of the predicted
+    motion.
 
     Args:
         shapes: K obstacles.
-        foresight: How far they are foreseen.
-        points: P, of the arm's outline.
-        radius: Of its capsules [m].
+        foresight: Prediction of the obstacles.
+        points: Number P of points of the arm's outline.
+        radius: Radius of the arm's capsules [m].
     """
     arm, obstacles = ca.SX.sym("points", 3 * points), ca.SX.sym("obstacles", 6 * len(shapes))
     arrival = ca.SX.sym("arrival")
@@ -88,13 +88,13 @@ def foresight_function(
     links, ahead = list(itertools.pairwise(ca.vertsplit(arm, 3))), ca.inf
     for shape, obstacle in zip(shapes, ca.vertsplit(obstacles, 6), strict=True):
         axes, v = shape.axes, shape.axes * obstacle[3:]
-        p, way = axes * obstacle[:3] + v * (foresight.age + begin), v * lasts
+        p, travel = axes * obstacle[:3] + v * (foresight.age + begin), v * lasts
         for part, (a, b) in itertools.product(shape.parts, links):
             c = p + axes * ca.DM(part.start)
             if part.is_sphere:
-                distance, share = to_segment(axes * a, axes * b, c, c + way)
+                distance, share = to_segment(axes * a, axes * b, c, c + travel)
             else:
-                distance, share = to_swept(a, b, c, p + ca.DM(part.end), way)
+                distance, share = to_swept(a, b, c, p + ca.DM(part.end), travel)
             spread = foresight.spread * (begin + share * lasts)
             ahead = ca.fmin(ahead, distance - (part.radius + radius) - spread)
     names = ["points", "obstacles", "arrival"]
@@ -106,8 +106,8 @@ def away_from(a: Any, b: Any, p: Any, part: Capsule) -> Any:
 
     Args:
         a: One end of the segment, shape (3,).
-        b: The other one, shape (3,).
-        p: Where the obstacle is that the capsule is a part of, shape (3,).
+        b: The other end, shape (3,).
+        p: Position of the obstacle that the capsule is a part of, shape (3,).
         part: The capsule.
     """
     if part.is_sphere:
@@ -121,23 +121,23 @@ def least_distances(
 ) -> np.ndarray:
     """Return the distance of a moving arm from each obstacle, between surfaces [m].
 
-    Two lines are nearest at an end of one of them, or where they are nearest without ends.
+    Two segments are nearest at an end of one of them, or at the closest points of their lines.
 
     Args:
-        arm: Points of its outline, shape (samples, 3P) [m].
-        positions: Of K obstacles, shape (samples, 3K) [m].
+        arm: Points of the arm's outline, shape (samples, 3P) [m].
+        positions: Positions of K obstacles, shape (samples, 3K) [m].
         shapes: The obstacles.
-        radius: Of the arm's capsules [m].
+        radius: Radius of the arm's capsules [m].
 
     Returns:
         Shape (samples, K).
     """
     found = []
-    places = np.split(arm, arm.shape[1] // 3, axis=1)
+    corners = np.split(arm, arm.shape[1] // 3, axis=1)
     for k, shape in enumerate(shapes):
         axes = shape.axes.full().ravel()
         p, least = axes * positions[:, 3 * k : 3 * k + 3], np.full(len(arm), np.inf)
-        for part, (a, b) in itertools.product(shape.parts, itertools.pairwise(places)):
+        for part, (a, b) in itertools.product(shape.parts, itertools.pairwise(corners)):
             c, d = p + np.array(part.start), p + np.array(part.end)
             distance = _between_lines(axes * a, axes * b, c, d)
             least = np.minimum(least, distance - part.radius - radius)
@@ -146,7 +146,7 @@ def least_distances(
 
 
 def _between_lines(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Return the distances of lines from a to b from those from c to d, each (samples, 3)."""
+    """Return the distances of segments a to b from segments c to d, each (samples, 3)."""
     least = np.minimum(_from_line(a, b, c), _from_line(a, b, d))
     least = np.minimum(least, np.minimum(_from_line(c, d, a), _from_line(c, d, b)))
     normal = np.cross(b - a, d - c)

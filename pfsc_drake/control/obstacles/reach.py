@@ -1,4 +1,4 @@
-"""When an obstacle can be somewhere at the earliest, whatever it does."""
+"""Earliest time at which an obstacle with bounded speed and acceleration can be near."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,21 +10,21 @@ from pfsc_drake.blocks.cases import where
 
 @dataclass(frozen=True)
 class Reach:
-    """How an obstacle can move at most.
+    """Bounds of an obstacle's motion.
 
-    The distance d of two convex bodies is a convex function of where they are. With n the unit
-    vector from the one to the other as measured, it is at any later time at least
+    The distance d of two convex bodies is a convex function of their positions. With n the measured
+    unit vector from one to the other, the distance after t is at least
 
         d + int_0^t max(n v - A t', -V) dt'
 
-    since n v is the velocity along n now, which falls by A at most and not below -V. The time
-    until a gap is used up follows in closed form.
+    since the velocity n v along n decreases by A at most, and not below -V. The time until a gap
+    is closed follows in closed form.
 
     Attributes:
         largest_speed: V [m/s].
-        largest_acceleration: A [m/s^2]; None if it is not known, then a measured velocity says
-            nothing: ``gap / V``.
-        velocity_uncertainty: By how much a measured velocity may be wrong [m/s].
+        largest_acceleration: A [m/s^2]; None if unknown, then the measured velocity is ignored:
+            ``gap / V``.
+        velocity_uncertainty: Largest error of a measured velocity [m/s].
     """
 
     largest_speed: float
@@ -32,11 +32,11 @@ class Reach:
     velocity_uncertainty: float
 
     def time(self, gap: Any, receding: Any) -> Any:
-        """Return the time until a gap may be used up [s]; negative where there is none.
+        """Return the time until a gap may be closed [s]; negative for a negative gap.
 
         Args:
-            gap: [m].
-            receding: Velocity along n as measured [m/s].
+            gap: Distance [m].
+            receding: Measured velocity along n [m/s].
         """
         V, A = self.largest_speed, self.largest_acceleration
         if A is None:

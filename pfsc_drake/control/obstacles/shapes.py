@@ -1,4 +1,4 @@
-"""What obstacles look like: spheres, columns, persons, and anything made of capsules."""
+"""Shapes of obstacles: spheres, columns, persons, and unions of capsules."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -10,18 +10,18 @@ from pfsc_drake.yaml.rules import Numbers, OneOf, Parameters, Positive, Range
 
 KINDS = ("sphere", "column", "person", "capsules")
 
-# m: radius of a person's head, and what is too far away
+# m: radius of a person's head, and largest coordinate
 _HEAD, _FARTHEST = 0.15, 100.0
 
 
 @dc.dataclass(frozen=True)
 class Capsule(Parameters):
-    """All that is nearer to a line than a radius; a sphere where the line is a point.
+    """Points within a radius of a line segment; a sphere if the segment is a point.
 
     Attributes:
-        start: One end of the line, from the obstacle's position on, axes of the world [m].
-        end: The other one [m].
-        radius: [m].
+        start: One end of the segment relative to the obstacle's position, world axes [m].
+        end: The other end [m].
+        radius: Radius [m].
     """
 
     start: Annotated[tuple[float, float, float], Numbers(3, Range(-_FARTHEST, _FARTHEST, "m"))]
@@ -30,33 +30,33 @@ class Capsule(Parameters):
 
     @property
     def is_sphere(self) -> bool:
-        """Whether its line is a point."""
+        """Whether the segment is a point."""
         return self.start == self.end
 
 
 @dc.dataclass(frozen=True)
 class ObstacleShape(Parameters):
-    """What moves, without turning.
+    """Shape of an obstacle that moves without turning.
 
     Attributes:
-        kind: ``sphere``; ``column`` along z that has no end; ``person`` who stands on
-            the obstacle's position, trunk and head; ``capsules`` as they are given.
-        radius: Of sphere, column, and a person's trunk with its arms [m].
-        height: Of a person [m].
-        given: Of ``capsules``: which.
+        kind: ``sphere``; ``column``, infinite along z; ``person``, trunk and head, standing at the
+            obstacle's position; ``capsules``, a union of capsules.
+        radius: Radius of a sphere, a column, or a person's trunk with arms [m].
+        height: Height of a person [m].
+        capsules: Parts, if the kind is ``capsules``.
     """
 
     kind: Annotated[str, OneOf(KINDS)]
     radius: Positive
     height: float = 1.75
-    given: tuple[Capsule, ...] = ()
+    capsules: tuple[Capsule, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.kind == "capsules":
-            require(bool(self.given), "parts", "none", "one or more where kind is capsules")
+            require(bool(self.capsules), "parts", "none", "one or more where kind is capsules")
             return
-        require(not self.given, "parts", "given", "none unless kind is capsules")
+        require(not self.capsules, "parts", "given", "none unless kind is capsules")
         if self.kind == "person":
             least = 2.0 * (self.radius + _HEAD)
             tall = least <= self.height <= _FARTHEST
@@ -64,10 +64,10 @@ class ObstacleShape(Parameters):
 
     @property
     def parts(self) -> tuple[Capsule, ...]:
-        """The capsules that it is made of; of a column one whose height is left out of account."""
+        """Capsules of the shape; for a column one capsule whose height is ignored."""
         r, origin = self.radius, (0.0, 0.0, 0.0)
         if self.kind == "capsules":
-            return self.given
+            return self.capsules
         if self.kind == "person":
             top = (0.0, 0.0, self.height - _HEAD)
             trunk = Capsule((0.0, 0.0, r), (0.0, 0.0, self.height - 2.0 * _HEAD - r), r)
@@ -76,5 +76,5 @@ class ObstacleShape(Parameters):
 
     @property
     def axes(self) -> ca.DM:
-        """Which axes of the world count for distances, shape (3,)."""
+        """World axes that count for distances, 1 or 0 each, shape (3,)."""
         return ca.DM([1.0, 1.0, 0.0 if self.kind == "column" else 1.0])

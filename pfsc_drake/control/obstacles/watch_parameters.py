@@ -1,4 +1,4 @@
-"""What a controller is told of obstacles, and how it keeps away from them."""
+"""Parameters of obstacle monitoring: uncertainties, margins, waiting and retreat."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -8,28 +8,26 @@ from pfsc_drake.yaml.rules import NotNegative, Parameters, Positive, Range
 
 @dc.dataclass
 class WatchParameters(Parameters):
-    """How progress on a path waits for obstacles.
+    """Parameters of a motion that waits for obstacles.
 
     Attributes:
         margin: Least distance between arm and obstacles while the arm moves [m].
         largest_speed: Largest speed of an obstacle, 1.6 m/s for a person who walks (ISO 13855)
             [m/s].
-        largest_acceleration: Largest acceleration of an obstacle [m/s^2]; null if it is not known,
-            then it may turn round at once.
-        uncertainty: By how much a measured position may be wrong [m].
-        velocity_uncertainty: By how much a measured velocity may be wrong [m/s].
-        latency: How old a measured position is at most when it is used [s].
-        spread: By how much an obstacle may be beside where it is expected, for each second ahead
-            [m/s].
-        retreat: Pace, as a share of the planned one, at which it goes back from where somebody is
-            expected, up to 1; 0 for never.
-        side: Side room: distance beside the margin that a place needs to wait there [m].
-        horizon: How far obstacles are foreseen [s].
-        smoothing: Time constant by which measured velocities are smoothed [s].
+        largest_acceleration: Largest acceleration of an obstacle [m/s^2]; null if unknown, then an
+            obstacle may reverse immediately.
+        uncertainty: Largest error of a measured position [m].
+        velocity_uncertainty: Largest error of a measured velocity [m/s].
+        latency: Largest age of a measured position when it is used [s].
+        spread: Growth rate of the uncertainty radius of a predicted position [m/s].
+        retreat: Speed scaling at which the tool retreats from predicted obstacles, up to 1; 0 for
+            never.
+        side: Distance in addition to the margin that a waiting point needs [m].
+        horizon: Prediction horizon [s].
+        smoothing: Time constant of the filter on measured velocities [s].
         resting_speed: Speed of the tool that counts as rest [m/s].
-        arm_radius: Radius of the capsules along the links within which the arm is [m].
-        reserve: Share of the drives' torques that waiting and setting off again leave, from 0 to
-            below 1.
+        arm_radius: Radius of the capsules along the links that enclose the arm [m].
+        reserve: Share of the drives' torques that stops and restarts do not use, from 0 to below 1.
     """
 
     margin: NotNegative = 0.15
@@ -39,7 +37,7 @@ class WatchParameters(Parameters):
     velocity_uncertainty: NotNegative = 0.3
     latency: Annotated[float, Range(0.0, 10.0, "s")] = 0.1
     spread: NotNegative = 0.05
-    retreat: Annotated[float, Range(0.0, 1.0, "of the planned pace")] = 0.0
+    retreat: Annotated[float, Range(0.0, 1.0, "of the planned speed")] = 0.0
     side: NotNegative = 0.05
     horizon: Annotated[float, Range(0.1, 60.0, "s")] = 2.5
     smoothing: Annotated[float, Range(0.001, 10.0, "s")] = 0.1

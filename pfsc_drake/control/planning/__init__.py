@@ -1,1 +1,1 @@
-"""What a motion will ask of the drives, and how slowly it must go so that they can."""
+"""Drive demand of a planned motion, and the speed scaling that keeps it within limits."""

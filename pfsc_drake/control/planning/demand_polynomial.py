@@ -1,14 +1,14 @@
-"""What a motion asks of the drives, as a polynomial of its pace and the pace's derivatives."""
+"""Drive demand of a motion as a polynomial of its speed scaling and the scaling's derivatives."""
 
 from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
 
-from pfsc_drake.control.planning.drive_demand import DriveDemand, with_pace
+from pfsc_drake.control.planning.drive_demand import DriveDemand, apply_scaling
 
 # exponents of (c, c', c'', c''') in every monomial of weight up to 4: the k-th derivative of the
-# joint coordinates has the weight k, and so has each of its terms in (planning-pace)
+# joint coordinates has the weight k, and so has each of its terms in (planning-scaling)
 _EXPONENTS = (
     (0, 0, 0, 0),
     (1, 0, 0, 0),
@@ -23,7 +23,7 @@ _EXPONENTS = (
     (1, 0, 1, 0),
     (0, 0, 0, 1),
 )
-# how many places are tried to find monomials from values, and which are the best conditioned
+# number of random sample sets; the best conditioned one determines the coefficients
 _TRIALS = 100
 
 
@@ -42,47 +42,47 @@ def _weight(powers: tuple[int, ...]) -> int:
 
 @dataclass(frozen=True)
 class DemandPolynomial:
-    """Torques of the drives along a course, ``tau = sum_m a_m c^i c'^j c''^k c'''^l``.
+    """Drive torques along a trajectory, ``tau = sum_m a_m c^i c'^j c''^k c'''^l``.
 
-    At a posture the inverse dynamics is a polynomial of the joints' derivatives, and these are
-    polynomials of the pace ``c`` and its time derivatives. With elastic joints there are twelve
-    monomials, from the weight to ``c^4`` and ``c'''``, with rigid ones four. The coefficients are
-    found once, from as many values, and are exact but for rounding.
+    At a given posture the inverse dynamics is a polynomial of the joint derivatives, and these are
+    polynomials of the speed scaling ``c`` and its time derivatives. Elastic joints have twelve
+    monomials, from gravity to ``c^4`` and ``c'''``, rigid joints four. The coefficients are
+    computed once from as many values, and are exact up to rounding.
 
     Attributes:
-        exponents: Of the M monomials.
-        coefficients: a_m, shape (samples, M, N).
+        exponents: Exponents of the M monomials.
+        coefficients: Coefficients a_m, shape (samples, M, N).
     """
 
     exponents: list[tuple[int, ...]]
     coefficients: np.ndarray
 
     @classmethod
-    def of(cls, demand: DriveDemand, course: np.ndarray, scale: float) -> "DemandPolynomial":
-        """Return the polynomials of a course.
+    def of(cls, demand: DriveDemand, trajectory: np.ndarray, scale: float) -> "DemandPolynomial":
+        """Return the polynomials of a trajectory.
 
         Args:
-            demand: Tells what a motion asks for.
-            course: Joint coordinates and derivatives at the pace 1, shape (samples, K + 1, N).
-            scale: Time in which the pace may change [s]; for the sake of rounding only.
+            demand: Drive demand of a motion.
+            trajectory: Joint coordinates and derivatives at scaling 1, shape (samples, K + 1, N).
+            scale: Time in which the scaling may change [s]; affects rounding only.
         """
         powers = exponents(demand.derivatives)
-        paces = _well_conditioned(powers) * scale ** -np.arange(4.0)
-        values = np.array([_torques(demand, course, pace) for pace in paces])
+        scalings = _well_conditioned(powers) * scale ** -np.arange(4.0)
+        values = np.array([_torques(demand, trajectory, scaling) for scaling in scalings])
         # each in units of its own size
         size = np.array([scale ** -sum(k * p for k, p in enumerate(power)) for power in powers])
-        table = _monomials(powers, paces) / size
+        table = _monomials(powers, scalings) / size
         found = np.linalg.solve(table, values.reshape(len(powers), -1)).reshape(values.shape)
         return cls(powers, (found / size[:, None, None]).transpose(1, 0, 2))
 
     def plus(self, torques: np.ndarray) -> "DemandPolynomial":
-        """Return the polynomials with torques more, whatever the pace, shape (samples, N)."""
+        """Return the polynomials plus torques that do not depend on the scaling, (samples, N)."""
         coefficients = self.coefficients.copy()
         coefficients[:, 0] += torques
         return replace(self, coefficients=coefficients)
 
     def torques(self, rates: np.ndarray) -> np.ndarray:
-        """Return the torques at a pace, shape (samples, N).
+        """Return the torques at a speed scaling, shape (samples, N).
 
         Args:
             rates: ``c, c', c'', c'''``, shape (samples, 4).
@@ -90,8 +90,8 @@ class DemandPolynomial:
         return np.einsum("smn,sm->sn", self.coefficients, _monomials(self.exponents, rates))
 
 
-def _torques(demand: DriveDemand, course: np.ndarray, pace: np.ndarray) -> np.ndarray:
-    both = demand.of(with_pace(course, np.tile(pace, (len(course), 1))))
+def _torques(demand: DriveDemand, trajectory: np.ndarray, scaling: np.ndarray) -> np.ndarray:
+    both = demand.of(apply_scaling(trajectory, np.tile(scaling, (len(trajectory), 1))))
     return both[:, : both.shape[1] // 2]
 
 
@@ -101,7 +101,7 @@ def _monomials(powers: list[tuple[int, ...]], rates: np.ndarray) -> np.ndarray:
 
 
 def _well_conditioned(powers: list[tuple[int, ...]]) -> np.ndarray:
-    """Return as many paces as monomials from which these are told apart best, (M, 4)."""
+    """Return the M scalings that determine the coefficients best, shape (M, 4)."""
     rng = np.random.default_rng(0)
     trials = rng.uniform(-1.0, 1.0, (_TRIALS, len(powers), 4))
     condition = [np.linalg.cond(_monomials(powers, trial)) for trial in trials]

@@ -1,4 +1,4 @@
-"""What a motion of the joints asks of the drives, and the pace at which they can follow it."""
+"""Drive demand of a joint trajectory, and the speed scaling at which the drives can follow it."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ _DEGREE = 4
 
 @dataclass(frozen=True)
 class DriveLimits:
-    """What drives can do.
+    """Limits of the drives.
 
     Attributes:
         effort: Largest torques [Nm or N], shape (N,).
@@ -38,31 +38,31 @@ class DriveLimits:
 
     @property
     def together(self) -> np.ndarray:
-        """Both, shape (2N,)."""
+        """Both limits, shape (2N,)."""
         return np.concatenate([self.effort, self.speed])
 
 
 class DriveDemand:
-    """Torques and speeds that a motion of the joints asks for.
+    """Drive torques and joint speeds that a joint trajectory needs.
 
-    With ``tau_J`` the link side's inverse dynamics, ``D_M`` the rotors and ``d_v`` the viscous
-    damping of the drives::
+    With ``tau_J`` the inverse dynamics of the links, ``D_M`` the rotor inertias and ``d_v`` the
+    viscous damping of the drives::
 
         rigid, velocity_servo:   tau_d = tau_J + D_M q'' + d_v q'
-        singular_perturbation:   the same, and -epsilon D_b tau_J' of the joints that are elastic
+        singular_perturbation:   the same, minus epsilon D_b tau_J' of the elastic joints
         visco_elastic, elastic:  tau_d = tau_J + D_M q_M'' + d_v q_M',  q_M = q + K_s^-1 tau_J
 
-    The joints' damping bends ``q_M`` a little less than that; it is left out.
+    The small effect of the joints' damping on ``q_M`` is neglected.
 
     Args:
-        robot: The robot as it is believed, N joints.
-        law: The law, which decides what of the joints' elasticity the drives have to follow.
-        viscous: What the drives overcome besides the robot's own damping, shape (N,).
+        robot: Nominal robot model, N joints.
+        law: The control law; it determines which elastic effects the drives compensate.
+        viscous: Viscous damping in addition to the robot model's, shape (N,).
         boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], shape (N,), of the law
             ``singular_perturbation``.
 
     Attributes:
-        derivatives: Up to which derivative of the joint coordinates it depends on the motion.
+        derivatives: Highest derivative of the joint coordinates that the demand depends on.
     """
 
     def __init__(
@@ -93,19 +93,19 @@ class DriveDemand:
             found[i] = demand
         return found
 
-    def at_constant_rate(self, course: np.ndarray) -> np.ndarray:
-        """Return the polynomials of the pace ``c`` at which a motion is gone through evenly.
+    def at_constant_rate(self, trajectory: np.ndarray) -> np.ndarray:
+        """Return the demand as polynomials of a constant speed scaling ``c``.
 
         Args:
-            course: As the motion of :meth:`of`, at the pace 1.
+            trajectory: Motion as for :meth:`of`, at scaling 1.
 
         Returns:
             Coefficients of ``c^0 .. c^4``, shape (samples, 5, 2N).
         """
-        paces = np.linspace(0.0, 1.0, _DEGREE + 1)
-        powers = paces[:, None] ** np.arange(self.derivatives + 1)
-        values = np.array([self.of(course * power[:, None]) for power in powers])
-        through = np.linalg.inv(np.vander(paces, increasing=True))
+        scalings = np.linspace(0.0, 1.0, _DEGREE + 1)
+        powers = scalings[:, None] ** np.arange(self.derivatives + 1)
+        values = np.array([self.of(trajectory * power[:, None]) for power in powers])
+        through = np.linalg.inv(np.vander(scalings, increasing=True))
         return np.einsum("kp,psn->skn", through, values)
 
 
@@ -128,7 +128,7 @@ def _demand_function(
         K_s = ca.DM(robot.K_s)
         velocity, acceleration = velocity + tau_J[1] / K_s, acceleration + tau_J[2] / K_s
     elif record.damps_springs:
-        assert boundary_layer_damping is not None  # the law has refused that
+        assert boundary_layer_damping is not None  # the law rejects None
         elastic = robot.elastic_joints
         fast = -ca.DM(np.where(elastic, boundary_layer_damping, 0.0)) * tau_J[1]
     damping = robot.viscous_damping + (np.zeros(n) if viscous is None else viscous)
@@ -142,17 +142,17 @@ def _demand_function(
     )
 
 
-def with_pace(course: np.ndarray, pace: np.ndarray) -> np.ndarray:
+def apply_scaling(trajectory: np.ndarray, scaling: np.ndarray) -> np.ndarray:
     """Return the time derivatives of ``Q(tau(t))`` by the chain rule.
 
     Args:
-        course: ``Q`` and its derivatives, shape (samples, K + 1, N) with K up to 4.
-        pace: ``tau', tau'', ..``, K of them, shape (samples, K) or more columns.
+        trajectory: ``Q`` and its derivatives, shape (samples, K + 1, N) with K up to 4.
+        scaling: ``tau', tau'', ..``, K of them, shape (samples, K) or more columns.
     """
-    motion = course.copy()
-    highest = course.shape[1] - 1
-    c, a, j, s = (pace[:, k, None] if k < pace.shape[1] else 0.0 for k in range(4))
-    Q = [course[:, k] for k in range(highest + 1)]
+    motion = trajectory.copy()
+    highest = trajectory.shape[1] - 1
+    c, a, j, s = (scaling[:, k, None] if k < scaling.shape[1] else 0.0 for k in range(4))
+    Q = [trajectory[:, k] for k in range(highest + 1)]
     motion[:, 1] = Q[1] * c
     if highest > 1:
         motion[:, 2] = Q[2] * c**2 + Q[1] * a
@@ -164,28 +164,28 @@ def with_pace(course: np.ndarray, pace: np.ndarray) -> np.ndarray:
     return motion
 
 
-# paces that are tried; slower than the slowest, a motion stands
+# candidate scalings; below the slowest one a motion counts as standing still
 _LADDER = np.linspace(1.0, 0.01, 100)
-# steps to the time asked for, from a linear guess
+# Newton steps to the requested time, from a linear guess
 _NEWTON = 4
-# box filters that make the pace C^4
+# box filters that make the scaling C^4
 _BOXES = 5
-# how often the pace is corrected, and by how much more than the demand tells
+# largest number of corrections, and safety factor of each
 _CORRECTIONS, _FURTHER = 30, 0.97
-# of what is allowed, left to the change of pace at the pace that is the largest if it is even
+# share of the allowed demand that the constant scaling leaves to changes of the scaling
 _FOR_CHANGES = 0.1
-# of what may be used of what drives have left beside the weight that they hold
+# usable share of the torque that gravity leaves
 _BESIDE_WEIGHT = 0.5
 
 
 @dataclass(frozen=True)
-class Pace:
-    """How fast a motion is gone through, on a grid of the time ``tau`` that was asked for.
+class SpeedScaling:
+    """Speed of a motion relative to the requested one, on a grid of the requested time ``tau``.
 
     Attributes:
         rates: ``c = dtau/dt`` and its time derivatives, shape (samples, 4) [1, 1/s, ..].
-        share: Largest share of its limit that a drive is asked for, shape (samples,).
-        tightest: Column of the demand that decides over the pace, shape (samples,).
+        share: Largest demand relative to its limit, shape (samples,).
+        tightest: Column of the demand that limits the scaling, shape (samples,).
     """
 
     rates: np.ndarray
@@ -196,15 +196,15 @@ class Pace:
 def allowed_demand(
     at_rest: np.ndarray, limits: np.ndarray, reserve: np.ndarray | float
 ) -> np.ndarray:
-    """Return what may be asked of the drives, shape (samples, 2N).
+    """Return the allowed drive demand, shape (samples, 2N).
 
-    That is ``1 - reserve`` of the limits; where the weight of the links alone takes about that
-    much, half of that share of what it leaves is allowed beside it.
+    It is ``1 - reserve`` of the limits. Where gravity alone takes about that much, it is gravity
+    plus half of ``1 - reserve`` of the remaining torque.
 
     Args:
         at_rest: Demand at rest, shape (samples, 2N).
-        limits: What drives can do, shape (2N,).
-        reserve: Share of the limits that is left, shape (2N,) or one for all.
+        limits: Limits of the drives, shape (2N,).
+        reserve: Share of the limits that is not used, shape (2N,) or one for all.
     """
     weight = np.minimum(np.abs(at_rest), limits)
     usable = (1.0 - reserve) * limits
@@ -212,87 +212,88 @@ def allowed_demand(
     return np.maximum(usable, weight + _BESIDE_WEIGHT * (1.0 - reserve) * beside)
 
 
-def find_pace(
+def find_scaling(
     demand: DriveDemand,
-    course: np.ndarray,
+    trajectory: np.ndarray,
     step: float,
     allowed: np.ndarray,
     change: float,
     smoothing: float,
-) -> Pace:
-    """Return the pace at which the drives are asked for no more than is allowed.
+) -> SpeedScaling:
+    """Return a speed scaling at which the drive demand is within the allowed one.
 
-    1. The largest even pace ``c(tau) <= 1`` from the polynomials of the demand.
-    2. Its minimum over the way that the smoothing spans, and forward and backward passes that
-       bound its change.
+    1. The largest constant scaling ``c(tau) <= 1`` from the polynomials of the demand.
+    2. Its minimum over the window of the smoothing, and forward and backward passes that bound its
+       change.
     3. Box filters, whose result is C^4 over ``tau``, and so over time.
-    4. The demand of this very motion, its changes of pace with all their derivatives included.
-       Where it is too large, the even pace is lowered, and what bounds its change; again from 2.
+    4. The demand of the resulting motion, with all derivatives of the scaling. Where it is too
+       large, the constant scaling and the bound on its change are lowered; repeat from 2.
 
     Args:
-        demand: Tells what a motion asks of the drives.
-        course: Joint coordinates and derivatives by ``tau``, shape (samples, K + 1, N).
+        demand: Drive demand of a motion.
+        trajectory: Joint coordinates and derivatives with respect to ``tau``, shape
+            (samples, K + 1, N).
         step: Step of the grid [s].
-        allowed: What may be asked, shape (samples, 2N).
-        change: Largest change of pace ``dc/dt`` [1/s].
-        smoothing: Width of the filters together [s].
+        allowed: Allowed demand, shape (samples, 2N).
+        change: Largest rate of change of the scaling, ``dc/dt`` [1/s].
+        smoothing: Total width of the filters [s].
 
     Raises:
-        InputError: If no pace is slow enough.
+        InputError: If no scaling is slow enough.
     """
-    polynomials = demand.at_constant_rate(course)
-    # no pace changes the weight: of what it leaves, at most half is kept for changes
+    polynomials = demand.at_constant_rate(trajectory)
+    # gravity does not depend on the scaling; at most half of the rest is reserved for changes
     weight = np.abs(polynomials[:, 0])
     even_allowed = np.maximum((1.0 - _FOR_CHANGES) * allowed, 0.5 * (weight + allowed))
-    even, tightest = _even_pace(polynomials, even_allowed)
-    bound = np.full(len(course), change)
+    even, tightest = _even_scaling(polynomials, even_allowed)
+    bound = np.full(len(trajectory), change)
     half = max(1, round(smoothing / (2.0 * _BOXES * step)))
     reach = 2 * _BOXES * half + 1
     for _ in range(_CORRECTIONS):
-        rates = _smoothed(even, bound, step, half)
-        ratio = np.abs(demand.of(with_pace(course, rates))) / allowed
+        rates = _smooth(even, bound, step, half)
+        ratio = np.abs(demand.of(apply_scaling(trajectory, rates))) / allowed
         worst = ratio.argmax(axis=1)
         share = np.take_along_axis(ratio, worst[:, None], axis=1)[:, 0]
         if share.max() <= 1.0:
-            return Pace(rates, share, np.where(even < 1.0, tightest, worst))
-        # what would be asked without a change of pace, and with it
-        alone = _evaluated(polynomials, rates[:, 0])
+            return SpeedScaling(rates, share, np.where(even < 1.0, tightest, worst))
+        # demand without and with a change of the scaling
+        alone = _evaluate(polynomials, rates[:, 0])
         constant = np.take_along_axis(np.abs(alone) / allowed, worst[:, None], axis=1)[:, 0]
         over = share > 1.0
-        room = np.maximum(1.0 - constant, 0.0) / np.maximum(share - constant, 1e-12)
-        slower = np.where(over, np.clip(_FURTHER * room, 0.5, 1.0), 1.0)
+        margin = np.maximum(1.0 - constant, 0.0) / np.maximum(share - constant, 1e-12)
+        slower = np.where(over, np.clip(_FURTHER * margin, 0.5, 1.0), 1.0)
         bound = bound * minimum_filter1d(slower, reach)
         lower = np.where(over, _FURTHER * np.clip(share, 1.0, 2.0) ** -0.25, 1.0)
         even = np.minimum(even, np.where(over, rates[:, 0] * lower, np.inf))
         even = np.maximum(even, _LADDER[-1])
-    raise InputError(f"no pace found; the drives are asked for {share.max():.3g} of what they may")
+    raise InputError(f"no speed scaling found; the demand is {share.max():.3g} of the allowed one")
 
 
-def _evaluated(polynomials: np.ndarray, pace: np.ndarray) -> np.ndarray:
-    """Return polynomials (samples, k, 2N) of a pace each (samples,), or one of all."""
+def _evaluate(polynomials: np.ndarray, scaling: np.ndarray) -> np.ndarray:
+    """Return polynomials (samples, k, 2N) at one scaling each (samples,), or at one for all."""
     value = polynomials[:, -1]
     for k in range(polynomials.shape[1] - 2, -1, -1):
-        value = value * np.reshape(pace, (-1, 1)) + polynomials[:, k]
+        value = value * np.reshape(scaling, (-1, 1)) + polynomials[:, k]
     return value
 
 
-def _even_pace(polynomials: np.ndarray, allowed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the largest pace below which everything is allowed, and what forbids more."""
-    pace = np.full(len(polynomials), _LADDER[-1])
+def _even_scaling(polynomials: np.ndarray, allowed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest constant scaling within the allowed demand, and the limiting column."""
+    scaling = np.full(len(polynomials), _LADDER[-1])
     tightest = np.zeros(len(polynomials), dtype=int)
     left = np.arange(len(polynomials))
-    # from slow to fast; a sample that has asked too much once is done
+    # from slow to fast; a sample that has exceeded the allowed demand once is done
     for candidate in _LADDER[::-1]:
-        ratio = np.abs(_evaluated(polynomials[left], candidate)) / allowed[left]
+        ratio = np.abs(_evaluate(polynomials[left], candidate)) / allowed[left]
         tightest[left] = ratio.argmax(axis=1)
         fits = ratio.max(axis=1) <= 1.0
         left = left[fits]
-        pace[left] = candidate
-    return pace, tightest
+        scaling[left] = candidate
+    return scaling, tightest
 
 
-def _smoothed(even: np.ndarray, bound: np.ndarray, step: float, half: int) -> np.ndarray:
-    """Return a pace below another, and its time derivatives, shape (samples, 4)."""
+def _smooth(even: np.ndarray, bound: np.ndarray, step: float, half: int) -> np.ndarray:
+    """Return a smooth scaling below another one, and its time derivatives, (samples, 4)."""
     square = minimum_filter1d(even, 2 * _BOXES * half + 1) ** 2
     # d(c^2)/dtau = 2 dc/dt
     rise = (2.0 * step * bound).tolist()
@@ -301,27 +302,27 @@ def _smoothed(even: np.ndarray, bound: np.ndarray, step: float, half: int) -> np
         values[i] = min(values[i], values[i - 1] + rise[i])
     for i in range(len(values) - 2, -1, -1):
         values[i] = min(values[i], values[i + 1] + rise[i])
-    pace = np.sqrt(values)
+    scaling = np.sqrt(values)
     for _ in range(_BOXES):
-        pace = uniform_filter1d(pace, 2 * half + 1, mode="nearest")
-    rates = [np.minimum(pace, 1.0)]
+        scaling = uniform_filter1d(scaling, 2 * half + 1, mode="nearest")
+    rates = [np.minimum(scaling, 1.0)]
     for _ in range(3):
-        rates.append(pace * np.gradient(rates[-1], step))
+        rates.append(scaling * np.gradient(rates[-1], step))
     return np.array(rates).T
 
 
 class Clock:
-    """The time ``t`` at which a time ``tau`` comes at a pace, and back.
+    """Map between the time ``t`` of a scaled motion and the requested time ``tau``.
 
     Args:
-        pace: ``dtau/dt`` on an even grid of ``tau`` from 0 on, shape (samples,).
+        scaling: ``dtau/dt`` on an even grid of ``tau`` from 0 on, shape (samples,).
         step: Step of the grid [s].
     """
 
-    def __init__(self, pace: np.ndarray, step: float) -> None:
-        grid = step * np.arange(len(pace))
-        # a rule that is not the same at odd and even samples would sound in high derivatives
-        self._slowness = make_interp_spline(grid, 1.0 / pace, k=5)
+    def __init__(self, scaling: np.ndarray, step: float) -> None:
+        grid = step * np.arange(len(scaling))
+        # a rule that differs at odd and even samples would excite high derivatives
+        self._slowness = make_interp_spline(grid, 1.0 / scaling, k=5)
         self._time = self._slowness.antiderivative()
         self._grid, self.times = grid, self._time(grid)
 

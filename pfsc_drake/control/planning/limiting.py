@@ -1,23 +1,23 @@
-"""Which limit a motion is at, and where."""
+"""Active limits along a motion."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-# of limits
+# kinds of limits
 KINDS = ("torque", "speed", "rate", "velocity")
-# of a limit, from which on a motion is at it
+# share of a limit from which on it counts as active
 _AT = 0.97
 
 
 @dataclass(frozen=True)
 class Limiting:
-    """What limits a motion, at every sample.
+    """Shares of all limits at every sample of a motion.
 
     Attributes:
         names: ``torque_1``, .., ``speed_1``, .., ``rate_1``, .., ``velocity``: limits of drives
             1..N, of torques, joint speeds and rates of torques, and of the tool.
-        shares: What the motion takes of each, shape (samples, limits).
+        shares: Share of each limit that the motion uses, shape (samples, limits).
     """
 
     names: list[str]
@@ -31,26 +31,26 @@ class Limiting:
         tick: tuple[int, float],
         torque_rate: np.ndarray,
         velocity: np.ndarray,
-        held_back: np.ndarray | float = 0.0,
+        restraint_ratio: np.ndarray | float = 0.0,
     ) -> "Limiting":
-        """Return what limits a motion.
+        """Return the shares of a motion.
 
         Args:
-            demand: Torques and joint speeds that it asks for, even samples, shape (samples, 2N).
-            allowed: What it may, of the same shape.
+            demand: Torques and joint speeds at evenly spaced samples, shape (samples, 2N).
+            allowed: Allowed torques and joint speeds, of the same shape.
             tick: Samples from one command to the next, and its time [s].
             torque_rate: Largest rates of torques, shape (N,).
-            velocity: What it takes of the largest velocity of the tool, shape (samples,).
-            held_back: What it takes of the joint speeds from which on a posture is held back, shape
-                (samples, N).
+            velocity: Share of the largest tool velocity, shape (samples,).
+            restraint_ratio: Share of the joint speeds at which the posture task is restrained,
+                shape (samples, N).
         """
         n = demand.shape[1] // 2
         samples, period = tick
         later = np.minimum(np.arange(len(demand)) + samples, len(demand) - 1)
         rates = np.abs(demand[later, :n] - demand[:, :n]) / period
-        taken = np.abs(demand) / allowed
-        taken[:, n:] = np.maximum(taken[:, n:], held_back)
-        shares = [taken, rates / torque_rate, velocity[:, None]]
+        used = np.abs(demand) / allowed
+        used[:, n:] = np.maximum(used[:, n:], restraint_ratio)
+        shares = [used, rates / torque_rate, velocity[:, None]]
         kinds = [f"{kind}_{i + 1}" for kind in KINDS[:-1] for i in range(n)]
         return cls([*kinds, KINDS[-1]], np.concatenate(shares, axis=1))
 
@@ -68,15 +68,15 @@ class Limiting:
 
     @property
     def active(self) -> np.ndarray:
-        """Number of the limit that the motion is at, from 1 on, 0 for none, shape (samples,)."""
+        """Number of the active limit from 1 on, 0 for none, shape (samples,)."""
         return np.where(self.largest >= _AT, 1 + self.shares.argmax(axis=1), 0)
 
-    def of_the_way(self, way: np.ndarray) -> dict[str, float]:
-        """Return on what share of the way each limit is the one, and ``none``; those that are.
+    def path_shares(self, travel: np.ndarray) -> dict[str, float]:
+        """Return the share of the path on which each limit, or ``none``, is active, if above 0.
 
         Args:
-            way: Length that the tool goes at each sample, shape (samples,).
+            travel: Distance of the tool at each sample, shape (samples,).
         """
-        parts = np.bincount(self.active, way, len(self.names) + 1) / way.sum()
+        parts = np.bincount(self.active, travel, len(self.names) + 1) / travel.sum()
         found = zip(["none", *self.names], parts.tolist(), strict=True)
         return {name: part for name, part in found if part > 0.0}

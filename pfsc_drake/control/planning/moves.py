@@ -1,4 +1,4 @@
-"""Straight moves of tangential coordinates from rest to rest, at whatever progress."""
+"""Straight moves of tangential coordinates from rest to rest, with any progress in time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,14 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from pfsc_drake.control.planning.pace_spline import PaceSpline
+from pfsc_drake.control.planning.scaling_spline import ScalingSpline
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 
-# of the time of a cruise all the way, for each of the ramps of a move that nobody has planned
+# duration of each ramp of a default move, relative to a cruise over the whole distance
 _RAMP = 0.25
-# order of contact of a ramp with the cruise
+# order of contact between ramp and cruise
 _SMOOTHER = 9
-# of the largest, below which a rate is none
+# share of the largest rate below which a rate counts as zero
 _NONE = 1e-9
 
 
@@ -22,8 +22,8 @@ class Move:
     """One move, ``eta(t) = begin + direction s(t)``.
 
     Attributes:
-        begin: Where it begins [m], shape (d,).
-        direction: By its largest component, shape (d,).
+        begin: Initial coordinates [m], shape (d,).
+        direction: Direction, scaled to a largest component of 1, shape (d,).
         progress: ``s(t)`` from 0 to its end [m], from rest to rest, of dimension 1, at times from
             0 on [s].
     """
@@ -34,21 +34,21 @@ class Move:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration [s]."""
         return float(self.progress.domain[1])
 
-    def at_pace(self, pace: PaceSpline, order: int, longest: float) -> "Move":
-        """Return the move at another pace, of class C^order.
+    def with_scaling(self, scaling: ScalingSpline, order: int, longest: float) -> "Move":
+        """Return the move with a speed scaling applied, of class C^order.
 
         Args:
-            pace: The pace, over the time of this move.
-            order: Up to 4.
-            longest: Of its pieces [s].
+            scaling: Speed scaling over the time of this move.
+            order: Order of continuity, up to 4.
+            longest: Largest duration of a polynomial piece [s].
         """
-        return replace(self, progress=pace.applied_to(self.progress, order, longest))
+        return replace(self, progress=scaling.apply_to(self.progress, order, longest))
 
     def slower(self, factor: float) -> "Move":
-        """Return the move with all times longer by a factor."""
+        """Return the move with all times multiplied by a factor."""
         table, old = self.progress.coefficients, self.progress
         powers = factor ** -np.arange(table.shape[1], dtype=float)
         curve = PiecewisePolynomialCurve(
@@ -65,39 +65,39 @@ def straight_moves(motion: PiecewisePolynomialCurve, order: int) -> list[Move]:
 
     Args:
         motion: Tangential coordinates over time, at rest at the ends of every move.
-        order: Up to which derivatives are continuous at rest, too.
+        order: Highest derivative that is continuous at rest, too.
     """
     state = motion.derivatives(motion.breakpoints, 1)
     speed = np.abs(state[:, 1]).max(axis=1)
-    places = state[speed <= _NONE * speed.max(), 0]
+    rests = state[speed <= _NONE * speed.max(), 0]
     moves = []
-    for begin, end in pairwise(places):
-        way = float(np.abs(end - begin).max())
-        if way > _NONE * np.abs(places).max():
-            moves.append(Move(begin, (end - begin) / way, _from_rest_to_rest(way, order)))
+    for begin, end in pairwise(rests):
+        distance = float(np.abs(end - begin).max())
+        if distance > _NONE * np.abs(rests).max():
+            moves.append(Move(begin, (end - begin) / distance, _from_rest_to_rest(distance, order)))
     return moves
 
 
-def _from_rest_to_rest(way: float, order: int) -> PiecewisePolynomialCurve:
+def _from_rest_to_rest(distance: float, order: int) -> PiecewisePolynomialCurve:
     """Return two ramps and a cruise of 1 m/s between them."""
     time = np.polynomial.Polynomial([0.0, 1.0])
-    # smoother where the cruise begins: what is planned on top cannot take a kink away
+    # smoother where the cruise begins: a later scaling cannot remove a kink
     slope = time ** (order - 1) * (1.0 - time) ** _SMOOTHER
     ramp = slope.integ() / slope.integ()(1.0)
-    long = _RAMP * way
+    long = _RAMP * distance
     rise = ramp(time / long).integ()
-    cruise = way - 2.0 * rise(long)
-    parts = [rise, rise(long) + time, way - rise(long - time)]
+    cruise = distance - 2.0 * rise(long)
+    parts = [rise, rise(long) + time, distance - rise(long - time)]
     terms = max(len(part.coef) for part in parts)
     table = [np.pad(part.coef, (0, terms - len(part.coef))) for part in parts]
-    places = np.cumsum([0.0, long, cruise, long])
-    return PiecewisePolynomialCurve(places, np.array(table)[:, :, None], known_smoothness=order)
+    times = np.cumsum([0.0, long, cruise, long])
+    return PiecewisePolynomialCurve(times, np.array(table)[:, :, None], known_smoothness=order)
 
 
 def one_after_another(
     moves: Sequence[Move], dwell: float
 ) -> tuple[PiecewisePolynomialCurve, np.ndarray]:
-    """Return the motion of all moves, and when each of them begins [s].
+    """Return the motion of all moves, and their initial times [s].
 
     Args:
         moves: At least one.
@@ -106,10 +106,10 @@ def one_after_another(
     terms = max(move.progress.coefficients.shape[1] for move in moves)
     times, tables, begins = [0.0], [], []
 
-    def rest(place: np.ndarray) -> None:
+    def rest(point: np.ndarray) -> None:
         if dwell > 0.0:
             times.append(times[-1] + dwell)
-            tables.append(np.pad(place[None, None, :], ((0, 0), (0, terms - 1), (0, 0))))
+            tables.append(np.pad(point[None, None, :], ((0, 0), (0, terms - 1), (0, 0))))
 
     rest(moves[0].begin)
     for move in moves:

@@ -1,1 +1,1 @@
-"""Paths whose way points come while the tool moves."""
+"""Paths whose waypoints arrive while the tool moves."""

@@ -1,4 +1,4 @@
-"""How a course grows by a control point, is cut back, and begins anew where it rests."""
+"""Operations on a growing path: append a control point, cut back, begin a new piece."""
 
 import math
 from collections.abc import Sequence
@@ -9,78 +9,78 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.control.streams.stream_course import POSE, POSITION, Course, picked
+from pfsc_drake.control.streams.growing_path import POSE, POSITION, GrowingPath, pick
 from pfsc_drake.control.streams.stream_parameters import StreamParameters
 
-# of the spacing of way points, by which every step of control points goes forward
+# least forward component of a step between control points, relative to the spacing
 _FORWARD = 0.1
-# spans beyond the one in which a tool would rest that are not taken back
-_KEPT = 1
-_PLACES = 4  # at which a course may be cut
+# spans beyond the stopping point that are not removed
+_MARGIN = 1
+_CUTS = 4  # number of candidate cuts
 
 Fields = dict[str, Any]
 
 
 class Growth:
-    """Functions on the fields of a :class:`Course`.
+    """Functions on the fields of a :class:`GrowingPath`.
 
     Args:
-        course: Layout of the course.
-        parameters: How way points become a path.
+        path: Layout of the path.
+        parameters: Parameters of the stream.
 
     Attributes:
         last_span: Number of the last span.
-        root: Place among the columns' spans at which a piece begins, or ends, once control points
-            on all sides of it are known that decide over it: then it lies on the last span.
+        root: Parameter relative to the columns' spans at which a piece begins or ends, on the last
+            span, once all control points that determine it are known.
     """
 
-    def __init__(self, course: Course, parameters: StreamParameters) -> None:
-        self._course, self._parameters = course, parameters
-        self.last_span = course.spans - 1
-        self.root = course.columns - 1 - course.spline.reach - (course.spline.degree - 1) / 2.0
+    def __init__(self, path: GrowingPath, parameters: StreamParameters) -> None:
+        self._path, self._parameters = path, parameters
+        self.last_span = path.spans - 1
+        self.root = path.columns - 1 - path.spline.reach - (path.spline.degree - 1) / 2.0
         self._on_last = self.root - self.last_span
-        points = course.spline.point_function(course.dimension, 0)
+        points = path.spline.point_function(path.dimension, 0)
         self._pose = lambda own: points(own, self._on_last)
 
     def control(self, before: Any, at: Any, after: Any) -> Any:
-        """Return the control point of a way point between two others."""
-        return self._course.spline.sharpened(before, at, after) if self._parameters.through else at
+        """Return the control point of a waypoint between two others."""
+        return self._path.spline.sharpen(before, at, after) if self._parameters.through else at
 
     def straight(self, at_rest: np.ndarray, direction: np.ndarray, spacing: float) -> Fields:
-        """Return a straight course that ends where the tool rests.
+        """Return a straight path that ends at the tool's rest pose.
 
         Args:
-            at_rest: Pose [m], and quaternion if there is one, shape (d,).
-            direction: Unit vector along it, shape (3,).
-            spacing: Distance of its control points [m].
+            at_rest: Position [m], with a quaternion if d = 7, shape (d,).
+            direction: Unit vector along the path, shape (3,).
+            spacing: Distance of the control points [m].
         """
-        course, middle = self._course, self._course.columns - 1 - self._course.spline.reach
+        path, middle = self._path, self._path.columns - 1 - self._path.spline.reach
         # the first piece begins with control point 0
-        before = 2 * course.spline.reach + 1
-        places = spacing * (np.arange(course.columns) - middle)
-        points = np.tile(at_rest, (course.columns, 1))
-        points[:, :POSITION] += np.outer(places, direction)
+        before = 2 * path.spline.reach + 1
+        distances = spacing * (np.arange(path.columns) - middle)
+        points = np.tile(at_rest, (path.columns, 1))
+        points[:, :POSITION] += np.outer(distances, direction)
         return {
             "first": ca.DM(-middle - before),
             "piece": ca.DM(0.0),
             "root": ca.DM(self.root - middle - before),
             "points": ca.DM(points.ravel()),
-            "eta": ca.DM(spacing * (np.arange(course.spans + 1) - self.root)),
-            "speed": ca.DM(np.full(course.spans, self._parameters.velocity)),
+            "eta": ca.DM(spacing * (np.arange(path.spans + 1) - self.root)),
+            "speed": ca.DM(np.full(path.spans, self._parameters.velocity)),
         }
 
-    def appended(self, known: Fields, control: Any) -> Fields:
-        """Return a course with one more control point, of which the last span is made.
+    def append(self, known: Fields, control: Any) -> Fields:
+        """Return a path with one more control point, and so one more span.
 
         Args:
-            known: The course.
+            known: Fields of the path.
             control: The control point, shape (d,).
         """
-        d, count = self._course.dimension, self._course.spline.degree + 1
+        d, count = self._path.dimension, self._path.spline.degree + 1
         points = ca.vertcat(known["points"][d:], control)
         own = self._positions(points[-d * count :])
-        end = known["eta"][-1] + self._course.spline.length(own, 1.0)
-        speed = self.speed(self._course.spline.shape(own))
+        end = known["eta"][-1] + self._path.spline.length(own, 1.0)
+        speed = self.speed(self._path.spline.shape(own))
         return known | {
             "first": known["first"] + 1.0,
             "points": points,
@@ -89,48 +89,48 @@ class Growth:
         }
 
     def end(self, known: Fields) -> tuple[Any, Any]:
-        """Return pose and arc length at which a course ends whose last span has its end.
+        """Return pose and arc length of the end, on a path whose last span contains it.
 
         Args:
-            known: The course.
+            known: Fields of the path.
         """
-        own = known["points"][-self._course.dimension * (self._course.spline.degree + 1) :]
-        way = self._course.spline.length(self._positions(own), self._on_last)
-        return self._pose(own), known["eta"][-2] + way
+        own = known["points"][-self._path.dimension * (self._path.spline.degree + 1) :]
+        length = self._path.spline.length(self._positions(own), self._on_last)
+        return self._pose(own), known["eta"][-2] + length
 
-    def mirrored(self, known: Fields, newest: Any, further: Any) -> Any:
-        """Return the control point to append to a piece that gets its end.
+    def mirror(self, known: Fields, newest: Any, further: Any) -> Any:
+        """Return the next control point beyond the end of a piece.
 
-        The spline is point-symmetric there, so that it leads exactly to the last way point.
+        The spline is point-symmetric there, so that it passes exactly through the last waypoint.
 
         Args:
-            known: The course.
-            newest: The last way point, which is its own control point.
-            further: How many control points it would be beyond the last one.
+            known: Fields of the path.
+            newest: The last waypoint, which is also its control point.
+            further: Number of control points beyond the last one.
         """
-        columns, far = self._course.columns, ca.fmax(further, 1.0)
+        columns, far = self._path.columns, ca.fmax(further, 1.0)
         middle, other = (self._column(known, columns - k * far) for k in (1.0, 2.0))
         return where(further > 0.0, 2.0 * middle - other, newest)
 
-    def begun(self, known: Fields, controls: Sequence[Any], eta: Any) -> Fields:
-        """Return a course whose new piece begins where the last one ended.
+    def begin_piece(self, known: Fields, controls: Sequence[Any], eta: Any) -> Fields:
+        """Return a path whose new piece begins at the end of the last one.
 
-        The spline is point-symmetric there, so that it leads exactly through.
+        The spline is point-symmetric there, so that it passes exactly through the begin.
 
         Args:
-            known: The course.
-            controls: The first control points, that of the begin first.
+            known: Fields of the path.
+            controls: First control points, beginning with the first one of the piece.
             eta: Arc length at the begin [m].
         """
-        course, spline = self._course, self._course.spline
-        begin, d = controls[0], course.dimension
+        path, spline = self._path, self._path.spline
+        begin, d = controls[0], path.dimension
         mirrored = [2.0 * begin - c for c in reversed(controls[1:])]
         step = mirrored[0] - mirrored[1]
-        older = course.columns - len(mirrored) - len(controls)
+        older = path.columns - len(mirrored) - len(controls)
         before = [mirrored[0] + (older - j) * step for j in range(older)]
         points = ca.vertcat(*before, *mirrored, *controls)
         own = self._positions(points[-d * (spline.degree + 1) :])
-        way, whole = spline.length(own, self._on_last), spline.length(own, 1.0)
+        length, whole = spline.length(own, self._on_last), spline.length(own, 1.0)
         steps = ca.DM(np.arange(-self.last_span, 1.0)) * ca.norm_2(step[:POSITION])
         first = known["first"] + len(mirrored) + len(controls)
         return {
@@ -138,80 +138,80 @@ class Growth:
             "piece": known["piece"] + 1.0,
             "root": first + self.root,
             "points": points,
-            "eta": ca.vertcat(eta - way + steps, eta - way + whole),
-            "speed": ca.DM.ones(course.spans) * self.speed(spline.shape(own)),
+            "eta": ca.vertcat(eta - length + steps, eta - length + whole),
+            "speed": ca.DM.ones(path.spans) * self.speed(spline.shape(own)),
         }
 
     def cut_back(self, known: Fields, stop: Any) -> tuple[Fields, Any, Any]:
-        """Return a course without control points that a tool does not need to stop.
+        """Return a path without the control points that a stop does not need.
 
-        What is left can be ended: of the first few places from there on it is cut at the first one
-        at which the piece would end gently.
+        The cut is at the first of a few candidates at which the piece would end gently, so that the
+        remaining piece can be ended.
 
         Args:
-            known: The course.
-            stop: Arc length at which it can stop [m].
+            known: Fields of the path.
+            stop: Arc length at which the reference can stop [m].
 
         Returns:
-            The course, its control point after the last one, and how many have gone; not less than
-            one, or nothing has changed.
+            The path, the control point after its last one, and the number of removed control
+            points; below one the path has not changed.
         """
-        course, count = self._course, self._course.spline.degree + 1
+        path, count = self._path, self._path.spline.degree + 1
         span = ca.sum1(known["eta"] <= stop) - 1.0
-        first = span + _KEPT + course.spline.degree
-        last = ca.DM(course.columns - 1.0)
-        for place in reversed(range(_PLACES)):
-            ends = first + place
-            there = [self._column(known, ends + 1.0 - k) for k in reversed(range(count))]
-            gentle = self.admissible(self.ended_at(there, count - 1))
-            last = where(ca.logic_and(gentle, ends + 1.0 < course.columns), ends, last)
-        gone = course.columns - 1.0 - last
+        first = span + _MARGIN + path.spline.degree
+        last = ca.DM(path.columns - 1.0)
+        for k_cut in reversed(range(_CUTS)):
+            ends = first + k_cut
+            tail = [self._column(known, ends + 1.0 - k) for k in reversed(range(count))]
+            gentle = self.admissible(self.end_at(tail, count - 1))
+            last = where(ca.logic_and(gentle, ends + 1.0 < path.columns), ends, last)
+        gone = path.columns - 1.0 - last
         after = self._column(known, last + 1.0)
 
-        def kept(name: str, size: int, width: int = 1) -> Any:
+        def retain(name: str, size: int, width: int = 1) -> Any:
             rows = ca.fmax(ca.DM(range(size)) - gone, 0.0)
             parts = ca.repmat(ca.DM(range(width)), 1, size)
-            return picked(known[name], ca.vec(ca.repmat(width * rows.T, width, 1) + parts))
+            return pick(known[name], ca.vec(ca.repmat(width * rows.T, width, 1) + parts))
 
         cut = known | {
             "first": known["first"] - gone,
-            "points": kept("points", course.columns, course.dimension),
-            "eta": kept("eta", course.spans + 1),
-            "speed": kept("speed", course.spans),
+            "points": retain("points", path.columns, path.dimension),
+            "eta": retain("eta", path.spans + 1),
+            "speed": retain("speed", path.spans),
         }
         return cut, after, gone
 
     def _column(self, known: Fields, number: Any) -> Any:
-        """Return the control point in a column, the last one from beyond, shape (d,)."""
-        d, inside = self._course.dimension, ca.fmin(number, self._course.columns - 1.0)
-        return picked(known["points"], d * inside + ca.DM(range(d)))
+        """Return the control point in a column, or in the last one if beyond, shape (d,)."""
+        d, inside = self._path.dimension, ca.fmin(number, self._path.columns - 1.0)
+        return pick(known["points"], d * inside + ca.DM(range(d)))
 
     def admissible(self, controls: Sequence[Any]) -> Any:
         """Return whether all spans on control points are regular and bend gently enough.
 
-        ``sigma'`` on a span is a mean of the p steps between its control points, with weights that
-        are positive. It is regular if all steps go forward in one direction, which here is that
-        from the first control point to the last one: then ``|sigma'|`` is not less than the
-        smallest of their components along it.
+        ``sigma'`` on a span is a mean of the p steps between its control points, with positive
+        weights. The span is regular if all steps have a positive component along one direction,
+        here from the first control point to the last: ``|sigma'|`` is then not less than the
+        smallest component.
 
         Args:
-            controls: Control points, one after the other, each of shape (d,).
+            controls: Control points in order, each of shape (d,).
         """
-        degree, good = self._course.spline.degree, ca.DM(1.0)
+        degree, good = self._path.spline.degree, ca.DM(1.0)
         sharpest = 1.0 / self._parameters.least_radius
         least = _FORWARD * self._parameters.spacing
         positions = [c[:POSITION] for c in controls]
         for s in range(len(positions) - degree):
             own = positions[s : s + degree + 1]
-            way = own[-1] - own[0]
-            forward = ca.vertcat(*[ca.dot(way, after - c) for c, after in pairwise(own)])
-            curvature, _ = ca.vertsplit(self._course.spline.shape(ca.vertcat(*own)))
-            regular = ca.mmin(forward) > least * ca.norm_2(way)
+            chord = own[-1] - own[0]
+            forward = ca.vertcat(*[ca.dot(chord, after - c) for c, after in pairwise(own)])
+            curvature, _ = ca.vertsplit(self._path.spline.shape(ca.vertcat(*own)))
+            regular = ca.mmin(forward) > least * ca.norm_2(chord)
             good = ca.logic_and(good, ca.logic_and(regular, curvature < sharpest))
         return good
 
     def speed(self, shape: Any) -> Any:
-        """Return the largest speed on a span [m/s], from what `UniformSpline.shape` tells."""
+        """Return the largest speed on a span [m/s] for the shape from `UniformSpline.shape`."""
         limits = self._parameters
         curvature, jerk = ca.vertsplit(shape)
         bent = ca.sqrt(limits.normal_acceleration / ca.fmax(curvature, 1e-9))
@@ -219,30 +219,30 @@ class Growth:
         return ca.fmin(limits.velocity, ca.fmin(bent, jerky))
 
     def _positions(self, own: Any) -> Any:
-        """Return the positions of a span's control points, one after the other."""
-        if self._course.dimension == POSITION:
+        """Return the positions of a span's control points in one vector."""
+        if self._path.dimension == POSITION:
             return own
-        count = self._course.spline.degree + 1
+        count = self._path.spline.degree + 1
         return ca.vec(ca.reshape(own, POSE, count)[:POSITION, :])
 
-    def ended_at(self, controls: Sequence[Any], end: int) -> list[Any]:
-        """Return control points up to an end, and as many mirrored at it as decide over it.
+    def end_at(self, controls: Sequence[Any], end: int) -> list[Any]:
+        """Return control points up to an end, and the mirrored ones that determine it.
 
         Args:
-            controls: Control points, one after the other.
-            end: Index of the one at which the path would end.
+            controls: Control points in order.
+            end: Index of the control point at which the path would end.
         """
-        kept = list(controls[: end + 1])
-        beyond = [2.0 * kept[end] - kept[end - k] for k in range(1, self._course.spline.reach + 1)]
-        return [*kept, *beyond]
+        head = list(controls[: end + 1])
+        beyond = [2.0 * head[end] - head[end - k] for k in range(1, self._path.spline.reach + 1)]
+        return [*head, *beyond]
 
     def whole_piece(self, controls: Sequence[Any]) -> list[Any]:
-        """Return control points of a piece with those mirrored at its begin and its end.
+        """Return the control points of a piece, with those mirrored at its begin and end.
 
         Args:
-            controls: Those from its begin to its end, two or more.
+            controls: Control points from begin to end, two or more.
         """
-        reach, last = self._course.spline.reach, len(controls) - 1
+        reach, last = self._path.spline.reach, len(controls) - 1
 
         def at(k: int) -> Any:
             if k < 0:
@@ -252,14 +252,12 @@ class Growth:
         return [at(k) for k in range(-reach, last + reach + 1)]
 
     def among(self, known: Fields, count: int) -> list[Any]:
-        """Return the last control points, one after the other, each of shape (d,)."""
-        return ca.vertsplit(
-            known["points"][-self._course.dimension * count :], self._course.dimension
-        )
+        """Return the last control points in order, each of shape (d,)."""
+        return ca.vertsplit(known["points"][-self._path.dimension * count :], self._path.dimension)
 
 
-def chosen(condition: Any, fields: Fields, otherwise: Fields) -> Fields:
-    """Return one of two courses, field by field."""
+def choose(condition: Any, fields: Fields, otherwise: Fields) -> Fields:
+    """Return one of two paths, field by field."""
     return {name: where(condition, value, otherwise[name]) for name, value in fields.items()}
 
 

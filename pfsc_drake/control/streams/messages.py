@@ -1,16 +1,16 @@
-"""How way points are told: the last of them again and again, so that none is missed."""
+"""Messages of waypoints: the last ones are repeated, so that none is missed."""
 
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pfsc_drake.control.streams.stream_course import POSE, POSITION
+from pfsc_drake.control.streams.growing_path import POSE, POSITION
 from pfsc_drake.errors import InputError, require
 
 
 class StreamStatus(IntEnum):
-    """What becomes of a stream of way points."""
+    """State of a stream of waypoints."""
 
     WAITING = 0
     RUNNING = 1
@@ -22,36 +22,36 @@ class StreamStatus(IntEnum):
 
     @property
     def words(self) -> str:
-        """What it means, for people."""
+        """Description for the user."""
         return _WORDS[self]
 
 
 _WORDS = {
-    StreamStatus.WAITING: "rests at the last way point, and waits for more",
+    StreamStatus.WAITING: "rests at the last waypoint, and waits for more",
     StreamStatus.RUNNING: "follows",
-    StreamStatus.ENDING: "goes to the last way point: no more came",
+    StreamStatus.ENDING: "goes to the last waypoint: no more arrived",
     StreamStatus.TURNING: "rests where the path turns too sharply, and goes on from there",
-    StreamStatus.MISSED: "stops at the last way point that came: later ones were missed",
-    StreamStatus.REFUSED: "stops before a way point that is no finite number, or out of bounds",
-    StreamStatus.BEGUN_ANEW: "stops at the last way point: its sender began to count anew",
+    StreamStatus.MISSED: "stops at the last waypoint received: later ones were missed",
+    StreamStatus.REFUSED: "stops before a waypoint that is NaN, infinite, or out of bounds",
+    StreamStatus.BEGUN_ANEW: "stops at the last waypoint: its sender restarted the count",
 }
 
 
 class WaypointLayout:
-    """Layout of a message of the last M way points: ``[total, ended, row, row, ..]``.
+    """Layout of a message of the last M waypoints: ``[total, ended, row, row, ..]``.
 
     A row is ``[x, y, z, new]`` or ``[x, y, z, qw, qx, qy, qz, new]`` [m]; ``new`` is 1 for the
-    first way point of a new path, for which what is not driven on yet of the path before is
-    forgotten. The newest row comes last; before the first way points there are zeros. A message
-    that is lost costs nothing as long as not more than M way points come before the next one.
+    first waypoint of a new path, which replaces the rest of the old one. The newest row comes last;
+    rows before the first waypoint are zero. A lost message has no effect if at most M waypoints
+    arrive until the next one.
 
     Args:
-        dimension: 3 or 7.
-        length: M.
+        dimension: Size of a waypoint, 3 or 7.
+        length: Number M of rows.
 
     Attributes:
-        dimension: 3 or 7.
-        length: M.
+        dimension: Size of a waypoint, 3 or 7.
+        length: Number M of rows.
         size: Length of a message.
     """
 
@@ -63,7 +63,7 @@ class WaypointLayout:
 
 
 class WaypointSender:
-    """Collects way points and tells them, those that have not been taken yet first.
+    """Collects waypoints and creates messages, beginning with those that have not been taken yet.
 
     Args:
         layout: Layout of the messages.
@@ -71,9 +71,8 @@ class WaypointSender:
         upper: Largest coordinates [m], three; none if empty.
 
     Attributes:
-        taken: How many way points have been taken, as far as the stream has told: more than a
-            message holds are told only once there is room. None to tell the last ones, whoever
-            hears.
+        taken: Number of waypoints taken, as reported by the stream; messages then contain the next
+            ones, at most M. None to send the last ones always.
     """
 
     def __init__(
@@ -86,48 +85,48 @@ class WaypointSender:
 
     @property
     def total(self) -> int:
-        """How many way points there have been."""
+        """Number of waypoints so far."""
         return len(self._rows)
 
     @property
     def message(self) -> np.ndarray:
-        """What is to be told, shape (size,)."""
-        told, length = self.total, self._layout.length
+        """Newest message, shape (size,)."""
+        count, length = self.total, self._layout.length
         if self.taken is not None:
-            told = min(told, self.taken + length)
+            count = min(count, self.taken + length)
         rows = np.zeros((length, self._layout.dimension + 1))
-        last = self._rows[max(0, told - length) : told]
+        last = self._rows[max(0, count - length) : count]
         if last:
             rows[-len(last) :] = last
-        ended = self._ended and told == self.total
-        return np.concatenate([[told, float(ended)], rows.ravel()])
+        ended = self._ended and count == self.total
+        return np.concatenate([[count, float(ended)], rows.ravel()])
 
     def add(self, waypoint: ArrayLike, *, new_path: bool = False) -> None:
-        """Tell one more way point.
+        """Add a waypoint.
 
         Args:
-            waypoint: ``[x, y, z]`` [m], or with a quaternion (w, x, y, z), as the layout says.
+            waypoint: ``[x, y, z]`` [m], or with a quaternion (w, x, y, z), by the layout.
             new_path: Whether a new path begins with it.
 
         Raises:
-            InputError: If it is no finite number, or out of bounds.
+            InputError: If it is NaN, infinite, or out of bounds.
         """
         values, number = np.asarray(waypoint, dtype=float), self.total + 1
         if values.shape != (self._layout.dimension,) or not np.isfinite(values).all():
             raise InputError(
-                f"way point {number}: {values.tolist()}; must be {self._layout.dimension} finite "
+                f"waypoint {number}: {values.tolist()}; must be {self._layout.dimension} finite "
                 "numbers"
             )
         lower, upper = self._bounds
         below = lower.size > 0 and bool(np.any(values[:3] < lower))
         if below or (upper.size > 0 and bool(np.any(values[:3] > upper))):
             raise InputError(
-                f"way point {number}: {np.round(values[:3], 6).tolist()} m; must be from "
+                f"waypoint {number}: {np.round(values[:3], 6).tolist()} m; must be from "
                 f"{lower.tolist()} to {upper.tolist()} m"
             )
         self._ended = False
         self._rows.append([*values.tolist(), float(new_path)])
 
     def end(self) -> None:
-        """Tell that there will be no more for now."""
+        """Announce that there are no more waypoints for now."""
         self._ended = True

@@ -1,4 +1,4 @@
-"""What can be chosen of a path whose way points come while the tool moves."""
+"""Parameters of a path whose waypoints arrive while the tool moves."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -10,24 +10,24 @@ from pfsc_drake.yaml.rules import Numbers, Parameters, Positive, Range
 
 @dataclass
 class StreamParameters(Parameters):
-    """How way points become a path, and how fast it is followed.
+    """Parameters of the path from waypoints, and of the motion along it.
 
     Attributes:
-        spacing: Way points nearer to the one before are left out; those more than twice as far
-            from it are joined to it by a straight line [m], 1e-4 to 1.
-        through: Whether the path leads by the way points, with an error of the fourth order of
-            their distance; otherwise it is smoother and cuts bends, which suits points by hand.
-        least_radius: Where the path would bend more sharply, the tool comes to rest at the point
-            before and goes on from there [m].
+        spacing: Least distance of waypoints; closer ones are skipped, and those at more than twice
+            the spacing are joined by a straight line [m], 1e-4 to 1.
+        through: Whether the path passes through the waypoints, with an error of fourth order in
+            their distance; otherwise it is smoother and cuts bends, which suits hand-drawn points.
+        least_radius: Least radius of curvature; where the path would bend more sharply, the tool
+            comes to rest at the previous waypoint and continues from there [m].
         velocity: Largest speed [m/s].
         acceleration: Largest acceleration along the path [m/s^2].
-        normal_acceleration: Largest acceleration across it, of the bends [m/s^2].
+        normal_acceleration: Largest centripetal acceleration [m/s^2].
         jerk: Largest jerk of the path at constant speed [m/s^3].
         bandwidth: Bandwidth of the lags that make the motion smooth enough for the law [1/s].
-        patience: Without a way point for so long the tool goes to the last one, to rest there [s].
-        lower: Smallest coordinates of way points [m], three; empty for no bound.
-        upper: Largest coordinates of way points [m], three; empty for no bound.
-        columns: How many control points are known at once, at least 20.
+        patience: Longest time without a waypoint; then the tool stops at the last one [s].
+        lower: Smallest coordinates of waypoints [m], three; empty for no bound.
+        upper: Largest coordinates of waypoints [m], three; empty for no bound.
+        columns: Number of control points in memory, at least 20.
     """
 
     spacing: Annotated[float, Range(0.0001, 1.0, "m")] = 0.01
@@ -51,5 +51,5 @@ class StreamParameters(Parameters):
 
     @property
     def limits(self) -> StreamLimits:
-        """How fast it goes along the path."""
+        """Limits of the motion along the path."""
         return StreamLimits(self.velocity, self.acceleration, self.bandwidth)

@@ -1,1 +1,1 @@
-"""Two sides that move each other over a channel: how they are coupled, and never give energy."""
+"""Teleoperation: passive couplings of two sides over a channel."""

@@ -1,4 +1,4 @@
-"""What a side of a teleoperation moves, as coordinates, and what does work on it."""
+"""Coordinates of the body that a side of a teleoperation moves, and their generalized forces."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,24 +13,24 @@ LINEAR, TURNING = slice(0, 3), slice(3, None)
 
 
 @dataclass(frozen=True)
-class Moved:
-    """Where something is, and how it came there.
+class PortMotion:
+    """Coordinates of a body and their change since the last tick.
 
     Attributes:
-        there: Coordinates since the start, shape (axes,) [m, rad].
-        step: By how much they have changed since the last tick, shape (axes,).
-        way: Displacement of that tick, which held forces do work along, shape (axes,) [m, rad].
-        after: What is remembered, by state.
+        coordinates: Coordinates since the start, shape (axes,) [m, rad].
+        step: Change of the coordinates since the last tick, shape (axes,).
+        displacement: Displacement since the last tick, conjugate to forces, shape (axes,) [m, rad].
+        states: States at the next tick by name.
     """
 
-    there: Any
+    coordinates: Any
     step: Any
-    way: Any
-    after: dict[str, Any]
+    displacement: Any
+    states: dict[str, Any]
 
 
-class MovedPoint:
-    """Three axes: a point, along the world's axes."""
+class PointCoordinates:
+    """Three axes: position of a point along the world axes."""
 
     axes = 3
 
@@ -39,31 +39,31 @@ class MovedPoint:
         self.states = {"origin": 3, "last": 3}
 
     def initial(self, u: Values) -> dict[str, Any]:
-        """Return what is remembered at the start."""
+        """Return the initial states."""
         return {"origin": u.position, "last": u.position}
 
-    def moved(self, x: Values, u: Values) -> Moved:
-        """Return where it is; if the input is no number, where it was."""
+    def motion(self, x: Values, u: Values) -> PortMotion:
+        """Return the motion; NaN or infinite inputs keep the last coordinates."""
         position = where(all_finite(u.position), u.position, x.last)
         step = position - x.last
-        after = {"origin": x.origin, "last": position}
-        return Moved(position - x.origin, step, step, after)
+        states = {"origin": x.origin, "last": position}
+        return PortMotion(position - x.origin, step, step, states)
 
-    def wrench(self, there: Any, force: Any) -> Any:
-        """Return what does the work of a force on the coordinates, shape (axes,) [N, Nm].
+    def wrench(self, coordinates: Any, force: Any) -> Any:
+        """Return the wrench of equal work for a force on the coordinates, shape (axes,) [N, Nm].
 
         Args:
-            there: Coordinates, shape (axes,).
-            force: On them, shape (axes,).
+            coordinates: Coordinates, shape (axes,).
+            force: Force on the coordinates, shape (axes,).
         """
         return force
 
 
-class MovedBody(MovedPoint):
-    """Six axes: a point, and how a body is turned.
+class BodyCoordinates(PointCoordinates):
+    """Six axes: position and rotation of a body.
 
-    The turn is the vector phi of ``R R_0'``, axis times angle, R_0 its orientation at the start:
-    coordinates that two sides agree in when they agree in R. It goes on beyond pi, up to 2 pi.
+    The rotation is the vector phi of ``R R_0'``, axis times angle, with R_0 the initial
+    orientation: two sides agree in it if they agree in R. It continues beyond pi, up to 2 pi.
     """
 
     axes = 6
@@ -74,22 +74,22 @@ class MovedBody(MovedPoint):
         self.states |= {"first_rows": 9, "last_rows": 9, "turn": 3}
 
     def initial(self, u: Values) -> dict[str, Any]:
-        """Return what is remembered at the start."""
+        """Return the initial states."""
         return super().initial(u) | {"first_rows": u.orientation, "last_rows": u.orientation}
 
-    def moved(self, x: Values, u: Values) -> Moved:
-        """Return where it is; if the input is no number, where it was."""
-        point = super().moved(x, u)
+    def motion(self, x: Values, u: Values) -> PortMotion:
+        """Return the motion; NaN or infinite inputs keep the last coordinates."""
+        point = super().motion(x, u)
         rows = where(all_finite(u.orientation), u.orientation, x.last_rows)
         R = matrix_of(rows)
         turn = nearest_turn(rotation_vector(R @ matrix_of(x.first_rows).T), x.turn)
-        return Moved(
-            ca.vertcat(point.there, turn),
+        return PortMotion(
+            ca.vertcat(point.coordinates, turn),
             ca.vertcat(point.step, turn - x.turn),
-            ca.vertcat(point.way, rotation_vector(R @ matrix_of(x.last_rows).T)),
-            point.after | {"first_rows": x.first_rows, "last_rows": rows, "turn": turn},
+            ca.vertcat(point.displacement, rotation_vector(R @ matrix_of(x.last_rows).T)),
+            point.states | {"first_rows": x.first_rows, "last_rows": rows, "turn": turn},
         )
 
-    def wrench(self, there: Any, force: Any) -> Any:
-        """Return what does the work of a force on the coordinates, shape (axes,) [N, Nm]."""
-        return ca.vertcat(force[LINEAR], moment_of(there[TURNING], force[TURNING]))
+    def wrench(self, coordinates: Any, force: Any) -> Any:
+        """Return the wrench of equal work for a force on the coordinates, (axes,) [N, Nm]."""
+        return ca.vertcat(force[LINEAR], moment_of(coordinates[TURNING], force[TURNING]))

@@ -1,4 +1,4 @@
-"""How leader and follower are coupled, and the numbers that keep them passive."""
+"""Parameters of the coupling between leader and follower, and of its passivity."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -13,13 +13,13 @@ COUPLINGS = ("waves", "position_force", "four_channel")
 
 @dataclass
 class PortTankParameters(Parameters):
-    """Energy that one side may give to what it moves, beyond what it got [J].
+    """Energy tank of one side: the energy that it may output beyond its input [J].
 
     Attributes:
-        capacity: Most that the tank holds [J].
-        initial: What it holds at the start [J]; where it holds less, the side damps what it moves.
-        refill: That damping, where the tank is empty [N s/m].
-        share: Share of what is above ``initial`` that a side sends on in a second [1/s]; with waves
+        capacity: Largest content of the tank [J].
+        initial: Initial content [J]; below it the side damps its motion.
+        refill: This damping at an empty tank [N s/m].
+        share: Share of the content above ``initial`` that a side sends per second [1/s]; with waves
             only while the other side lacks energy.
     """
 
@@ -36,13 +36,13 @@ class PortTankParameters(Parameters):
 
 @dataclass
 class RotationParameters(Parameters):
-    """How turns are coupled, three axes more, about those of the world.
+    """Coupling of rotations, three additional axes about the world axes.
 
     Attributes:
-        impedance: ``b`` of their waves [Nm s/rad].
-        stiffness: K of the other couplings [Nm/rad].
-        damping: D of the other couplings [Nm s/rad].
-        scale: How far the follower turns by the leader's turn.
+        impedance: Wave impedance ``b`` [Nm s/rad].
+        stiffness: Stiffness K of the other couplings [Nm/rad].
+        damping: Damping D of the other couplings [Nm s/rad].
+        scale: Rotation of the follower per rotation of the leader.
     """
 
     impedance: Positive = 1.0
@@ -53,25 +53,25 @@ class RotationParameters(Parameters):
 
 @dataclass
 class CouplingParameters(Parameters):
-    """How leader and follower are coupled, in lengths and forces of the follower.
+    """Coupling of leader and follower, in lengths and forces of the follower.
 
     Attributes:
         coupling: ``waves``: each side sends a wave, and no more energy than its own;
-            ``position_force``: the follower is drawn to where the leader is, the leader feels how
-            much; ``four_channel``: positions and felt forces go both ways.
-        passive: Whether no side gives energy that it has not got, whatever the channel does.
-        impedance: ``b`` of the waves [N s/m]; that of a follower that moves freely, its damping,
-            reflects none.
-        stiffness: K of the other couplings [N/m].
-        damping: D of the other couplings [N s/m].
-        force_share: Share of the other side's felt force, ``four_channel``.
-        motion_scale: How far the follower moves by the leader's way.
-        force_scale: What the leader feels of the follower's forces.
-        smoothing: Time constant [s] of each of two lags by which what arrives is taken over;
-            about half the jitter.
-        velocity_smoothing: Time constant [s] of the side's own velocity.
-        tank: What one side may give.
-        rotation: How turns are coupled; null for three axes.
+            ``position_force``: a spring draws the follower to the leader's position, the leader
+            feels its force; ``four_channel``: positions and measured forces in both directions.
+        passive: Whether each side is passive for any delay and loss in the channel.
+        impedance: Wave impedance ``b`` [N s/m]; no wave is reflected where it equals the damping
+            of the freely moving follower.
+        stiffness: Stiffness K of the other couplings [N/m].
+        damping: Damping D of the other couplings [N s/m].
+        force_share: Reflected share of the other side's measured force, ``four_channel``.
+        motion_scale: Motion of the follower per motion of the leader.
+        force_scale: Force at the leader per force at the follower.
+        smoothing: Time constant [s] of each of the two lags on the received signal; about half the
+            jitter.
+        velocity_smoothing: Time constant [s] of the filter on the side's own velocity.
+        tank: Energy tank of a side.
+        rotation: Coupling of rotations; null for three axes.
     """
 
     coupling: Annotated[str, OneOf(COUPLINGS)] = "waves"
@@ -94,9 +94,9 @@ class CouplingParameters(Parameters):
 
     @property
     def moment_scale(self) -> float:
-        """What the leader feels of the follower's moments.
+        """Moment at the leader per moment at the follower.
 
-        Work at the leader is then in one ratio to that at the follower, whatever turns or moves.
+        The ratio of work at leader and follower is then the same for rotation and translation.
         """
         turned = 1.0 if self.rotation is None else self.rotation.scale
         return self.force_scale * turned / self.motion_scale
@@ -106,7 +106,7 @@ class CouplingParameters(Parameters):
 
         Args:
             name: ``impedance``, ``stiffness`` or ``damping``; ``wave``: ``sqrt(2b)``; ``refill``:
-                damping where a tank is empty, for turns in the ratio of the impedances.
+                damping at an empty tank, for rotations in the ratio of the impedances.
         """
         if name == "wave":
             return ca.sqrt(2.0 * self.per_axis("impedance"))
@@ -120,15 +120,15 @@ class CouplingParameters(Parameters):
 
 @dataclass(frozen=True)
 class PortLimits(Parameters):
-    """What a port may count on, of what it moves.
+    """Limits of a port and of the body that it moves.
 
     Attributes:
-        force: Largest force that it gives [N].
-        speed: Largest speed of what it moves [m/s].
-        ticks_late: Ticks after which its force acts.
+        force: Largest force of the port [N].
+        speed: Largest speed of the body [m/s].
+        ticks_late: Number of ticks after which the force acts.
         period: Sampling time [s].
-        moment: Largest moment that it gives [Nm], where it turns something.
-        turning: Largest angular velocity of what it moves [rad/s].
+        moment: Largest moment of the port [Nm], with six axes.
+        turning: Largest angular velocity of the body [rad/s].
 
     Raises:
         InputError: If a number is out of range.
@@ -143,11 +143,11 @@ class PortLimits(Parameters):
 
     @property
     def reserve(self) -> float:
-        """Most energy that forces take which are given and still to act [J]."""
+        """Largest work of the commanded forces that are still to act [J]."""
         power = self.force * self.speed + self.moment * self.turning
         return power * self.period * (1 + self.ticks_late)
 
     @property
-    def pledged(self) -> float:
-        """What of the reserve forces may take that are given already, at least half of it [J]."""
+    def pending_reserve(self) -> float:
+        """Part of the reserve for forces commanded before, at least half of it [J]."""
         return self.reserve * max(0.5, self.ticks_late / (1 + self.ticks_late))

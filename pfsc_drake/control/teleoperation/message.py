@@ -1,10 +1,10 @@
-"""What two sides tell each other, at every tick, and in which order it stands."""
+"""Layout of the messages that two sides exchange at every tick."""
 
 import numpy as np
 
-# number of the message, from 1 on; what is followed; what is felt; energy that was given away; what
-# the tank lacks.
-# With three axes the last three of what is followed and felt are zero.
+# number of the message, from 1 on; signal to follow; measured force; energy sent; energy that the
+# tank lacks.
+# With three axes the last three components of signal and force are zero.
 _SIZES = {"count": 1, "signal": 6, "felt": 6, "energy": 1, "lack": 1}
 _ENDS = np.cumsum(list(_SIZES.values())).tolist()
 FIELDS = {

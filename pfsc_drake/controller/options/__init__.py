@@ -1,1 +1,1 @@
-"""What can be chosen of a controller; blocks of a scenario file are these."""
+"""Options of a controller; blocks of a scenario file."""

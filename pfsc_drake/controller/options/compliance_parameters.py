@@ -1,4 +1,4 @@
-"""How a tool yields to forces, and how those are known without a sensor."""
+"""Compliance of a tool with forces, and observation of forces without a sensor."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -16,10 +16,10 @@ from pfsc_drake.control.fixtures.fixture_parameters import RobotLimitParameters
 from pfsc_drake.yaml.rules import NotNegative, OneOf, Parameters, Positive
 
 SOURCES = ("sensor", "observed")
-# of what a hand feels: least and most mass, most damping, most stiffness, and their units
-_OF_PLACES = (1e-3, 1e4, 1e7, 1e9, "kg", "N s/m", "N/m")
-_OF_ANGLES = (1e-6, 1e4, 1e6, 1e8, "kg m^2", "Nm s/rad", "Nm/rad")
-_BOUNDS = {"tangential": _OF_PLACES, "transversal": _OF_PLACES, "rotational": _OF_ANGLES}
+# limits of an impedance: least and most mass, most damping, most stiffness, and their units
+_TRANSLATION = (1e-3, 1e4, 1e7, 1e9, "kg", "N s/m", "N/m")
+_ROTATION = (1e-6, 1e4, 1e6, 1e8, "kg m^2", "Nm s/rad", "Nm/rad")
+_BOUNDS = {"tangential": _TRANSLATION, "transversal": _TRANSLATION, "rotational": _ROTATION}
 
 
 @dc.dataclass
@@ -29,8 +29,8 @@ class ObservedForceParameters(Parameters):
     Attributes:
         rate: Rate of the observer [1/s].
         damping: Damping of the inverse of the Jacobian in singular postures.
-        force_dead_band: [N]; friction and model errors are taken for forces below it.
-        torque_dead_band: [Nm].
+        force_dead_band: Dead band of forces [N], for the effects of friction and model errors.
+        torque_dead_band: Dead band of torques [Nm].
     """
 
     rate: Positive = 100.0
@@ -41,21 +41,21 @@ class ObservedForceParameters(Parameters):
 
 @dc.dataclass
 class ComplianceParameters(Parameters):
-    """How the tool yields to measured forces (3.42), (3.44); what is not given stays rigid.
+    """Compliance of the tool with measured forces (3.42), (3.44); rigid by default.
 
     Attributes:
-        source: Where the forces come from: the ``sensor``, or ``observed`` from how the joints
-            move, for robots that can be moved at their links.
-        observed: How they are observed.
-        tangential: Tangential of eta.
-        transversal: Transversal of xi_1 and xi_2.
-        rotational: Rotational of the angles, three or those of the tool's axis; oriented paths
+        source: Source of the forces: the ``sensor``, or ``observed`` from the joint motion, for
+            backdrivable robots.
+        observed: Observer of the forces.
+        tangential: Impedance of eta.
+        transversal: Impedance of xi_1 and xi_2.
+        rotational: Impedance of the angles, three or those of the tool's axis; oriented paths
             only.
-        with_turning: Whether torques act along eta where the path's orientation turns.
-        press: With which force a tool presses on a surface, whose transversal coordinate has no
-            stiffness then. None without the block.
-        limits: How far the tool follows a hand along a path or a surface, to where the robot
-            itself cannot go on; in space see ``fixtures.limits``.
+        with_turning: Whether torques act along eta if the path's orientation turns.
+        press: Force reference normal to a surface, whose transversal coordinate then has no
+            stiffness. None without the block.
+        limits: Limits of the robot for hand guiding along a path or a surface; in space see
+            ``fixtures.limits``.
     """
 
     source: Annotated[str, OneOf(SOURCES)] = "sensor"
@@ -70,20 +70,20 @@ class ComplianceParameters(Parameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         for kind, bounds in _BOUNDS.items():
-            _require_bearable(kind, getattr(self, kind), *bounds)
+            _require_feasible(kind, getattr(self, kind), *bounds)
         stiffness = self.transversal.stiffness
         free = not stiffness.at and stiffness.value == 0.0
-        allowed = "null unless transversal.stiffness.value is 0, which lets the force decide"
+        allowed = "null unless transversal.stiffness.value is 0, as the force reference requires"
         require(self.press is None or free, "press", "given", allowed)
 
     @property
     def needs_sensor(self) -> bool:
-        """Whether anything yields to what a sensor measures."""
+        """Whether any coordinate complies with measured forces."""
         return self.is_given and self.source == "sensor"
 
     @property
     def is_given(self) -> bool:
-        """Whether any coordinate yields."""
+        """Whether any coordinate complies."""
         kinds = (self.tangential, self.transversal, self.rotational)
         return any(kind.stiffness.at or np.isfinite(kind.stiffness.value) for kind in kinds)
 
@@ -92,26 +92,26 @@ class ComplianceParameters(Parameters):
         return ImpedanceParameters(self.tangential, self.transversal, self.rotational)
 
 
-def _require_bearable(
+def _require_feasible(
     kind: str,
-    said: CoordinateImpedance,
+    impedance: CoordinateImpedance,
     lightest: float,
     heaviest: float,
     most_damped: float,
     stiffest: float,
     *units: str,
 ) -> None:
-    """Refuse numbers that are far from all that a hand feels; infinite stiffness is allowed."""
-    for number in said.mass.values or [said.mass.value]:
+    """Refuse values far from a feasible impedance; infinite stiffness is allowed."""
+    for number in impedance.mass.values or [impedance.mass.value]:
         require_between(f"{kind}.mass", number, lightest, heaviest, units[0])
-    damping = said.damping
+    damping = impedance.damping
     if isinstance(damping, SlowEnds):
         dampings = [damping.most]
     else:
         dampings = damping.values or [damping.value]
     for number in dampings:
         require_between(f"{kind}.damping", number, 0.0, most_damped, units[1])
-    for number in said.stiffness.values or [said.stiffness.value]:
+    for number in impedance.stiffness.values or [impedance.stiffness.value]:
         good = number <= stiffest or number == np.inf
         allowed = f"0 to {stiffest:g} {units[2]}, or .inf for position control"
         require(good, f"{kind}.stiffness", number, allowed)

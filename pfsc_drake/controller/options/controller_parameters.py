@@ -1,4 +1,4 @@
-"""Options of a law: gains, poles, forces that it is told of, and the posture of spare joints."""
+"""Options of a law: gains, poles, external forces, and the posture of redundant joints."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -29,31 +29,31 @@ _ELBOW_JOINTS = (2, 4, 6)
 class PostureParameters(Parameters):
     """Posture of a robot with more joints than the task has outputs.
 
-    The joints stay next to a posture reference as far as the outputs let them, with the poles of
-    ``controller.gains.<law>.posture``, by default those of ``xi``. The reference starts where the
-    joints start, and moves like a mass with damper and spring behind a filter that makes it
-    smooth enough for the law.
+    The joints follow a posture reference in the null space of the outputs, with the poles of
+    ``controller.gains.<law>.posture``, by default those of ``xi``. The reference starts at the
+    initial joint coordinates, and moves like a mass with damper and spring behind a filter that
+    makes it smooth enough for the law.
 
     Attributes:
         task: ``reference``: towards ``reference_deg``; ``limits``: away from the joints' limits;
-            ``conditioning``: to where the outputs are easy to move; ``elbow``: as
-            ``reference``, and the elbow's swivel angle stays that of the reference exactly.
-        reference_deg: Where the posture goes, one number per joint or one for all [deg], m for
-            slides; empty for where it starts.
-        weight: By what deviations of the joints are judged: ``identity``, all alike; ``inertia``,
-            the robot's; ``range``, in proportion to what the limits allow.
-        joint_weights: The same as one positive number per joint, or one for all; empty for
+            ``conditioning``: towards well-conditioned postures; ``elbow``: as ``reference``, with
+            the elbow's swivel angle exactly equal to its reference.
+        reference_deg: Goal of the posture, one number per joint or one for all [deg], m for slides;
+            empty for its start.
+        weight: Weight of deviations of the joints: ``identity``; ``inertia`` of the robot;
+            ``range``, relative to the ranges of the joints.
+        joint_weights: Weights, one positive number per joint, or one for all; empty for
             ``weight``.
         elbow_joints: Numbers of the joints whose origins are shoulder, elbow and wrist, the first
             joint being 1.
         inertia: Inertia of the posture in the null space, every joint [kg m^2 or kg].
-        damping: Damping of the same [Nm s/rad or N s/m].
+        damping: Damping of the posture [Nm s/rad or N s/m].
         stiffness: Stiffness of its spring [Nm/rad or N/m], or of the pull of ``limits`` and
-            ``conditioning``; 0 for a posture that stays where it is left.
-        filter_rate: Filter rate of the filter [rad/s].
-        yields: To which external torques it yields: ``none``; ``known``: those of all forces on
-            the robot; ``observed``: as they show in how the links move, without a sensor.
-        observer_rate: How fast torques are observed [rad/s].
+            ``conditioning``; 0 for none.
+        filter_rate: Rate of the filter [rad/s].
+        yields: External torques with which it complies: ``none``; ``known``: of all forces on the
+            robot; ``observed``: observed from the motion of the links, without a sensor.
+        observer_rate: Rate of the observer of torques [rad/s].
     """
 
     task: Annotated[str, OneOf(POSTURE_TASKS)] = "reference"
@@ -80,7 +80,7 @@ class PostureParameters(Parameters):
 
     @property
     def is_pulled(self) -> bool:
-        """Whether a potential pulls the posture, not a spring."""
+        """Whether a potential moves the posture, not a spring."""
         return self.task in ("limits", "conditioning")
 
 
@@ -94,17 +94,17 @@ class GainParameters(Parameters):
     """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
 
     Attributes:
-        poles: Real poles [1/s], r of them, or one number for r equal ones; ``auto`` to have them
-            chosen for a bandwidth: two slow ones for the convergence, faster ones for the
-            robustness. A run's resolved scenario names what was chosen.
-        bandwidth: Magnitude of the slow poles [1/s] that ``auto`` chooses.
-        bears: Relative error of masses and joint stiffnesses that poles chosen by ``auto`` bear.
-        free: Whether only its velocity is held, so that a hand leads it wherever it likes; then
-            there are r - 1 poles, or the coefficients ``a_2 .. a_r``. For ``eta`` and ``phi``.
+        poles: Real poles [1/s], r of them, or one number for r equal ones; ``auto`` chooses
+            them for a bandwidth: two slow ones for the convergence, faster ones for the
+            robustness. A run's resolved scenario lists the chosen poles.
+        bandwidth: Magnitude of the slow poles [1/s] with ``auto``.
+        bears: Relative error of masses and joint stiffnesses that poles by ``auto`` tolerate.
+        free: Whether only its velocity is controlled, for hand guiding; then there are r - 1
+            poles, or the coefficients ``a_2 .. a_r``. For ``eta`` and ``phi``.
         coefficients: ``a_1 .. a_r``, alternatively.
         integral: ``a_0``; needs coefficients.
-        integral_pole: With poles, one more pole [1/s] and with it an integral part, which takes
-            away what wrong masses leave at rest; 0 for none.
+        integral_pole: With poles, one more pole [1/s] and with it an integral part, which removes
+            the steady-state error of wrong masses; 0 for none.
     """
 
     poles: list[float] = dc.field(default_factory=list, metadata=AUTO_OR_MANY)
@@ -119,9 +119,9 @@ class GainParameters(Parameters):
         super().__post_init__()
         alone = self.integral_pole != 0.0 and bool(self.coefficients)
         require(not alone, "integral_pole", self.integral_pole, "0 with coefficients; see integral")
-        held = self.bandwidth or self.integral or self.integral_pole
+        fixes_position = self.bandwidth or self.integral or self.integral_pole
         require(
-            not (self.free and held),
+            not (self.free and fixes_position),
             "free",
             self.free,
             "false with bandwidth, integral or integral_pole, which hold a position",
@@ -141,12 +141,12 @@ class GainParameters(Parameters):
 
     @property
     def is_given(self) -> bool:
-        """Whether there are any."""
+        """Whether there are any gains."""
         return bool(self.poles or self.coefficients or self.bandwidth)
 
     @property
     def is_automatic(self) -> bool:
-        """Whether poles are to be chosen."""
+        """Whether poles are chosen automatically."""
         return self.bandwidth > 0.0 and not self.poles
 
 
@@ -157,9 +157,9 @@ class LawGains:
     Attributes:
         eta: Tangential.
         xi: Both transversal.
-        phi: Rotational; unused by arms that only position.
-        posture: Posture of the joints next to the posture reference, where there are more joints
-            than outputs; by default those of ``xi`` without their integral part.
+        phi: Rotational; unused without orientation.
+        posture: Joints about the posture reference of a redundant robot; by default the gains of
+            ``xi`` without their integral part.
     """
 
     eta: GainParameters = dc.field(default_factory=GainParameters)
@@ -169,7 +169,7 @@ class LawGains:
 
     @property
     def is_automatic(self) -> bool:
-        """Whether any poles are to be chosen."""
+        """Whether any poles are chosen automatically."""
         return any(gains.is_automatic for gains in (self.eta, self.xi, self.phi, self.posture))
 
     def __post_init__(self) -> None:
@@ -182,15 +182,15 @@ class LawGains:
 
 @dc.dataclass
 class ExternalTorqueParameters(Parameters):
-    """What the law knows of the external torques in the joints.
+    """External torques in the joints, as an input of the law.
 
     Attributes:
         source: ``none``: nothing; ``known``: from the wrench that acts on the tool;
-            ``measured``: from the force/torque sensor; ``observed``: from how the links move,
+            ``measured``: from the force/torque sensor; ``observed``: from the motion of the links,
             without a sensor.
         bandwidth: Bandwidth of the estimated derivatives, of which laws for elastic joints need one
-            or two, and of the torque itself [rad/s]; 0 for the torque as it is, without
-            derivatives, which only an observer cannot do.
+            or two, and of the torque itself [rad/s]; 0 for the unfiltered torque without
+            derivatives, except with an observer.
     """
 
     source: Annotated[str, OneOf(_TORQUE_SOURCES)] = "none"
@@ -207,41 +207,41 @@ STATES = ("measured", "from_torque", "observed")
 
 @dc.dataclass
 class ControllerParameters(Parameters):
-    """The path following controller.
+    """Parameters of the path following controller.
 
     Attributes:
-        law: Actuation model that the law is made for.
+        law: Actuation model of the law.
         gains: Gains by law.
         sampling_time: Sampling time ``T_s`` [s].
         boundary_layer_damping: Diagonal of ``epsilon D_b``, or one number for all joints [s], for
             ``singular_perturbation``.
         min_rcond: Smallest reciprocal condition number of the decoupling matrix.
         damped_below: Reciprocal condition number below which the joints' motion is damped, so
-            that a robot goes through singular postures off its path rather than stops; 0 for
-            never, else above ``min_rcond``.
+            that a robot moves through singular postures beside its path instead of stopping; 0
+            for never, else above ``min_rcond``.
         max_alpha: End of the feasible neighbourhood for the controller, below 1.
         max_beyond_end: Largest distance of the tool beyond an end of an open path [m]; a fault
             farther out.
         brake_damping: Damping of the safe state on every drive, as a fraction of its
             effort limit per rad/s.
         effort_scale: Fraction of the model's effort limits that the law may use.
-        manifold: ``path``: path following; ``trajectory``: classical tracking of a point
-            that moves along the path with time, for comparison; ``surface``: surface following;
-            ``space``: led freely by a hand, within fixtures.
-        external_torque: What it knows of forces on the tool.
-        model: What the controller takes the robot for, as ``robot.model``, or a YAML file with
-            robot parameters; empty for the plant's own. ``model_error`` comes on top.
-        friction: What it does about friction.
-        posture: What joints do that the task leaves free.
-        state: Where it has the links' side of elastic joints from: ``measured``; ``from_torque``,
-            by torque sensors in the joints; ``observed``, by the motors alone.
-        state_bandwidth: Bandwidth with which the links' motion and torques are observed [rad/s].
-        state_uncertainty: How well is known by what that is done, for a run's standard deviations.
-        delay: Until a torque acts that the law commands [s], a multiple of its sampling time, at
-            most 10 of it: it then acts on the state that its model foretells for that moment, with
-            velocities of the age of positions. Null for a law that takes what is measured.
+        manifold: ``path``: path following; ``trajectory``: classical trajectory
+            tracking along the path, for comparison; ``surface``: surface following; ``space``:
+            hand guiding within fixtures.
+        external_torque: External torques as an input of the law.
+        model: Nominal model of the robot, as ``robot.model``, or a YAML file with robot parameters;
+            empty for the model of the plant. ``model_error`` is added.
+        friction: Compensation of friction.
+        posture: Posture of redundant joints.
+        state: Source of the links' side of elastic joints: ``measured``; ``from_torque``, by torque
+            sensors in the joints; ``observed``, by the motors alone.
+        state_bandwidth: Bandwidth of the observed motion and torques of the links [rad/s].
+        state_uncertainty: Uncertainty of its parameters, for a run's standard deviations.
+        delay: Delay of the commanded torques [s], a multiple of the sampling time, at most 10 of
+            it: the law then acts on the state that its model predicts for that time, with
+            velocities of the age of positions. Null for a law without prediction.
         torque_lead: With the law ``rigid``: whether torques are extrapolated from the last two
-            ticks to the middle of that for which they are held, as those of the elastic laws are.
+            samples to the middle of their hold interval, as with the elastic laws.
     """
 
     law: Annotated[str, OneOf(LAWS)] = "elastic"
@@ -269,15 +269,17 @@ class ControllerParameters(Parameters):
 
     @property
     def law_record(self) -> Law:
-        """What follows from the choice of the law."""
+        """Properties of the chosen law."""
         return LAWS[self.law]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        allowed = "false but with the law 'rigid'; the elastic laws lead their torques anyway"
+        allowed = (
+            "false except with the law 'rigid'; the elastic laws always extrapolate their torques"
+        )
         require(self.law_record.can_lead or not self.torque_lead, "torque_lead", True, allowed)
         for law in self.gains:
-            require_one_of("gains", law, LAWS)
+            require_one_of(f"gains.{law}", law, LAWS)
         good = self.damped_below == 0.0 or self.min_rcond < self.damped_below < 1.0
         allowed = f"0, or above min_rcond = {self.min_rcond:g} and below 1"
         require(good, "damped_below", self.damped_below, allowed)

@@ -1,4 +1,4 @@
-"""Options of a whole controller, of its faults, and of regions that a led tool stays out of."""
+"""Options of a complete controller, its faults, and virtual fixtures of hand guiding."""
 
 import dataclasses as dc
 from collections.abc import Callable, Sequence
@@ -10,7 +10,7 @@ from pfsc_drake.control.compliance.tuned_impedance import REQUESTS, TuningParame
 from pfsc_drake.control.fixtures.fixture_parameters import GuidanceParameters, RobotLimitParameters
 from pfsc_drake.control.law.swing import Swing
 from pfsc_drake.control.law.timed_reference import StreamLimits
-from pfsc_drake.control.obstacles.elbow_room import ElbowParameters
+from pfsc_drake.control.obstacles.elbow_clearance import ElbowParameters
 from pfsc_drake.control.obstacles.shapes import ObstacleShape
 from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.controller.extension import Extension
@@ -29,7 +29,7 @@ class BrakeParameters(Parameters):
     Attributes:
         torque: Holding torque [Nm, joint side; or N], one for all or of every joint; empty for
             the drive's limit.
-        delay: From the request until they hold [s].
+        delay: Time from the request until they hold [s].
     """
 
     torque: NotNegatives = dc.field(default_factory=list, metadata=ONE_OR_MANY)
@@ -38,25 +38,24 @@ class BrakeParameters(Parameters):
 
 @dc.dataclass
 class FaultParameters(Parameters):
-    """What is a fault beside what every law takes for one, and what happens then.
+    """Faults beyond those of every law, and the response to them.
 
     Attributes:
-        plausibility: By how much positions and integrated velocities of a joint may differ until
-            they are not believed [rad or m], see
-            :class:`~pfsc_drake.control.law.supervision.Supervision`; 0 to believe everything.
+        plausibility: Largest plausible difference of position and integrated velocity of a joint
+            [rad or m], see :class:`~pfsc_drake.control.law.supervision.Supervision`; 0 for no
+            check.
         joint_limits: Whether a joint at its limit is a fault.
-        overspeed: Share of its largest speed by which a joint may be faster until it is a fault;
-            ``.inf`` if no speed is.
-        saturation_time: How long a drive may be at its limit [s], half of the time that it is not
-            being taken off; 0 for ever, null for 0.2 s where the law commands torques, and for
-            ever where it commands velocities.
-        chatter_turns: How many times a drive may turn from one limit to the other, fewer being
-            forgotten with 0.2 s; 0 for any number.
-        hold_bandwidth: Hold bandwidth of the position hold after a fault [rad/s].
-        effort_share: Part of the drives' limits that braking is planned with, up to 1.
-        brakes: Holding brakes, which are requested after a stop, and earlier where nothing is
-            measured of a joint (``stop_category``); ``null`` for a robot without, whose drives
-            hold it.
+        overspeed: Tolerated excess of a joint's largest speed, as a share of it; ``.inf`` for no
+            limit.
+        saturation_time: Longest time of a drive at its limit [s], minus half of the time that it is
+            not; 0 for no limit, null for 0.2 s if the law commands torques, and for no limit if it
+            commands velocities.
+        chatter_turns: Largest number of changes of a drive from one limit to the other, forgotten
+            with a time constant of 0.2 s; 0 for any number.
+        hold_bandwidth: Bandwidth of the position hold after a fault [rad/s].
+        effort_share: Share of the drives' limits for planned braking, up to 1.
+        brakes: Holding brakes, requested after a stop, and earlier without any measurement of a
+            joint (``stop_category``); ``null`` for a robot without brakes, held by its drives.
     """
 
     plausibility: NotNegative = 2e-3
@@ -69,39 +68,39 @@ class FaultParameters(Parameters):
     brakes: BrakeParameters | None = dc.field(default_factory=BrakeParameters)
 
 
-# at a sample, so that a region that comes near is found beside those that are
-_FEWEST_LOOKS = 2
+# at a sample, so that an approaching region is found beside the near ones
+_FEWEST_EVALUATIONS = 2
 
 
 @dc.dataclass
 class FixtureOptions(Parameters):
-    """What limits a tool that is led through space.
+    """Limits of hand guiding through space.
 
     Attributes:
-        guidance: How it is kept out of regions.
-        limits: How far it follows a hand to where the robot itself cannot go on.
+        guidance: Parameters of the forbidden regions.
+        limits: Limits of the robot.
         smoothing: Time constant [s] of each of the r - 1 lags that make the reference smooth
-            enough for laws that give torques.
-        looks: Most distances that are computed at a tick beside those of regions that are near;
-            0 for as many as are due, else 2 or more.
+            enough for laws that command torques.
+        looks: Largest number of distance evaluations in a sample beside those of near regions; 0
+            for all that are due, else 2 or more.
     """
 
     guidance: GuidanceParameters = dc.field(default_factory=GuidanceParameters)
     limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
     smoothing: Annotated[float, Range(0.001, 0.1, "s")] = 0.003
     looks: Annotated[
-        int, Range(_FEWEST_LOOKS, besides=0, words=f"0, or {_FEWEST_LOOKS} and more")
+        int, Range(_FEWEST_EVALUATIONS, besides=0, words=f"0, or {_FEWEST_EVALUATIONS} and more")
     ] = 0
 
 
 @dc.dataclass
 class ObstacleOptions(Parameters):
-    """Obstacles that progress along a path waits for.
+    """Obstacles for which the motion along a path waits.
 
     Attributes:
-        shapes: What they look like.
-        watch: How progress waits for them.
-        elbow: How the elbow of an arm with joints to spare avoids them; it does not if omitted.
+        shapes: Shapes of the obstacles.
+        watch: Parameters of the waiting motion.
+        elbow: Avoidance by the elbow of a redundant arm; none if omitted.
     """
 
     shapes: Annotated[list[ObstacleShape], Count(1)]
@@ -130,47 +129,47 @@ class OperatorOptions:
         return {"impedance_request": REQUESTS} | switches
 
 
-# 1/s, of poles that nobody chooses
+# 1/s, default of poles
 BANDWIDTH = 20.0
 
 
 @dc.dataclass
 class FollowerOptions:
-    """What can be chosen of a path or surface following controller.
+    """Options of a path or surface following controller.
 
     Attributes:
         bandwidth: Bandwidth of the error dynamics [1/s], for coordinates without gains of their
-            own; their poles are chosen by it, see :class:`GainParameters`.
-        controller: Gains, limits, friction, forces, posture, sampling time. Its law is the one
-            that the controller is added with.
-        faults: What is a fault.
-        friction: Coefficients f_c and f_v of the drives that are believed, each (N,).
-        posture: From where the posture at the start is looked for, shape (N,) [rad or m]; the
-            middle of the joints' limits if omitted.
-        transition: How long the reference takes from where the tool is at the start to the motion
-            that is wanted [s]; 0 for no such transition.
-        compliance: How the tool yields to a hand or to what it touches; by default not at all.
-        override: Whether there is a port for the pace of the motion, see :class:`TimedReference`.
-        stream: How fast the tool goes along a path to way points that come while it moves, by a
-            port of their own, in place of a motion over time; None for the latter.
-        obstacles: What progress along a path waits for: there is a port for where it is, and with
-            ``override`` the pace that is asked for is from 0 to 1. None for nothing.
-        measures: What is measured: ``plant_state``, the state ``[q, v]`` of the plant, or
+            own, see :class:`GainParameters`.
+        controller: Gains, limits, friction, forces, posture, sampling time. Its law is the law
+            of the call.
+        faults: Parameters of faults.
+        friction: Nominal coefficients f_c and f_v of the drives, each (N,).
+        posture: Initial guess of the posture at the start, shape (N,) [rad or m]; the middle of the
+            joints' limits if omitted.
+        transition: Duration of the transition of the reference from the start of the tool to the
+            desired motion [s]; 0 for none.
+        compliance: Compliance of the tool with an operator or the environment; rigid by default.
+        override: Whether there is a port for the speed scaling of the motion, see
+            :class:`TimedReference`.
+        stream: Limits of the motion along a path to received waypoints, with a port of their own,
+            in place of a motion over time; None for the latter.
+        obstacles: Obstacles for which the motion waits, with a port for their positions; with
+            ``override`` the requested speed scaling is from 0 to 1. None for no obstacles.
+        measures: Measured signals: ``plant_state``, the state ``[q, v]`` of the plant, or
             ``joint_state``, ``[q_J, v_J, q_M, v_M]``.
-        frame: Of a path or surface that moves: the pose of its frame at the start, ``[p_WC, R_WC
-            by rows]``, shape (12,) [m, 1]; there is a port for the motion then. None if it rests.
+        frame: Pose of the frame of a moving path or surface at the start, ``[p_WC, R_WC by rows]``,
+            shape (12,) [m, 1]; there is a port for its motion then. None if it rests.
         swings: Oscillations of the manifold along its normals (5.1), (5.2).
-        reference: What the motion may take of the drives: where it takes more it is slowed, or
-            there is a warning; or it is made as fast as they allow. None to leave it as it is.
+        reference: Limits of the motion by the drives: beyond them it is slowed, or there is a
+            warning; or it is planned as fast as they allow. None for an unlimited motion.
         operator: Settings of an operator, by ports of their own; none if omitted.
-        stop_request: Whether there is a port that stops the robot at any value but 0.
-        carries: Whether there is a port for the motion of the joints, ``joint_jet``, of a robot
-            that carries a workpiece.
-        known_forces: Names of the inputs with forces that are known, of ``wrench_ext`` (on the
+        stop_request: Whether there is a port that stops the robot at any value except 0.
+        carries: Whether there is a port for the joint motion, ``joint_jet``, of a workpiece robot.
+        known_forces: Names of the inputs with known forces: ``wrench_ext`` (on the
             tool point, world axes, shape (6,) [N, Nm]) and ``push_torque`` (of forces on links,
-            shape (N,) [Nm or N]); None to take the port ``wrench`` for known as for measured ones.
-        frame_motion: Returns the planned motion of the frame that carries the manifold, ``[p_WC,
-            R_WC by rows]`` over time, with which the demand on the drives is planned.
+            shape (N,) [Nm or N]); None to use the port ``wrench`` for known and measured forces.
+        frame_motion: Returns the planned motion of the manifold's frame, ``[p_WC, R_WC by rows]``
+            over time, for the plan of the demand on the drives.
         extensions: Further blocks, such as the compensation of a tool behind a force sensor.
     """
 

@@ -1,4 +1,4 @@
-"""What the controller does about friction."""
+"""Parameters of friction and of its compensation."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -22,7 +22,7 @@ _VELOCITIES = ("measured", "reference")
 
 
 _PRESLIDING = 1e-7, 0.1  # rad or m
-_LARGEST = 1e9  # of friction; what it multiplies stays within a float
+_LARGEST = 1e9  # of friction; products with it stay within a float
 
 
 @dc.dataclass
@@ -32,12 +32,12 @@ class JointFrictionParameters(Parameters):
     Attributes:
         f_c: Coulomb friction of every joint, or one number for all [Nm or N].
         f_v: Viscous friction of every joint, or one number for all [Nm s/rad or N s/m].
-        file: Instead, name of a shipped robot or YAML file with robot parameters, whose
-            friction of the first joints is taken.
-        drift: How it changes during the run; null for not at all.
+        file: Instead, name of a shipped robot or YAML file with robot parameters; the
+            friction of its first joints applies.
+        drift: Change of the friction during the run; null for none.
         presliding: Displacement at which a stuck drive begins to slide, of every joint or one
-            number for all [rad or m]; empty for the least that steps of 1 ms can integrate.
-            Gears have 1 to 1000 urad.
+            number for all [rad or m]; empty for the smallest value for steps of 1 ms. Gears have
+            1 to 1000 urad.
     """
 
     f_c: Annotated[list[float], Numbers(each=Range(0.0, _LARGEST))] = dc.field(
@@ -54,8 +54,8 @@ class JointFrictionParameters(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = bool(self.f_c or self.f_v)
-        require(not (self.file and given), "file", self.file, "either file, or f_c and f_v")
+        has_values = bool(self.f_c or self.f_v)
+        require(not (self.file and has_values), "file", self.file, "either file, or f_c and f_v")
 
     @property
     def is_given(self) -> bool:
@@ -65,22 +65,22 @@ class JointFrictionParameters(Parameters):
 
 @dc.dataclass
 class KalmanParameters(Parameters):
-    """The friction Kalman filter, see :class:`FrictionKalmanFilter`.
+    """Parameters of the friction Kalman filter, see :class:`FrictionKalmanFilter`.
 
-    Numbers of the same kind are one for all joints or one per joint.
+    Lists have one number for all joints or one per joint.
 
     Attributes:
-        intervals: ``mean``: what happens in a sampling interval enters by its mean; ``begin``:
-            by its value at the beginning, as printed in (A.5).
-        start: First estimates of f_c and f_v, as a fraction of what is believed.
+        intervals: ``mean``: mean values over a sampling interval; ``begin``: values at its begin,
+            as printed in (A.5).
+        start: Initial estimates of f_c and f_v, as a fraction of the nominal ones.
         momentum_noise: Variance that the momentum gains per sample [(Nm s)^2].
         coulomb_noise: Variance that f_c gains per sample [Nm^2]; empty for the square of a
-            thousandth of what is believed.
+            thousandth of the nominal f_c.
         viscous_noise: Variance that f_v gains per sample [(Nm s/rad)^2]; likewise.
         measurement_noise: Variance of a measured momentum [(Nm s)^2].
         initial_variance: Initial variance of all states at the start.
-        resting_velocity: Magnitude below which a drive counts as stuck and teaches nothing
-            [rad/s or m/s]; ``intervals: mean`` only.
+        resting_velocity: Magnitude below which a drive counts as stuck, without a correction of
+            its estimates [rad/s or m/s]; ``intervals: mean`` only.
     """
 
     intervals: Annotated[str, OneOf(("mean", "begin"))] = "mean"
@@ -100,26 +100,26 @@ class KalmanParameters(Parameters):
 
 @dc.dataclass
 class FrictionCompensationParameters(Parameters):
-    """Friction that the drive torques overcome, (2.42), (3.29), (3.58), (3.65).
+    """Friction compensation by the drive torques, (2.42), (3.29), (3.58), (3.65).
 
-    What is believed of it is what the plant has, unless ``believed`` says otherwise. Nothing of
-    it is used with the law ``velocity_servo``.
+    The nominal friction is the friction of the plant, unless ``believed`` is not empty. The law
+    ``velocity_servo`` does not use it.
 
     Attributes:
-        source: ``none``; ``model``: Coulomb and viscous friction as believed; ``observer``: what
-            an observer makes of how the joints move.
-        velocity: On which friction with known coefficients acts: ``measured``, or the
-            ``reference`` velocity of the joints, which has no noise but is a tick old.
+        source: ``none``; ``model``: nominal Coulomb and viscous friction; ``observer``: friction
+            observed from the motion of the joints.
+        velocity: Velocity for friction with known coefficients: ``measured``, or the ``reference``
+            velocity of the joints, without noise but a sample late.
         smoothing: Velocity around zero over which Coulomb friction changes its sign [rad/s or
             m/s].
         observer: ``disturbance``: of first order, the torque without a model of friction;
             ``kalman``: of the coefficients.
         rate: L of the disturbance observer [1/s].
         kalman: The friction Kalman filter.
-        watched: Whether the observer runs beside ``none`` or ``model``, only to be logged.
-        believed: Coefficients that are believed.
-        hold_at_rest: Whether drives that stick get constant torques while the reference rests, see
-            :class:`RestHold`; with ``none`` they do not.
+        watched: Whether the observer also runs with ``none`` or ``model``, for the log only.
+        believed: Nominal coefficients.
+        hold_at_rest: Whether sticking drives get constant torques while the reference rests, see
+            :class:`RestHold`; not with ``none``.
     """
 
     source: Annotated[str, OneOf(_SOURCES)] = "none"
@@ -134,26 +134,28 @@ class FrictionCompensationParameters(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        told = self.velocity == "measured" or self.source == "none" or self.has_coefficients
-        allowed = "measured; the disturbance observer knows no friction that acts on a velocity"
-        require(told, "velocity", self.velocity, allowed)
+        is_possible = self.velocity == "measured" or self.source == "none" or self.has_coefficients
+        allowed = "measured; the disturbance observer has no model of friction by velocity"
+        require(is_possible, "velocity", self.velocity, allowed)
         drift = self.believed.drift
-        require(drift is None, "believed.drift", drift, "null; what is believed does not drift")
+        require(drift is None, "believed.drift", drift, "null; nominal friction does not drift")
         bristles = self.believed.presliding
-        require(not bristles, "believed.presliding", bristles, "empty; it is not compensated")
+        require(
+            not bristles, "believed.presliding", bristles, "empty; presliding is not compensated"
+        )
 
     @property
     def is_given(self) -> bool:
-        """Whether anything is done about friction, or an observer of it is watched."""
+        """Whether friction is compensated, or an observer of it is logged."""
         return self.source != "none" or self.watched
 
     @property
     def has_coefficients(self) -> bool:
-        """Whether what is compensated is friction with coefficients."""
+        """Whether friction is compensated by coefficients."""
         kalman = self.source == "observer" and self.observer == "kalman"
         return kalman or self.source == "model"
 
     @property
     def needs_reference_velocity(self) -> bool:
-        """Whether the law has to tell the velocities that the reference asks for."""
+        """Whether the law must output the joint velocities of the reference."""
         return self.velocity == "reference" and self.has_coefficients

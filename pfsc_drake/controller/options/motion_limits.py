@@ -1,4 +1,4 @@
-"""How a motion is adapted to the drives."""
+"""Limits of a motion by its drives."""
 
 import dataclasses as dc
 from typing import Annotated
@@ -11,29 +11,29 @@ from pfsc_drake.yaml.rules import OneOf, Parameters, Range
 _LIMITS = ("respect", "warn")
 _SPEEDS = ("asked", "fastest")
 _VELOCITY = 0.1  # m/s
-# beyond, durations have no digits left, or none at all
+# beyond, durations lose their digits
 VELOCITY = Range(1e-6, 1e3, "m/s, a positive number")
 ACCELERATION = Range(1e-6, 1e6, "m/s^2, a positive number")
-# samples of a motion whose largest rates are looked for, and the least of these [m/s, m/s^2]
+# samples of a motion for its largest rates, and the smallest rates [m/s, m/s^2]
 _SAMPLES, _SLOWEST = 2001, 1e-6
 
 
 @dc.dataclass(kw_only=True)
 class MotionLimits(Parameters):
-    """What a motion may take of the drives.
+    """Limits of a motion by the drives.
 
     Attributes:
         velocity: Largest velocity [m/s]; None for 0.1, and with ``speed`` = ``fastest`` for any.
-        acceleration: Largest acceleration [m/s^2]; with ``fastest`` the drives decide.
+        acceleration: Largest acceleration [m/s^2]; with ``fastest`` the drives limit it.
         dwell: Rest before, between and after the moves [s].
-        limits: ``respect``: where the drives, by the nominal model, could not follow, the motion is
-            slowed; ``warn``: there is a warning.
-        reserve: Share of the drives' torques, and of the speeds of velocity servos, that the motion
-            leaves, from 0 to below 1.
-        speed: ``asked``: as velocity and acceleration say; ``fastest``: in the least time in which
-            the drives can follow, all but the reserve.
-        torque_rate: With ``fastest`` the largest rate of the drives' torques [Nm/s], of strong ones
-            ten times their largest torque in a second; infinite for any.
+        limits: ``respect``: the motion is slowed beyond the nominal limits of the drives; ``warn``:
+            there is a warning.
+        reserve: Reserved share of the drives' torques, and of the speeds of velocity servos, from 0
+            to below 1.
+        speed: ``asked``: by velocity and acceleration; ``fastest``: the shortest motion within the
+            limits of the drives, minus the reserve.
+        torque_rate: With ``fastest`` the largest rate of the drives' torques [Nm/s], of strong
+            drives ten times their largest torque in a second; infinite for any.
     """
 
     velocity: Annotated[float, VELOCITY] | None = None
@@ -46,16 +46,16 @@ class MotionLimits(Parameters):
 
     @property
     def largest_velocity(self) -> float:
-        """Largest velocity of a motion as it is asked for [m/s]."""
+        """Largest velocity of the requested motion [m/s]."""
         return _VELOCITY if self.velocity is None else self.velocity
 
 
 def limits_of(motion: PiecewisePolynomialCurve, limits: MotionLimits) -> MotionLimits:
-    """Return limits with the velocity and the acceleration of a motion as it is asked for.
+    """Return limits with the velocity and the acceleration of a requested motion.
 
     Args:
         motion: Tangential coordinates over time [m].
-        limits: The limits; those of a fastest motion stay as they are.
+        limits: The limits; limits of a fastest motion do not change.
     """
     if limits.speed == "fastest":
         return limits

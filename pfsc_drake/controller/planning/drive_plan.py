@@ -1,4 +1,4 @@
-"""A motion's demand on the drives, as it is planned."""
+"""Planned demand of a motion on the drives."""
 
 from dataclasses import dataclass
 
@@ -7,39 +7,39 @@ import numpy as np
 from pfsc_drake.control.planning.limiting import Limiting
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 
-# of what drives can do, the largest share that a faster motion may ask for
+# largest share of the drive limits that a faster motion may use
 _USED = 0.95
 
 
 @dataclass(frozen=True)
 class DrivePlan:
-    """What a reference asks of the drives, as it is believed.
+    """Demand of a reference on the drives, by the nominal model.
 
     Attributes:
-        times: Times of the samples, in the time of the reference that is followed [s], (samples,).
-        demand: Torques [Nm or N] and joint speeds [rad/s or m/s] that it asks for, (samples, 2N).
-        asked: The same of the reference that was asked for, at the same places.
-        limits: What is believed of the drives, (2N,).
-        pace: Speed in units of the one that was asked for, (samples,).
-        motion: The reference that is followed: the one asked for where that fits.
-        said: What there is to say, one sentence each.
-        limiting: Which limits it is at, if it is the fastest.
+        times: Times of the samples, in the time of the followed reference [s], (samples,).
+        demand: Torques [Nm or N] and joint speeds [rad/s or m/s] that it needs, (samples, 2N).
+        requested_demand: The same of the requested reference, at the same points of the path.
+        limits: Nominal limits of the drives, (2N,).
+        speed_scaling: Speed as a share of the requested one, (samples,).
+        motion: Followed reference: the requested one where that fits.
+        messages: Messages, one sentence each.
+        limiting: Active limits, if it is the fastest motion.
     """
 
     times: np.ndarray
     demand: np.ndarray
-    asked: np.ndarray
+    requested_demand: np.ndarray
     limits: np.ndarray
-    pace: np.ndarray
+    speed_scaling: np.ndarray
     motion: PiecewisePolynomialCurve
-    said: list[str]
+    messages: list[str]
     limiting: Limiting | None = None
 
-    def fastest_pace(self, relative_degree: int) -> float:
-        """Return how many times as fast the motion may be made, at least 1.
+    def largest_scaling(self, relative_degree: int) -> float:
+        """Return the largest speed scaling of the motion, at least 1.
 
-        Speeds grow with the pace, torques with its square at most, those of elastic joints with its
-        power r.
+        Speeds grow with the scaling, torques at most with its square, torques of elastic joints
+        with its power r.
 
         Args:
             relative_degree: r of the law.
@@ -47,8 +47,8 @@ class DrivePlan:
         if not len(self.demand):
             return 1.0
         most = np.abs(self.demand).max(axis=0)
-        room = np.where(most > 0.0, _USED * self.limits / np.maximum(most, 1e-12), np.inf)
-        torques, speeds = np.split(room, 2)
+        factor = np.where(most > 0.0, _USED * self.limits / np.maximum(most, 1e-12), np.inf)
+        torques, speeds = np.split(factor, 2)
         power = 1.0 / max(relative_degree, 2)
         return float(max(1.0, min((torques**power).min(), speeds.min())))
 
@@ -59,10 +59,11 @@ class DrivePlan:
 
     @property
     def waiting_time(self) -> float:
-        """How much longer the motion takes than was asked for [s]."""
-        return float(np.sum(np.diff(self.times) * (1.0 - (self.pace[1:] + self.pace[:-1]) / 2.0)))
+        """Extension of the motion beyond the requested duration [s]."""
+        scaling = self.speed_scaling
+        return float(np.sum(np.diff(self.times) * (1.0 - (scaling[1:] + scaling[:-1]) / 2.0)))
 
     @property
     def is_slowed(self) -> bool:
-        """Whether the reference is not the one that was asked for."""
-        return bool(np.any(self.pace < 1.0))
+        """Whether the reference is slower than the requested one."""
+        return bool(np.any(self.speed_scaling < 1.0))

@@ -1,4 +1,4 @@
-"""What a task's motion asks of the drives, as they are believed."""
+"""Demand of the motions of a task on the drives, by the nominal model."""
 
 from collections.abc import Callable
 
@@ -9,11 +9,15 @@ from pfsc_drake.control.planning.drive_demand import (
     DriveDemand,
     DriveLimits,
     allowed_demand,
-    with_pace,
+    apply_scaling,
 )
-from pfsc_drake.control.planning.joint_course import CourseError, CourseFinder, CourseStart
-from pfsc_drake.controller.believed import Coefficients
+from pfsc_drake.control.planning.joint_trajectory import (
+    TrajectoryError,
+    TrajectoryFinder,
+    TrajectoryStart,
+)
 from pfsc_drake.controller.fault_description import describe_singularity
+from pfsc_drake.controller.nominal_robot import Coefficients
 from pfsc_drake.controller.options.follower_options import FollowerOptions
 from pfsc_drake.controller.tasks.task import Task
 from pfsc_drake.geometry import PiecewisePolynomialCurve
@@ -24,27 +28,26 @@ from pfsc_drake.yaml.fields import spread
 
 # share of joint speeds that is left where torques are commanded
 _SPEED_RESERVE = 0.05
-# of singular values of the tool's Jacobian: below, a singular place is the posture's fault
+# of singular values of the tool's Jacobian: below, the posture is the cause of a singularity
 _SINGULAR = 0.02
 
 
 class MotionDemand:
-    """What the motions of one task ask of one robot.
+    """Demand of the motions of one task on the drives of one robot.
 
     Args:
-        options: Options of the controller; ``reference`` says what a motion leaves of the drives.
-        task: What the tool is to do.
-        law: The law that does it.
-        start: Where the robot starts, near the first place of the reference.
-        friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
-            are believed.
-        carrier: ``[p_WC, R_WC by rows]`` over time of the frame that carries the task's manifold,
-            if one does; at rest at the ends.
+        options: Options of the controller; ``reference`` has the reserve of the drives.
+        task: Task of the tool.
+        law: Its law.
+        start: Start of the robot, near the first point of the reference.
+        friction: Coefficients f_c and f_v of the nominal model, each (N,), if there are any.
+        carrier: ``[p_WC, R_WC by rows]`` over time of the moving frame of the task's manifold, if
+            there is one; at rest at the ends.
 
     Attributes:
-        robot: The robot as it is believed, N joints.
-        demand: What a motion of its joints asks for.
-        limits: What drives can do: torques, then speeds, shape (2N,).
+        robot: Nominal model of the robot, N joints.
+        demand: Demand of a joint motion on the drives.
+        limits: Limits of the drives: torques, then speeds, shape (2N,).
     """
 
     def __init__(
@@ -52,7 +55,7 @@ class MotionDemand:
         options: FollowerOptions,
         task: Task,
         law: FollowingLaw,
-        start: CourseStart,
+        start: TrajectoryStart,
         friction: Coefficients | None,
         carrier: PiecewisePolynomialCurve | None = None,
     ) -> None:
@@ -67,8 +70,8 @@ class MotionDemand:
         self.demand = DriveDemand(
             self.robot, controller.law, f_v, np.array(damping) if damping else None
         )
-        found = task.place, task.evaluate, law.inverse, law.posture
-        self._finder = CourseFinder(self.robot, *found, carried=carrier is not None)
+        found = task.projected_manifold, task.evaluate, law.inverse, law.posture
+        self._finder = TrajectoryFinder(self.robot, *found, in_moving_frame=carrier is not None)
         effort = self.robot.gather("effort_limit") * controller.effort_scale
         effort = np.maximum(effort - f_c, 1e-3 * effort)
         speed = largest_speeds(self.robot)
@@ -80,10 +83,10 @@ class MotionDemand:
     @property
     def motion(self) -> PiecewisePolynomialCurve:
         """Motion that is planned."""
-        assert self._task.motion is not None  # else a hand guides the tool, or waypoints come
+        assert self._task.motion is not None  # otherwise guided or streamed
         return self._task.motion
 
-    def course_of(
+    def trajectory_of(
         self,
         motion: PiecewisePolynomialCurve,
         step: float,
@@ -91,70 +94,72 @@ class MotionDemand:
         still: bool,
         added: Callable[[np.ndarray], np.ndarray] | None = None,
     ) -> tuple[float, np.ndarray]:
-        """Return the joints' course on an even grid of a motion's time, and its step [s].
+        """Return the joint trajectory on an even grid of a motion's time, and its step [s].
 
         Args:
             motion: Tangential coordinates over time.
-            step: From sample to sample at most [s].
+            step: Largest step of the grid [s].
             still: Whether joints beyond the outputs only move with them, as little as they can.
             added: Derivatives 0..r that are added to those of the reference at times [s], shape
                 (samples, r + 1, m), if any are.
 
         Raises:
-            CourseError: If the joints cannot follow; says where.
+            TrajectoryError: If the joints cannot follow; says where.
         """
-        times, reference = self._sampled(motion, step)
+        times, reference = self._sample(motion, step)
         if added is not None:
             reference += added(times)
         frames = self._frames(times)
         try:
-            course = self._finder.find(self._start, reference, times, still=still, frames=frames)
-        except CourseError as error:
-            raise self._located(error, motion, float(times[1])) from None
-        return float(times[1]), self._continued(course, times[1])
+            trajectory = self._finder.find(
+                self._start, reference, times, still=still, frames=frames
+            )
+        except TrajectoryError as error:
+            raise self._locate(error, motion, float(times[1])) from None
+        return float(times[1]), self._extend(trajectory, times[1])
 
     def may_be_singular(
-        self, motion: PiecewisePolynomialCurve, step: float, course: np.ndarray
+        self, motion: PiecewisePolynomialCurve, step: float, trajectory: np.ndarray
     ) -> bool:
-        """Return whether a singular place may lie between the samples of a course.
+        """Return whether a singular posture may lie between the samples of a trajectory.
 
-        The condition number of either side then leads there by the next sample.
+        The condition number on either side, extrapolated by a sample, shows it.
 
         Args:
             motion: Tangential coordinates over time.
-            step: As it was asked for.
-            course: Its course.
+            step: Requested step [s].
+            trajectory: Its joint trajectory.
         """
-        times, reference = self._sampled(motion, step)
-        led = course[:, : reference.shape[1]]
-        rcond = self._finder.condition(self._start, led, reference, self._frames(times))
+        times, reference = self._sample(motion, step)
+        followed = trajectory[:, : reference.shape[1]]
+        rcond = self._finder.condition(self._start, followed, reference, self._frames(times))
         ahead = np.minimum(2.0 * rcond[1:-1] - rcond[:-2], 2.0 * rcond[1:-1] - rcond[2:])
         return bool(np.any(ahead < self._law.inverse.min_rcond))
 
-    def _located(
-        self, error: CourseError, motion: PiecewisePolynomialCurve, step: float
-    ) -> CourseError:
-        """Return an error that says where on its way the robot cannot follow, and why."""
-        time, q = step * (len(error.course) - 1), error.course[-1]
+    def _locate(
+        self, error: TrajectoryError, motion: PiecewisePolynomialCurve, step: float
+    ) -> TrajectoryError:
+        """Return an error that says where the robot cannot follow the motion, and why."""
+        time, q = step * (len(error.trajectory) - 1), error.trajectory[-1]
         where = self.where(motion, time)
-        said = f"the joints do not reach the reference at {where}"
+        message = f"the joints do not reach the reference at {where}"
         if error.rcond is not None:
-            said = f"{error} at {where}"
-            place, tool = self._task.place, self._task.place.tool
+            message = f"{error} at {where}"
+            manifold, tool = self._task.projected_manifold, self._task.projected_manifold.tool
             axes = {"tool_axis": tool.tool_axis, "yaw_axis": tool.yaw_axis}
-            posture = singular_posture(self.robot, q, oriented=place.is_oriented, **axes)
+            posture = singular_posture(self.robot, q, oriented=manifold.is_oriented, **axes)
             if posture.rcond < _SINGULAR:
-                said = describe_singularity(self.robot, q, posture, f"singular at {where}")
-        located = CourseError(said, error.rcond)
-        located.course = error.course
+                message = describe_singularity(self.robot, q, posture, f"singular at {where}")
+        located = TrajectoryError(message, error.rcond)
+        located.trajectory = error.trajectory
         return located
 
     def where(self, motion: PiecewisePolynomialCurve, time: float) -> str:
-        """Return what to call a place of a motion.
+        """Return the name of a point of a motion, for messages.
 
         Args:
             motion: Tangential coordinates over time.
-            time: When it is there [s].
+            time: Time of the point [s].
         """
         eta = motion.derivatives(np.array([time]), 0)[0, 0]
         value = f"{eta[0]:.3g}" if len(eta) == 1 else f"({eta[0]:.3g}, {eta[1]:.3g})"
@@ -163,7 +168,7 @@ class MotionDemand:
     def beyond_limits(
         self, motion: PiecewisePolynomialCurve, step: float, postures: np.ndarray
     ) -> list[str]:
-        """Return which joint first passes a limit of its position, if one does, and where.
+        """Return a message on the first joint that passes a position limit, if one does.
 
         Args:
             motion: Tangential coordinates over time.
@@ -184,7 +189,7 @@ class MotionDemand:
         ]
 
     def _frames(self, times: np.ndarray) -> np.ndarray | None:
-        """Return the motion of what carries the manifold, at rest after its end."""
+        """Return the motion of the manifold's frame, at rest after its end."""
         carrier = self._carrier
         if carrier is None:
             return None
@@ -193,63 +198,69 @@ class MotionDemand:
         frames[times > end, 1:] = 0.0
         return np.asarray(frames.reshape(len(times), -1))
 
-    def _sampled(
+    def _sample(
         self, motion: PiecewisePolynomialCurve, step: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return even times and the reference of the virtual output then."""
+        """Return times of an even grid, and the reference of the virtual output on it."""
         order, duration = self._law.linearization.relative_degree, motion.domain[1]
         times = np.linspace(0.0, duration, int(np.ceil(duration / step)) + 1)
-        asked = motion.derivatives(times, order)
-        reference = np.zeros((len(times), order + 1, len(self._task.place.coordinates)))
-        reference[:, :, : asked.shape[2]] = asked
+        requested = motion.derivatives(times, order)
+        reference = np.zeros(
+            (len(times), order + 1, len(self._task.projected_manifold.coordinates))
+        )
+        reference[:, :, : requested.shape[2]] = requested
         return times, reference
 
-    def _continued(self, course: np.ndarray, step: float) -> np.ndarray:
-        """Return a course with as many derivatives as the demand depends on."""
-        while course.shape[1] <= self.demand.derivatives:
-            further = np.gradient(course[:, -1:], step, axis=0)
-            course = np.concatenate([course, further], axis=1)
-        return course[:, : self.demand.derivatives + 1]
+    def _extend(self, trajectory: np.ndarray, step: float) -> np.ndarray:
+        """Return a trajectory with all derivatives that the demand depends on."""
+        while trajectory.shape[1] <= self.demand.derivatives:
+            further = np.gradient(trajectory[:, -1:], step, axis=0)
+            trajectory = np.concatenate([trajectory, further], axis=1)
+        return trajectory[:, : self.demand.derivatives + 1]
 
-    def bare_course_of(
-        self, motion: PiecewisePolynomialCurve, step: float, course: np.ndarray
+    def trajectory_without_posture(
+        self, motion: PiecewisePolynomialCurve, step: float, trajectory: np.ndarray
     ) -> np.ndarray:
-        """Return a motion's course without what only a posture moves.
+        """Return a motion's trajectory without the motion that only a posture adds.
 
         Args:
             motion: Tangential coordinates over time.
-            step: As it was asked for.
-            course: Its course.
+            step: Requested step [s].
+            trajectory: Its joint trajectory.
         """
-        times, reference = self._sampled(motion, step)
-        led = course[:, : reference.shape[1]]
-        return self._continued(self._finder.bare(self._start, led, reference), times[1])
+        times, reference = self._sample(motion, step)
+        followed = trajectory[:, : reference.shape[1]]
+        return self._extend(
+            self._finder.without_posture(self._start, followed, reference), times[1]
+        )
 
-    def held_back(
-        self, motion: PiecewisePolynomialCurve, step: float, course: np.ndarray
+    def restraint_ratio(
+        self, motion: PiecewisePolynomialCurve, step: float, trajectory: np.ndarray
     ) -> np.ndarray:
         """Return joint speeds by those from which on the law holds a posture back, (samples, N).
 
         Args:
             motion: Tangential coordinates over time.
-            step: As it was asked for.
-            course: Its course.
+            step: Requested step [s].
+            trajectory: Its joint trajectory.
         """
-        reference = self._sampled(motion, step)[1]
-        return self._finder.held_back(self._start, course[:, : reference.shape[1]], reference)
+        reference = self._sample(motion, step)[1]
+        return self._finder.restraint_ratio(
+            self._start, trajectory[:, : reference.shape[1]], reference
+        )
 
-    def allowed(self, course: np.ndarray, reserve: float | None = None) -> np.ndarray:
-        """Return what may be asked of the drives, (samples, 2N).
+    def allowed(self, trajectory: np.ndarray, reserve: float | None = None) -> np.ndarray:
+        """Return the allowed demand on the drives, (samples, 2N).
 
         Args:
-            course: The joints' course, see :meth:`course_of`.
-            reserve: Share of the torques that is left; that of the reference by default.
+            trajectory: The joint trajectory, see :meth:`trajectory_of`.
+            reserve: Reserved share of the torques; the reserve of the reference by default.
         """
         left = self._reserve.copy()
         if reserve is not None:
             left[: self.robot.dimension] = reserve
-        return allowed_demand(self.at_rest(course), self.limits, left)
+        return allowed_demand(self.at_rest(trajectory), self.limits, left)
 
-    def at_rest(self, course: np.ndarray) -> np.ndarray:
-        """Return what the places of a course ask for at rest, (samples, 2N)."""
-        return self.demand.of(with_pace(course, np.zeros((len(course), 4))))
+    def at_rest(self, trajectory: np.ndarray) -> np.ndarray:
+        """Return the demand at rest in the postures of a trajectory, (samples, 2N)."""
+        return self.demand.of(apply_scaling(trajectory, np.zeros((len(trajectory), 4))))

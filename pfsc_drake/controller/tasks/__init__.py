@@ -1,1 +1,1 @@
-"""Tasks of a tool: a manifold, its projection, the motion along it, and where both begin."""
+"""Tasks of a tool: manifold, projection, motion along the manifold, and start."""

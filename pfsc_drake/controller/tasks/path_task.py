@@ -1,4 +1,4 @@
-"""Path following, and for comparison tracking of a point that moves along a path with time."""
+"""Path following, and for comparison trajectory tracking along a path."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -27,14 +27,14 @@ _MAX_ALPHA = 0.95
 
 
 class PathTask(Task):
-    """Path following: the tool converges to a path, at whatever speed it moves along.
+    """Path following: the tool converges to a path, independent of its speed along it.
 
     Args:
         path: The path.
         motion: Arc length over time [m].
         relative_degree: Relative degree r of the law.
         angles: Choice of the orientation's coordinates, see :class:`PathManifold`.
-        tracks: Whether the point that time prescribes is tracked instead (Sec. 3.8.4).
+        tracks: Whether a trajectory is tracked instead (Sec. 3.8.4).
         offset: Transversal coordinates of the tool at the start [m], shape (2,).
         rotation_deg: ZYX angles of the tool at the start from the path's orientation [deg].
         max_alpha: End of the feasible neighbourhood, below 1.
@@ -45,7 +45,7 @@ class PathTask(Task):
     """
 
     projector_name = "path_projector"
-    place: PathManifold
+    projected_manifold: PathManifold
     motion: PiecewisePolynomialCurve
     shape: ShapeReport
 
@@ -70,8 +70,8 @@ class PathTask(Task):
             "turning": path.frame.turns,
             "length": None if path.closed else path.length,
         }
-        self.place = PathManifold(relative_degree, **followed)
-        self.manifold = self.place
+        self.projected_manifold = PathManifold(relative_degree, **followed)
+        self.manifold = self.projected_manifold
         if tracks:
             self.manifold = MovingPoint(relative_degree, **followed)
             count = len(self.manifold.coordinates)
@@ -83,12 +83,12 @@ class PathTask(Task):
         return self.path.evaluator(self.relative_degree)
 
     @property
-    def projecting(self) -> Projector:
+    def projection_block(self) -> Projector:
         """Block that finds the closest point on the manifold."""
         return Projector(self.evaluator)
 
     @property
-    def lap(self) -> float | None:
+    def revolution(self) -> float | None:
         """Length of the manifold [m] if it is closed in its only direction."""
         return self.path.length if self.path.closed else None
 
@@ -98,16 +98,16 @@ class PathTask(Task):
         return self.path.length
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """Return the point of ``place`` next to a tool, shape (size,)."""
+        """Return the point of ``projected_manifold`` closest to a tool, shape (size,)."""
         return self.evaluator(y_t.tolist(), memory[0])
 
     def start(self, shift: np.ndarray) -> StartPoint:
-        """Return where the tool starts."""
+        """Return the start of the tool."""
         eta = float(self.motion.derivatives(self.motion.domain[:1], 0)[0, 0, 0])
         theta = self.path.arc_length.parameter(eta)
-        layout, evaluator = self.place.layout, self.evaluator
+        layout, evaluator = self.projected_manifold.layout, self.evaluator
         on_path = evaluator.evaluate_at(theta)
-        axes = self.place.axes(on_path).full()
+        axes = self.projected_manifold.axes(on_path).full()
         beside = self._offset[0] * axes[:, 1], self._offset[1] * axes[:, 2]
         y_t = on_path[layout.position][:3] + beside[0] + beside[1] + shift
         point = evaluator(y_t.tolist(), theta)
@@ -124,20 +124,20 @@ class PathTask(Task):
         return StartPoint(self._target(y_t, R_d, self._rotation_deg), point[layout.memory])
 
     def point(self, start: StartPoint) -> np.ndarray:
-        """Return the point of the manifold that the law acts on at the start, shape (size,)."""
+        """Return the point of the manifold on which the law acts at the start, shape (size,)."""
         if self._tracks:
-            return self.evaluator.evaluate_at(start.place[0])
+            return self.evaluator.evaluate_at(start.projection[0])
         return super().point(start)
 
-    def way(self) -> Iterator[tuple[np.ndarray, str]]:
-        """Yield positions of the tool along its motion [m], each (3,), with their names."""
+    def tool_positions(self) -> Iterator[tuple[np.ndarray, str]]:
+        """Iterate over positions of the tool along its motion [m], each (3,), with their names."""
         visited = self.motion.derivatives(self.motion.breakpoints, 0)[:, 0, 0]
         begin, end = float(visited.min()), float(visited.max())
         if self.path.closed:  # every revolution is the same
             end = min(end, begin + self.path.length)
-        places = np.linspace(begin, end, 2 + int((end - begin) / _SPACING))
-        theta = np.array([self.path.arc_length.parameter(eta) for eta in places])
-        for eta, position in zip(places, self.path.position.derivatives(theta, 0), strict=True):
+        samples = np.linspace(begin, end, 2 + int((end - begin) / _SPACING))
+        theta = np.array([self.path.arc_length.parameter(eta) for eta in samples])
+        for eta, position in zip(samples, self.path.position.derivatives(theta, 0), strict=True):
             yield position[0], f"path at eta = {eta:.4g} m"
 
     @property
@@ -145,14 +145,14 @@ class PathTask(Task):
         """Map from coordinates of the manifold to positions in the world."""
         return PathTarget(self.path)
 
-    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+    def check_coordinates(self, coordinates: np.ndarray, key: str) -> None:
         """Refuse coordinates off the manifold."""
         allowed = f"eta from 0 to {self.path.length:.6g} m"
         require(is_on(self.path, coordinates[0]), key, coordinates.tolist(), allowed)
 
 
 def is_on(path: Path, eta: float) -> bool:
-    """Return whether an arc length is on a path, up to its very ends but for rounding.
+    """Return whether an arc length is on a path, its ends included up to rounding.
 
     Args:
         path: The path.

@@ -1,4 +1,4 @@
-"""A path whose way points come while the tool moves, and the systems that make it."""
+"""Path through waypoints that are received while the tool moves, and its systems."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from pfsc_drake.blocks.block import Values
-from pfsc_drake.control.law.pace import PacedReference
+from pfsc_drake.control.law.paced_reference import PacedReference
+from pfsc_drake.control.streams.growing_path import POSE, POSITION, GrowingPath
 from pfsc_drake.control.streams.intake import WaypointIntake
 from pfsc_drake.control.streams.messages import WaypointLayout
 from pfsc_drake.control.streams.projector import StreamedProjector
-from pfsc_drake.control.streams.stream_course import POSE, POSITION, Course
 from pfsc_drake.control.streams.stream_parameters import StreamParameters
 from pfsc_drake.errors import require
 from pfsc_drake.geometry import quaternion_to_matrix
@@ -24,24 +24,24 @@ _NO_SIZE = 1e-6
 
 
 class StreamedPath:
-    """A path of which only the begin is known beforehand.
+    """Path that grows by received waypoints; only its begin is known beforehand.
 
     Args:
-        start: Where the tool rests at first: position [m], and quaternion (w, x, y, z) where way
-            points have one, shape (3,) or (7,).
-        parameters: How way points become a path.
+        start: Pose of the tool at rest: position [m], and quaternion (w, x, y, z) if waypoints have
+            one, shape (3,) or (7,).
+        parameters: Parameters of the path through waypoints.
         order: Relative degree r of the law.
-        direction: Direction of the path before its first way point, shape (3,).
-        length: How many way points a message holds.
+        direction: Direction of the path before its first waypoint, shape (3,).
+        length: Number of waypoints in a message.
 
     Attributes:
-        course: Layout of the path.
-        parameters: How way points become a path.
+        layout: Layout of the path.
+        parameters: Parameters of the path through waypoints.
         messages: Layout of messages.
-        start: Where the tool rests at first, the quaternion of length one.
+        start: Pose of the tool at rest, with unit quaternion.
 
     Raises:
-        InputError: If the start is no place.
+        InputError: If the start is not a pose.
     """
 
     def __init__(
@@ -62,39 +62,39 @@ class StreamedPath:
                 bool(size > _NO_SIZE), "start", self.start.tolist(), "a quaternion that is not zero"
             )
             self.start[POSITION:] /= size
-        self.course = Course(order, len(self.start), parameters.columns)
+        self.layout = GrowingPath(order, len(self.start), parameters.columns)
         self.parameters, self._direction = parameters, direction
         self.messages = WaypointLayout(len(self.start), length)
 
     def __content__(self) -> object:
-        """Return what decides over it."""
-        return self.start, self.parameters, self.course, self._direction, self.messages.length
+        """Return the data that determine the path."""
+        return self.start, self.parameters, self.layout, self._direction, self.messages.length
 
     @property
     def is_oriented(self) -> bool:
-        """Whether way points have an orientation."""
+        """Whether waypoints have an orientation."""
         return len(self.start) == POSE
 
     @property
     def projector(self) -> StreamedProjector:
-        """What finds the tool's place on it."""
-        return StreamedProjector(self.course)
+        """Block that finds the closest point on the path."""
+        return StreamedProjector(self.layout)
 
     @property
     def target(self) -> ToolTarget:
-        """Where the tool is at the start."""
+        """Pose of the tool at the start."""
         R_e = quaternion_to_matrix(self.start[POSITION:]) if self.is_oriented else None
         return ToolTarget(self.start[:POSITION], R_e)
 
     def intake(self, highest: int, period: float) -> WaypointIntake:
-        """Return what takes way points.
+        """Return the block that receives waypoints.
 
         Args:
             highest: Order of the highest derivative of the reference.
             period: Sampling time [s].
         """
         return WaypointIntake(
-            self.course,
+            self.layout,
             self.parameters,
             self.messages,
             highest,
@@ -107,28 +107,28 @@ class StreamedPath:
     def point(self) -> np.ndarray:
         """The path's point at the start, laid out by the manifold's layout, shape (size,)."""
         projector, intake = self.projector, self.intake(1, 1.0)
-        course = intake.initial(Values(), 0)["course"]
+        path = intake.initial(Values(), 0)["path"]
         pose = np.concatenate([self.start[:POSITION], np.eye(3).ravel()])
-        u = Values(tool_pose=ca.DM(pose), course=course)
+        u = Values(tool_pose=ca.DM(pose), path=path)
         x = Values(**projector.initial(u, 0))
         return np.array(projector.output(x, u, 0)["manifold_point"]).ravel()
 
 
 @dataclass(frozen=True)
 class Stream:
-    """Systems that make a path of way points, connected.
+    """Connected systems of a streamed path.
 
     Attributes:
         waypoints: Port for messages.
         reference: Derivatives of the virtual output's reference by rows.
         stream: Status of the stream, see :class:`WaypointIntake`.
-        course: The path, laid out by :class:`Course`.
+        path: The path, laid out by :class:`GrowingPath`.
     """
 
     waypoints: InputPort
     reference: OutputPort
     stream: OutputPort
-    course: OutputPort
+    path: OutputPort
 
 
 def add_stream(
@@ -139,12 +139,12 @@ def add_stream(
     num_outputs: int,
     period: float,
 ) -> Stream:
-    """Add what takes way points and what goes along the path that they make.
+    """Add the intake of waypoints and the reference along their path.
 
     Args:
         builder: Builder of the diagram.
         path: The path.
-        projector: Finds the tool's place on it; its port for the course is connected.
+        projector: System that finds the closest point; its port for the path is connected.
         order: Order of the highest derivative of the reference.
         num_outputs: m.
         period: Sampling time [s].
@@ -153,21 +153,21 @@ def add_stream(
         "waypoint_intake", BlockSystem(path.intake(order, period), period)
     )
     paced = PacedReference(
-        path.parameters.limits, order, num_outputs, period, stretches=path.course.spans
+        path.parameters.limits, order, num_outputs, period, stretches=path.layout.spans
     )
-    pace = builder.AddNamedSystem("paced_reference", BlockSystem(paced, period))
-    course = intake.GetOutputPort("course")
-    builder.Connect(course, projector.GetInputPort("course"))
+    reference = builder.AddNamedSystem("paced_reference", BlockSystem(paced, period))
+    growing_path = intake.GetOutputPort("path")
+    builder.Connect(growing_path, projector.GetInputPort("path"))
     builder.Connect(
         projector.GetOutputPort("manifold_point"), intake.GetInputPort("manifold_point")
     )
     for name in ("motion", "stop"):
-        builder.Connect(pace.GetOutputPort(name), intake.GetInputPort(name))
+        builder.Connect(reference.GetOutputPort(name), intake.GetInputPort(name))
     for name in ("goal", "stretches", "stretch_speeds"):
-        builder.Connect(intake.GetOutputPort(name), pace.GetInputPort(name))
+        builder.Connect(intake.GetOutputPort(name), reference.GetInputPort(name))
     return Stream(
         intake.GetInputPort("waypoints"),
-        pace.GetOutputPort("reference"),
+        reference.GetOutputPort("reference"),
         intake.GetOutputPort("stream"),
-        course,
+        growing_path,
     )

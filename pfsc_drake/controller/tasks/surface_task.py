@@ -1,4 +1,4 @@
-"""Surface following: the tool converges to a surface, and moves over it as two coordinates say."""
+"""Surface following: the tool converges to a surface and follows two coordinates on it."""
 
 from collections.abc import Iterator, Sequence
 
@@ -10,7 +10,7 @@ from pfsc_drake.controller.tasks.task import StartPoint, Task
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
-from pfsc_drake.geometry.surfaces.length import way_on_surface
+from pfsc_drake.geometry.surfaces.length import parameters_along_motion
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import surface_report
 from pfsc_drake.geometry.surfaces.surface_evaluator import SurfaceEvaluator
@@ -27,9 +27,9 @@ class SurfaceTask(Task):
         surface: The surface.
         manifold: Its manifold, with the orientation of the tool.
         motion: Two tangential coordinates over time [m].
-        quaternion: Orientation of the tool, where it is the same everywhere, shape (4,).
-        theta: Parameters of the surface where the tool starts; the middle of its domain if omitted.
-        offset: Distance from there along the normal [m].
+        quaternion: Orientation of the tool, if it is constant, shape (4,).
+        theta: Surface parameters of the start; the middle of the domain if omitted.
+        offset: Distance of the start along the normal [m].
         position: Tool point at the start [m], shape (3,), instead of both.
         rotation_deg: ZYX angles of the tool at the start from the surface's orientation [deg].
         max_alpha: End of the feasible neighbourhood, below 1.
@@ -43,7 +43,7 @@ class SurfaceTask(Task):
     """
 
     projector_name = "surface_projector"
-    place: SurfaceManifold
+    projected_manifold: SurfaceManifold
     motion: PiecewisePolynomialCurve
 
     def __init__(
@@ -60,7 +60,7 @@ class SurfaceTask(Task):
         max_alpha: float = _MAX_ALPHA,
     ) -> None:
         self.surface, self.motion, self.warnings = surface, motion, []
-        self.place = self.manifold = manifold
+        self.projected_manifold = self.manifold = manifold
         self.evaluator = SurfaceEvaluator(surface, manifold.layout.order, quaternion)
         self.shape = surface_report(surface)
         self._rotation_deg, self._max_alpha = rotation_deg, max_alpha
@@ -76,52 +76,53 @@ class SurfaceTask(Task):
         self.first = on_surface + offset * manifold.axes(point).full()[:, 2]
 
     @property
-    def projecting(self) -> Projector:
+    def projection_block(self) -> Projector:
         """Block that finds the closest point on the manifold."""
         return Projector(self.evaluator, np.append([0.0, 0.0], self._eta(0.0)))
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """Return the point of ``place`` next to a tool, shape (size,)."""
+        """Return the point of ``projected_manifold`` closest to a tool, shape (size,)."""
         return self.evaluator(y_t.tolist(), memory)
 
     def _eta(self, time: float) -> np.ndarray:
         return self.motion.derivatives(np.array([time]), 0)[0, 0]
 
     def start(self, shift: np.ndarray) -> StartPoint:
-        """Return where the tool starts."""
+        """Return the start of the tool."""
         y_t, max_alpha = self.first + shift, self._max_alpha
         try:
-            foot = self.evaluator.project_globally(y_t)
+            closest_point = self.evaluator.project_globally(y_t)
         except InputError as error:
             raise InputError(f"start: {error}") from None
-        said = f"start: tool point {np.round(y_t, 6).tolist()} m"
-        if not (foot.converged and foot.alpha < max_alpha):
+        subject = f"start: tool point {np.round(y_t, 6).tolist()} m"
+        if not (closest_point.converged and closest_point.alpha < max_alpha):
             raise InputError(
-                f"{said} is outside the feasible neighbourhood of the surface, "
-                f"alpha = {foot.alpha:.3g}; alpha must be below {max_alpha:g}"
+                f"{subject} is outside the feasible neighbourhood of the surface, "
+                f"alpha = {closest_point.alpha:.3g}; alpha must be below {max_alpha:g}"
             )
-        if foot.at_border:
+        if closest_point.at_border:
             raise InputError(
-                f"{said} is beside the patch, {1e3 * foot.distance:.3g} mm from its border at "
-                f"theta = {np.round(foot.theta, 6).tolist()}; it must be above or below it"
+                f"{subject} is beside the patch, {1e3 * closest_point.distance:.3g} mm from its "
+                f"border at theta = {np.round(closest_point.theta, 6).tolist()}; it must be above "
+                "or below it"
             )
-        place = np.append(foot.theta, self._eta(0.0))
+        projection = np.append(closest_point.theta, self._eta(0.0))
         R_d = None
-        if self.place.is_oriented:
-            R_d = self.place.orientation(self.evaluate(y_t, place)[None])[0]
-        return StartPoint(self._target(y_t, R_d, self._rotation_deg), place)
+        if self.projected_manifold.is_oriented:
+            R_d = self.projected_manifold.orientation(self.evaluate(y_t, projection)[None])[0]
+        return StartPoint(self._target(y_t, R_d, self._rotation_deg), projection)
 
-    def way(self) -> Iterator[tuple[np.ndarray, str]]:
-        """Yield positions of the tool along its motion [m], each (3,), with their names.
+    def tool_positions(self) -> Iterator[tuple[np.ndarray, str]]:
+        """Iterate over positions of the tool along its motion [m], each (3,), with their names.
 
         Raises:
             InputError: If the motion leaves the surface.
         """
         begin, end = self.motion.domain
         times = np.linspace(begin, end, 2 + int((end - begin) / _SPACING))
-        first = self.start(np.zeros(3)).place[:2]
-        way = way_on_surface(self.surface, self.motion, first, times)
-        for t, theta in zip(times, way, strict=True):
+        first = self.start(np.zeros(3)).projection[:2]
+        parameters = parameters_along_motion(self.surface, self.motion, first, times)
+        for t, theta in zip(times, parameters, strict=True):
             where = f"eta = {np.round(self._eta(t), 4).tolist()} m"
             for k, ends in enumerate(self.surface.domain):
                 closed = self.surface.closed[k]
@@ -137,7 +138,7 @@ class SurfaceTask(Task):
         """Map from coordinates ``(theta_1, theta_2, xi)`` to positions in the world."""
         return SurfaceTarget(self.surface)
 
-    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+    def check_coordinates(self, coordinates: np.ndarray, key: str) -> None:
         """Refuse coordinates off the manifold."""
         domain = self.surface.domain
         for value, ends, closed in zip(coordinates[:2], domain, self.surface.closed, strict=True):

@@ -1,4 +1,4 @@
-"""A task of a tool: a manifold, its projection, the motion along it, and where both begin."""
+"""Task of a tool: manifold, projection, motion along the manifold, and start."""
 
 import math
 from abc import ABC, abstractmethod
@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from pfsc_drake.blocks.block import Block
-from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
+from pfsc_drake.control.manifolds.manifold import Manifold, ProjectedManifold
 from pfsc_drake.control.manifolds.moving_point import TrajectoryPoint
 from pfsc_drake.controller.planning.drive_plan import DrivePlan
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport, zyx_to_matrix
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport
-from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.physics.hand_path import CoordinateMap
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 
 
@@ -25,34 +25,34 @@ class StartPoint:
 
     Attributes:
         target: Pose of the tool, as far as its orientation matters.
-        place: Position on the manifold, as its projector remembers it.
+        projection: Position on the manifold, as the projector stores it.
     """
 
     target: ToolTarget
-    place: np.ndarray
+    projection: np.ndarray
 
 
 class Task(ABC):
-    """Task of a tool, whichever robot moves it.
+    """Task of a tool, independent of the robot.
 
     Attributes:
         projector_name: Name of the system that finds the closest point.
         manifold: Manifold that the law linearizes; in its own frame, where that moves.
-        place: Manifold in whose coordinates the tool's position is measured: the same but where a
+        projected_manifold: Manifold of the tool's measured coordinates: the same unless a
             trajectory is tracked.
-        motion: Tangential coordinates of the reference over time [m]; None where nothing but a hand
-            or waypoints that come decide on it.
+        motion: Tangential coordinates of the reference over time [m]; None for hand guiding and
+            streamed waypoints.
         warnings: Doubts about manifold and motion, one sentence each.
-        prescribed_point: Block with the point that the law acts on, where time prescribes it.
-        shape: Numbers of the manifold that decide whether it can be followed, if they are known.
-        fit: Distances of the points that the manifold was fitted to, if it was.
-        drive_plan: Demand of the motion on the drives, once it is planned.
+        prescribed_point: Block with the point on which the law acts, if time prescribes it.
+        shape: Report on the regularity of the manifold, if it is known.
+        fit: Residuals of the fit, if the manifold was fitted to points.
+        drive_plan: Demand of the motion on the drives, after planning.
     """
 
     projector_name: ClassVar[str]
 
     manifold: Manifold
-    place: PlaceManifold
+    projected_manifold: ProjectedManifold
     motion: PiecewisePolynomialCurve | None
     warnings: list[str]
     prescribed_point: TrajectoryPoint | None = None
@@ -62,56 +62,56 @@ class Task(ABC):
 
     @property
     @abstractmethod
-    def projecting(self) -> Block:
+    def projection_block(self) -> Block:
         """Block that finds the closest point on the manifold."""
 
     @abstractmethod
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """Return the point of ``place`` next to a tool, shape (size,).
+        """Return the point of ``projected_manifold`` closest to a tool, shape (size,).
 
         Args:
             y_t: Tool point [m], shape (3,).
-            memory: Position from which it is looked for, as the projector remembers it.
+            memory: Initial guess of the projection, as the projector stores it.
         """
 
     @abstractmethod
     def start(self, shift: np.ndarray) -> StartPoint:
-        """Return where the tool starts.
+        """Return the start of the tool.
 
         Args:
-            shift: Added to its position [m], shape (3,).
+            shift: Shift of its position [m], shape (3,).
 
         Raises:
-            InputError: If it is outside the feasible neighbourhood.
+            InputError: If the start is outside the feasible neighbourhood.
         """
 
     def point(self, start: StartPoint) -> np.ndarray:
-        """Return the point of the manifold that the law acts on at the start, shape (size,).
+        """Return the point of the manifold on which the law acts at the start, shape (size,).
 
         Args:
             start: Start of the tool.
         """
-        return self.evaluate(start.target.y_t, start.place)
+        return self.evaluate(start.target.y_t, start.projection)
 
     @abstractmethod
-    def way(self) -> Iterator[tuple[np.ndarray, str]]:
-        """Yield positions of the tool along its motion [m], each (3,), with their names."""
+    def tool_positions(self) -> Iterator[tuple[np.ndarray, str]]:
+        """Iterate over positions of the tool along its motion [m], each (3,), with their names."""
 
     @property
     @abstractmethod
-    def target(self) -> Place:
+    def target(self) -> CoordinateMap:
         """Map from coordinates of the manifold to positions in the world."""
 
     @abstractmethod
-    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+    def check_coordinates(self, coordinates: np.ndarray, key: str) -> None:
         """Refuse coordinates off the manifold.
 
         Args:
-            coordinates: Translational ones [m], shape (3,).
-            key: Their name, for the message.
+            coordinates: Translational coordinates [m], shape (3,).
+            key: Name of the coordinates, for the message.
 
         Raises:
-            InputError: If they are.
+            InputError: If the coordinates are off the manifold.
         """
 
     @property
@@ -120,7 +120,7 @@ class Task(ABC):
         return self.motion is not None
 
     @property
-    def lap(self) -> float | None:
+    def revolution(self) -> float | None:
         """Length of the manifold [m] if it is closed in its only direction."""
         return None
 
@@ -138,7 +138,7 @@ class Task(ABC):
         self, y_t: np.ndarray, R_d: np.ndarray | None, rotation_deg: Sequence[float]
     ) -> ToolTarget:
         """Return the pose of a tool at a position, turned from the reference orientation R_d."""
-        tool = self.place.tool
+        tool = self.projected_manifold.tool
         if R_d is not None:
             R_d = R_d @ zyx_to_matrix(np.deg2rad(rotation_deg))
         return ToolTarget(y_t, R_d, tool.tool_axis, tool.yaw_axis)

@@ -1,4 +1,4 @@
-"""Parametrized curves: what every curve offers."""
+"""Parametrized curves: their common interface."""
 
 import math
 from abc import ABC, abstractmethod
@@ -57,7 +57,7 @@ class Curve(ABC):
         return self.domain[1] - self.domain[0]
 
     def wrap(self, theta: ArrayLike) -> np.ndarray:
-        """Parameters moved into the domain by whole periods; unchanged if open.
+        """Return parameters moved into the domain by whole periods; unchanged if open.
 
         Args:
             theta: Path parameters, any shape.
@@ -72,8 +72,8 @@ class Curve(ABC):
         inside = (values >= begin) & (values <= end)
         return np.where(inside, values, begin + np.mod(values - begin, end - begin))
 
-    def laps(self, theta: ArrayLike) -> np.ndarray:
-        """Whole periods by which parameters lie outside the domain; zero if open.
+    def revolutions(self, theta: ArrayLike) -> np.ndarray:
+        """Return the whole periods by which parameters lie outside the domain; zero if open.
 
         Args:
             theta: Unwrapped path parameters, any shape.
@@ -87,10 +87,10 @@ class Curve(ABC):
         return np.where(outside & self.closed, np.floor((values - begin) / (end - begin)), 0.0)
 
     def first_discontinuity(self, order: int) -> float | None:
-        """Parameter at which a derivative of at most this order first jumps.
+        """Return the parameter at which a derivative of at most this order first jumps.
 
         Args:
-            order: Highest order of derivative that is asked for.
+            order: Highest order of derivative.
 
         Returns:
             theta, or None if all derivatives up to `order` are continuous.
@@ -99,7 +99,7 @@ class Curve(ABC):
 
     @abstractmethod
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 0..order with respect to theta, for set-up and figures.
+        """Return derivatives 0..order with respect to theta, for set-up and figures.
 
         Args:
             theta: Path parameters, shape [...]. Closed curves wrap.
@@ -112,11 +112,11 @@ class Curve(ABC):
             InputError: theta lies outside the domain of an open curve.
         """
 
-    def _checked(self, theta: ArrayLike) -> np.ndarray:
-        """Wrapped parameters; refuses those outside of an open curve."""
+    def _to_domain(self, theta: ArrayLike) -> np.ndarray:
+        """Return wrapped parameters; refuse those outside of an open curve."""
         values = self.wrap(theta)
         begin, end = self.domain
-        # Parameters come out of sums and projections, so the ends carry rounding errors.
+        # Parameters result from sums and projections, so the ends have rounding errors.
         slack = 1e-9 * (end - begin)
         outside = ~((values >= begin - slack) & (values <= end + slack))
         if np.any(outside):
@@ -126,7 +126,7 @@ class Curve(ABC):
 
 
 def check_order(order: int) -> int:
-    """The order of derivative, if it is an integer of at least zero.
+    """Return the order of derivative, if it is an integer of at least zero.
 
     Raises:
         InputError: it is not.

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve, check_order
 
-# Between the axes of a circle: from smaller ones its plane is not known well.
+# Between the axes of a circle: smaller angles do not define its plane accurately.
 _LEAST_ANGLE_DEG = 0.1
 
 
@@ -48,7 +48,7 @@ class FourierCurve(Curve):
         axis_u: ArrayLike = (1.0, 0.0, 0.0),
         axis_v: ArrayLike = (0.0, 1.0, 0.0),
     ) -> "FourierCurve":
-        """Circle center + radius (u cos(theta) + v sin(theta)).
+        """Return the circle center + radius (u cos(theta) + v sin(theta)).
 
         Args:
             center: Centre [dimension], m.
@@ -85,7 +85,7 @@ class FourierCurve(Curve):
         width: float = 0.25,
         height: float = 0.1,
     ) -> "FourierCurve":
-        """Vertically bent lemniscate (3.87).
+        """Return the vertically bent lemniscate (3.87).
 
         center + [width cos(theta), width sin(theta) cos(theta), height sin(theta)^2];
         it crosses itself at theta = pi/2 and 3 pi/2.
@@ -104,8 +104,8 @@ class FourierCurve(Curve):
         return cls(constant, cosine, sine)
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 0..order with respect to theta, for set-up and figures."""
-        angles = self._checked(theta)[..., None] * np.arange(1, len(self.cosine) + 1)
+        """Return derivatives 0..order with respect to theta, for set-up and figures."""
+        angles = self._to_domain(theta)[..., None] * np.arange(1, len(self.cosine) + 1)
         basis = np.empty((*angles.shape[:-1], 2 * len(self.cosine) + 1))
         basis[..., 0] = 1.0
         basis[..., 1::2] = np.cos(angles)
@@ -113,7 +113,7 @@ class FourierCurve(Curve):
         return np.einsum("kdj,...j->...kd", self._table(order), basis)
 
     def _table(self, order: int) -> np.ndarray:
-        """Map from [1, cos, sin, cos 2, ...] to derivatives, [order + 1, dimension, terms]."""
+        """Return a map from [1, cos, sin, ...] to derivatives, [order + 1, dimension, terms]."""
         table = np.zeros((check_order(order) + 1, self.dimension, 2 * len(self.cosine) + 1))
         table[0, :, 0] = self.constant
         a, b = self.cosine, self.sine
@@ -125,7 +125,7 @@ class FourierCurve(Curve):
 
 
 def _direction(name: str, axis: ArrayLike) -> np.ndarray:
-    """Unit vector of a vector of any length; one that is zero or not finite is refused."""
+    """Return the unit vector of a vector of any length; refuse zero or NaN."""
     vector = np.array(axis, dtype=float)
     largest = float(np.abs(vector).max(initial=0.0))
     if not 0.0 < largest < math.inf:

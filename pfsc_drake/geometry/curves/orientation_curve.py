@@ -22,8 +22,8 @@ class OrientationCurve(Curve):
 
     ``R(theta) = H(q(theta)) / |q(theta)|^2`` with H homogeneous of degree two is as smooth as
     q and free of representation singularities, unlike the Euler angles of section 3.1.
-    The period of a closed one may be two laps of the path: quaternions of the two laps
-    then differ in sign, the orientations do not.
+    The period of a closed one may be two revolutions of the path: the quaternions of the
+    two then differ in sign, the orientations do not.
 
     Args:
         curve: Quaternions (w, x, y, z), a curve of dimension 4.
@@ -52,7 +52,7 @@ class OrientationCurve(Curve):
 
     @classmethod
     def fixed(cls, quaternion: ArrayLike, domain: tuple[float, float]) -> "OrientationCurve":
-        """The same orientation everywhere.
+        """Return a constant orientation.
 
         Args:
             quaternion: (w, x, y, z), [4], not zero.
@@ -65,15 +65,15 @@ class OrientationCurve(Curve):
         return cls(PiecewisePolynomialCurve(domain, q[None], closed=True))
 
     def first_discontinuity(self, order: int) -> float | None:
-        """Parameter at which a derivative of at most this order first jumps."""
+        """Return the parameter at which a derivative of at most this order first jumps."""
         return self._curve.first_discontinuity(order)
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 0..order with respect to theta, for set-up and figures. Dimension 4."""
+        """Return derivatives 0..order of the quaternion with respect to theta."""
         return self._curve.derivatives(theta, order)
 
     def rotation_matrix(self, theta: ArrayLike) -> np.ndarray:
-        """Rotation matrices R(theta).
+        """Return the rotation matrices R(theta).
 
         Args:
             theta: Path parameters, shape [...].
@@ -91,7 +91,7 @@ def interpolate_orientation(
     smoothness: int,
     closed: bool = False,
 ) -> OrientationCurve:
-    """Smooth orientation through keyframes.
+    """Return a smooth orientation through keyframes.
 
     Args:
         quaternions: Keyframes (w, x, y, z), [n, 4], of any length but zero and any sign.
@@ -104,7 +104,7 @@ def interpolate_orientation(
         closed: True if the orientation is periodic.
 
     Returns:
-        The curve. Its period is two laps if the quaternion returns with its sign flipped.
+        The curve. Its period is two revolutions if the quaternion returns with its sign flipped.
 
     Raises:
         InputError: values not finite or zero, neighbours more than 170 degrees apart, a
@@ -142,7 +142,7 @@ def interpolate_orientation(
 
 
 def check_neighbours(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions with signs such that neighbours are close.
+    """Return quaternions with signs such that neighbours are close.
 
     Args:
         quaternions: (w, x, y, z), [n, 4], of length one.
@@ -168,7 +168,7 @@ def check_neighbours(quaternions: np.ndarray) -> np.ndarray:
 
 
 def _normalize(q: np.ndarray) -> np.ndarray:
-    """Unit quaternions [n, 4]; refuses what is none."""
+    """Return unit quaternions [n, 4]; refuse zero and NaN."""
     if q.ndim != 2 or q.shape[1:] != (4,) or len(q) == 0:
         raise InputError(f"quaternions: shape {q.shape}; [n, 4] is required")
     norm = np.linalg.norm(q, axis=1)

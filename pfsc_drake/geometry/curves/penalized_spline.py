@@ -61,7 +61,7 @@ class PenalizedSpline:
         self._right = weighted @ self._values
 
     def fit(self, exponent: float) -> np.ndarray:
-        """Coefficients of the best spline, [product of the knots' counts(, dimension)].
+        """Return coefficients of the best spline, [product of the knots' counts(, dimension)].
 
         Args:
             exponent: Decimal logarithm of the roughness.
@@ -69,22 +69,22 @@ class PenalizedSpline:
         return self._fit(self._solver(exponent), exponent)
 
     def at_points(self, coefficients: np.ndarray) -> np.ndarray:
-        """Values of a spline at theta_i, [n(, dimension)]."""
+        """Return values of a spline at theta_i, [n(, dimension)]."""
         return np.asarray(self._basis @ coefficients)
 
     def residuals(self, coefficients: np.ndarray) -> np.ndarray:
-        """Spline less values, shape as these."""
+        """Return spline minus values, shape as these."""
         return np.asarray(self._basis @ coefficients - self._values)
 
     def best_predicting(self, around: float | None = None) -> tuple[float, float]:
-        """Roughness whose spline predicts left-out points best, and the noise it leaves.
+        """Return the roughness that predicts left-out points best, and the remaining noise.
 
-        The score is that of generalized cross-validation, n |w^(1/2) r|^2 / (n - p)^2 with
+        The score is the one of generalized cross-validation, n |w^(1/2) r|^2 / (n - p)^2 with
         residuals r and p the trace of the map from values to the spline's (P. Craven and G.
         Wahba, Numerische Mathematik 31, 1979), p estimated from random signs (M. F. Hutchinson).
 
         Args:
-            around: Decimal logarithm of a roughness that is known to be near.
+            around: Decimal logarithm of a nearby roughness, if known.
 
         Returns:
             Decimal logarithm of the roughness, and sqrt(|w^(1/2) r|^2 / (n - p)).
@@ -112,12 +112,12 @@ class PenalizedSpline:
     def strongest(
         self, allowed: Callable[[np.ndarray], bool], least: float, step: float = _STEP
     ) -> float:
-        """The strongest penalty whose spline is allowed, but not less than ``least``.
+        """Return the strongest penalty whose spline is allowed, but not less than ``least``.
 
         Args:
-            allowed: Told coefficients.
+            allowed: Predicate of the coefficients.
             least: Decimal logarithm of a roughness.
-            step: How exactly it is found.
+            step: Resolution of the search.
 
         Returns:
             Decimal logarithm of the roughness.
@@ -130,14 +130,14 @@ class PenalizedSpline:
             low, high = (middle, high) if allowed(self.fit(middle)) else (low, middle)
         return low
 
-    def pulled_in(
+    def pull_in(
         self,
         exponent: float,
         tolerance: float,
         inside: float,
         distances: Callable[[np.ndarray], np.ndarray],
     ) -> tuple[np.ndarray, bool]:
-        """Give those points larger weights that would lie outside of a tolerance.
+        """Increase the weights of points that would lie outside of a tolerance.
 
         Args:
             exponent: Decimal logarithm of the roughness.
@@ -161,7 +161,7 @@ class PenalizedSpline:
         return coefficients, False
 
     def standard_errors(self, theta: np.ndarray, exponent: float) -> np.ndarray:
-        """How uncertain the spline is, over the noise of values of weight one.
+        """Return the standard error of the spline, relative to the noise of values of weight one.
 
         Args:
             theta: Parameters, [n, parameters].
@@ -169,10 +169,10 @@ class PenalizedSpline:
 
         Returns:
             sqrt(b' (B' W B + roughness penalty)^-1 b) with the B-splines b there, [n]; for a
-            penalty that suits the values it holds both their noise and what they leave open.
+            penalty that suits the values it includes their noise and the bias of smoothing.
         """
-        places = _products(self.knots, theta)
-        columns = places.toarray().T
+        products = _products(self.knots, theta)
+        columns = products.toarray().T
         return np.asarray(np.sqrt(np.sum(columns * self._solver(exponent)(columns), axis=0)))
 
     def _solver(self, exponent: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -190,19 +190,19 @@ class PenalizedSpline:
 
 
 def _products(knots: tuple[UniformKnots, ...], theta: np.ndarray) -> csr_array:
-    """All products of B-splines of all directions at parameters, [n, coefficients]."""
-    place, data = np.zeros((len(theta), 1), dtype=int), np.ones((len(theta), 1))
+    """Return all products of B-splines of all directions at parameters, [n, coefficients]."""
+    indices, data = np.zeros((len(theta), 1), dtype=int), np.ones((len(theta), 1))
     for side, values in zip(knots, theta.T, strict=True):
         columns, entries = side.entries(values)
         data = (data[:, :, None] * entries[:, None, :]).reshape(len(theta), -1)
-        place = (place[:, :, None] * side.count + columns[:, None, :]).reshape(len(theta), -1)
+        indices = (indices[:, :, None] * side.count + columns[:, None, :]).reshape(len(theta), -1)
     rows = np.repeat(np.arange(len(theta)), data.shape[1])
     shape = (len(theta), math.prod(side.count for side in knots))
-    return csr_array((data.ravel(), (rows, place.ravel())), shape=shape)
+    return csr_array((data.ravel(), (rows, indices.ravel())), shape=shape)
 
 
 def _differences(knots: tuple[UniformKnots, ...]) -> csr_array:
-    """All differences of order m of neighbouring coefficients, weighted and stacked."""
+    """Return all differences of order m of neighbouring coefficients, weighted and stacked."""
     order = knots[0].degree // 2 + 1
     along = [_powers(side, order) for side in knots]
     if len(knots) == 1:
@@ -217,7 +217,7 @@ def _differences(knots: tuple[UniformKnots, ...]) -> csr_array:
 
 
 def _powers(knots: UniformKnots, order: int) -> list[csr_array]:
-    """Differences of order 0..order of the coefficients in one direction."""
+    """Return differences of order 0..order of the coefficients in one direction."""
     found = [csr_array(eye_array(knots.count, format="csr"))]
     for _ in range(order):
         last = found[-1]

@@ -15,7 +15,7 @@ _ROUNDING = 1e-13
 
 
 def power_coefficients(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Polynomials through values at the nodes of `chebyshev_nodes`.
+    """Return polynomials through values at the nodes of `chebyshev_nodes`.
 
     Args:
         values: [segments, degree + 1, dimension], at the nodes.
@@ -33,7 +33,7 @@ def power_coefficients(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 
 def chebyshev_nodes(starts: np.ndarray, lengths: np.ndarray, count: int) -> np.ndarray:
-    """Chebyshev points of the first kind, all inside of their segments.
+    """Return the Chebyshev points of the first kind, all inside of their segments.
 
     Args:
         starts: Begin of each segment, [segments].
@@ -53,13 +53,13 @@ def fit_pieces(
     degree: int,
     tolerance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Halves segments until a polynomial on each agrees with the function.
+    """Halve segments until a polynomial on each agrees with the function.
 
     The function is never evaluated at the ends of a segment, so it may jump there.
 
     Args:
         function: Maps parameters [m] to values [m, dimension].
-        breakpoints: Where the function need not be smooth, with both ends, [segments + 1].
+        breakpoints: Ends of the intervals in which the function is smooth, [segments + 1].
         degree: Degree of the polynomials.
         tolerance: Largest deviation allowed, in units of the function. Larger ones pass
             on segments so short that the integral of the function does not feel them.
@@ -110,7 +110,7 @@ def fit_pieces(
 
 @cache
 def _conversions(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Maps from values at `count` nodes to a Chebyshev series, and from there to powers."""
+    """Return maps from values at `count` nodes to a Chebyshev series, and from there to powers."""
     nodes = _chebyshev_points(count)
     chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, count - 1))
     powers = np.zeros((count, count))

@@ -26,7 +26,7 @@ class PiecewisePolynomialCurve(Curve):
         coefficients: c_sj, shape [segments, degree + 1, dimension], lowest power first.
         closed: True if theta is periodic.
         known_smoothness: Class C^k that holds by construction; jumps of derivatives up
-            to this order are rounding errors and not looked at. The default measures all.
+            to this order are rounding errors and ignored. The default measures all.
 
     Raises:
         InputError: wrong shapes, values that are not finite, or a curve that is not
@@ -72,7 +72,7 @@ class PiecewisePolynomialCurve(Curve):
 
     @classmethod
     def line(cls, start: ArrayLike, end: ArrayLike) -> "PiecewisePolynomialCurve":
-        """Straight line parametrized by arc length.
+        """Return the straight line parametrized by arc length.
 
         Args:
             start: First point [dimension], m.
@@ -96,7 +96,7 @@ class PiecewisePolynomialCurve(Curve):
 
     @classmethod
     def between_rests(cls, theta: np.ndarray, points: np.ndarray) -> "PiecewisePolynomialCurve":
-        """Curve of class C^6 through points, at rest at both ends.
+        """Return the curve of class C^6 through points, at rest at both ends.
 
         Args:
             theta: Parameters of the points, evenly spaced [points].
@@ -117,13 +117,13 @@ class PiecewisePolynomialCurve(Curve):
         return self.coefficients.shape[1] - 1
 
     def first_discontinuity(self, order: int) -> float | None:
-        """Parameter at which a derivative of at most this order first jumps."""
+        """Return the parameter at which a derivative of at most this order first jumps."""
         thetas = [theta for theta in self._lost_at[: check_order(order) + 1] if theta is not None]
         return min(thetas, default=None)
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 0..order with respect to theta, for set-up and figures."""
-        values = self._checked(theta)
+        """Return derivatives 0..order with respect to theta, for set-up and figures."""
+        values = self._to_domain(theta)
         segment = np.searchsorted(self.breakpoints[1:-1], values, side="right")
         local = values - self.breakpoints[segment]
         powers = local[..., None] ** np.arange(self.degree + 1)
@@ -131,7 +131,7 @@ class PiecewisePolynomialCurve(Curve):
         return np.einsum("...kdj,...j->...kd", table[segment], powers)
 
     def _table(self, order: int) -> np.ndarray:
-        """Map from powers to derivatives, [segments, order + 1, dimension, powers]."""
+        """Return the map from powers to derivatives, [segments, order + 1, dimension, powers]."""
         segments, count, dimension = self.coefficients.shape
         table = np.zeros((segments, check_order(order) + 1, dimension, count))
         for k in range(min(order + 1, count)):
@@ -140,7 +140,7 @@ class PiecewisePolynomialCurve(Curve):
         return table
 
     def _find_discontinuities(self, known_smoothness: int) -> list[float | None]:
-        """For each order 0..degree the first parameter at which that derivative jumps."""
+        """Return for each order 0..degree the first parameter at which that derivative jumps."""
         lengths = np.diff(self.breakpoints)
         table = self._table(self.degree)
         powers = lengths[:, None] ** np.arange(self.degree + 1)
@@ -167,10 +167,10 @@ class PiecewisePolynomialCurve(Curve):
 
 
 class PieceTable:
-    """Polynomials of u = theta - theta_s on each piece s of an interval, several of them at once.
+    """Polynomials of u = theta - theta_s on each piece s of an interval, for several quantities.
 
-    Before the first piece and after the last, their polynomials go on. A parameter that is not a
-    number has values that are none.
+    Before the first piece and after the last, their polynomials are extrapolated. A NaN parameter
+    has NaN values.
 
     Args:
         breakpoints: theta_s and the last end, increasing, [pieces + 1].
@@ -199,7 +199,7 @@ class PieceTable:
         Args:
             theta: Scalar.
             first: Number of the first of them.
-            count: How many; all by default.
+            count: Number of quantities; all by default.
         """
         count = self.quantities if count is None else count
         piece, u = self.piece(theta)
@@ -209,14 +209,14 @@ class PieceTable:
 
 
 def piece_function(breakpoints: np.ndarray) -> ca.Function:
-    """``theta -> number of the piece, theta - theta_s``; the first or last one from outside."""
+    """Return ``theta -> number of the piece, theta - theta_s``, an end piece from outside."""
     theta, table = ca.MX.sym("theta"), ca.MX(ca.DM(breakpoints))
     piece = ca.low(table, theta, {"lookup_mode": "binary"})
     return ca.Function("piece", [theta], [piece, theta - table[piece]])
 
 
 def _power_row(count: int) -> ca.Function:
-    """``u -> [1, u, u^2, ..]``, shape (1, count)."""
+    """Return ``u -> [1, u, u^2, ..]``, shape (1, count)."""
     u = ca.SX.sym("u")
     powers = [ca.SX(1.0), u]
     for j in range(2, count):

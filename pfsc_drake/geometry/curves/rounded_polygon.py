@@ -9,7 +9,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 
 _SHARPEST_DEG = 170.0
-# Of the domain: what is shorter is left out.
+# Of the domain: shorter pieces are omitted.
 _NOTHING = 1e-12
 
 
@@ -21,9 +21,9 @@ def round_corners(
     smoothness: int,
     closed: bool,
 ) -> PiecewisePolynomialCurve:
-    """Straight lines from point to point, with the corners blended.
+    """Return straight lines from point to point, with the corners blended.
 
-    Around the corner at theta_i the slope goes over from that of one line to that of the next,
+    Around the corner at theta_i the slope changes from one line's to the next one's,
 
         sigma'(theta) = (1 - b) slope_i + b slope_i+1,    |theta - theta_i| < distance_i,
 
@@ -35,8 +35,8 @@ def round_corners(
         points: Corners [n, dimension]; if `closed`, the last is the first again.
         parameters: theta_i [n], strictly increasing.
         distances: Half widths of the blends in theta, positive: [n - 2] of the inner corners
-            of an open curve, [n - 1] with that of the first corner first if `closed`. Those of
-            neighbours together must not exceed the line between them.
+            of an open curve, [n - 1] beginning with the first corner if `closed`. The sum of two
+            neighbours must not exceed the line between them.
         smoothness: k of the class C^k.
         closed: True for a closed curve.
 
@@ -51,7 +51,7 @@ def round_corners(
     rows: list[np.ndarray] = []
 
     def add(start: float, end: float, row: np.ndarray) -> None:
-        """A piece, unless neighbouring blends leave nothing of a line."""
+        """Add a piece, unless neighbouring blends leave nothing of a line."""
         if end - start > _NOTHING * (parameters[-1] - parameters[0]):
             starts.append(start)
             rows.append(row)
@@ -63,7 +63,7 @@ def round_corners(
         add(start, end, row)
 
     def bend(corner: int, before: np.ndarray, after: np.ndarray, width: float, half: bool) -> None:
-        """Blend from theta_i - width, or its second half from theta_i."""
+        """Add a blend from theta_i - width, or its second half from theta_i."""
         first = points[corner] - width * before
         length = width if half else 2.0 * width
         series = (second_half if half else whole) / length ** np.arange(terms)
@@ -95,15 +95,15 @@ def round_corners(
 
 
 def blend_distances(points: np.ndarray, distance: float, *, closed: bool) -> np.ndarray:
-    """Half widths of the blends of a polygon: a distance, but at most half of a side.
+    """Return half widths of the blends of a polygon: a distance, but at most half of a side.
 
     Args:
         points: Corners [n, dimension], m; if `closed`, the last is the first again.
-        distance: From the corner, m, positive.
+        distance: Distance from the corner, m, positive.
         closed: True for a closed polygon.
 
     Returns:
-        [n - 2], or [n - 1] with that of the first corner first if `closed`; m.
+        [n - 2], or [n - 1] beginning with the first corner if `closed`; m.
 
     Raises:
         InputError: a corner turns back by more than 170 degrees.
@@ -130,7 +130,7 @@ def blend_distances(points: np.ndarray, distance: float, *, closed: bool) -> np.
 
 
 def _blend_integral(smoothness: int) -> np.ndarray:
-    """Integral of the blend b over [0, 1] from 0 to s: coefficients of powers of s."""
+    """Return the integral of the blend b over [0, 1] from 0 to s: coefficients of powers of s."""
     k = smoothness - 1
     rate = Polynomial([0.0, 1.0]) ** k * Polynomial([1.0, -1.0]) ** k
     blend = rate.integ()
@@ -138,6 +138,6 @@ def _blend_integral(smoothness: int) -> np.ndarray:
 
 
 def _of_second_half(coefficients: np.ndarray) -> np.ndarray:
-    """Coefficients of the same polynomial of s in powers of 2 s - 1."""
+    """Return coefficients of the same polynomial of s in powers of 2 s - 1."""
     moved = Polynomial(coefficients)(Polynomial([0.5, 0.5])).coef
     return np.pad(np.asarray(moved, dtype=float), (0, len(coefficients) - len(moved)))

@@ -1,4 +1,4 @@
-"""How a curve goes on smoothly beyond its end to a straight line."""
+"""Smooth continuation of a curve beyond its end to a straight line."""
 
 import math
 
@@ -9,20 +9,20 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.geometry.curves.curve import Curve, check_order
 
-# How much a term of the Taylor series may change the tangent, relative to it.
+# Largest change of the tangent by a term of the Taylor series, relative to it.
 _BEND = 0.5
 
 
 class RunOut(Curve):
-    """A curve that goes on smoothly from the end of another one to a constant derivative.
+    """Curve that continues another one smoothly from its end to a constant derivative.
 
     With the distance u from the end, outwards, and its length L::
 
         sigma'(u) = (1 - w(u / L)) T(u) + w(u / L) g
 
     T is the Taylor polynomial of the curve's derivative at the end, w rises from 0 to 1 with
-    k - 1 vanishing derivatives at both ends, so that the curve is of class C^k there and goes
-    on with the constant derivative g in class C^k.
+    k - 1 vanishing derivatives at both ends, so that the curve is of class C^k there and can be
+    continued with the constant derivative g in class C^k.
 
     Args:
         derivatives: Derivatives of the curve at its end by theta, orders 0..k, [k + 1, dimension].
@@ -51,13 +51,13 @@ class RunOut(Curve):
             row[: polynomial.degree() + 1] = polynomial.coef
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 0..order with respect to theta, for set-up and figures."""
-        x = (self._checked(theta) - self._theta) / self._length
+        """Return derivatives 0..order with respect to theta, for set-up and figures."""
+        x = (self._to_domain(theta) - self._theta) / self._length
         powers = x[..., None] ** np.arange(self._degree + 1)
         return np.einsum("kdj,...j->...kd", self._table(order), powers)
 
     def expression(self, theta: ca.SX, order: int) -> ca.SX:
-        """`derivatives` at a scalar as an expression, [order + 1, dimension]."""
+        """Return `derivatives` at a scalar as an expression, [order + 1, dimension]."""
         x = (theta - self._theta) / self._length
         powers = [ca.SX(1.0)]
         for _ in range(self._degree):
@@ -66,7 +66,7 @@ class RunOut(Curve):
         return ca.horzcat(*rows).T
 
     def _table(self, order: int) -> np.ndarray:
-        """Map from powers of x to derivatives by theta, [order + 1, dimension, degree + 1]."""
+        """Return a map from powers of x to derivatives, [order + 1, dimension, degree + 1]."""
         table = np.zeros((check_order(order) + 1, *self._coefficients.shape))
         for k in range(min(order, self._degree) + 1):
             for j in range(k, self._degree + 1):
@@ -76,7 +76,7 @@ class RunOut(Curve):
 
 
 def straightening_length(derivatives: np.ndarray, longest: float) -> float:
-    """Length in which no term of the Taylor series takes a curve far from its tangent.
+    """Return a length in which no term of the Taylor series leads far from the tangent.
 
     Args:
         derivatives: Derivatives of the curve at its end by theta, orders 0..k, [k + 1, dimension].
@@ -91,7 +91,7 @@ def straightening_length(derivatives: np.ndarray, longest: float) -> float:
 
 
 def _smooth_step(k: int) -> Polynomial:
-    """Polynomial from 0 at 0 to 1 at 1 with k - 1 vanishing derivatives at both."""
+    """Return the polynomial from 0 at 0 to 1 at 1 with k - 1 vanishing derivatives at both."""
     x = Polynomial([0.0, 1.0])
     slope = (x * (1.0 - x)) ** (k - 1)
     rise = slope.integ()

@@ -14,7 +14,7 @@ Deviation = Callable[[np.ndarray], np.ndarray]
 # Logarithm of the roughness below which only the knots decide, and how exactly one is found.
 _LEAST, _STEP = -6.0, 0.05
 _FEWEST_INTERVALS, _MOST_INTERVALS = 8, 20_000
-# What of the tolerance the knots alone may cost.
+# Part of the tolerance that the knots alone may use.
 _KNOT_SHARE = 0.1
 # Part of the tolerance up to which points are inside.
 _INSIDE = 0.999
@@ -26,8 +26,8 @@ class SmoothFit(NamedTuple):
     Attributes:
         curve: The spline on [0, end].
         deviations: Distance of each point from it, [n].
-        attainable: Largest deviation of a curve that follows no noise; the tolerance to ask
-            for where `deviations` exceed the one given.
+        attainable: Largest deviation of a curve that follows no noise; the tolerance to
+            request where `deviations` exceed the present one.
     """
 
     curve: PiecewisePolynomialCurve
@@ -46,12 +46,12 @@ def smoothest_within(
     noise: float,
     deviation: Deviation,
 ) -> SmoothFit:
-    """The smoothest penalized spline near points, at most `tolerance` away from each.
+    """Return the smoothest penalized spline near points, at most `tolerance` away from each.
 
-    The knots are twice as many as least squares need to come as near as the noise lets them.
-    The penalty is the strongest that either keeps all points within the tolerance, or leaves
-    deviations as large as the noise (V. A. Morozov's principle of discrepancy): fitting more
-    closely would follow the noise. Points that are still outside then get larger weights.
+    There are twice as many knots as least squares need to come as near as the noise permits.
+    The penalty is the strongest that either puts all points within the tolerance, or leaves
+    deviations as large as the noise (V. A. Morozov's principle of discrepancy): a closer fit
+    would follow the noise. Points that are still outside then get larger weights.
 
     Args:
         parameters: Parameters of the points, [n], within [0, end].
@@ -60,12 +60,12 @@ def smoothest_within(
         degree: Degree of the polynomials; the spline is of class C^(degree - 1).
         closed: True for a periodic spline.
         tolerance: Largest deviation allowed.
-        noise: Root mean square of the deviations that noise makes, see `noise_level`.
+        noise: Root mean square of the deviations by noise, see `noise_level`.
         deviation: Maps values at all parameters [n, dimension] to deviations [n].
 
     Returns:
-        The spline; some deviations exceed the tolerance where even as many knots as points
-        do not let it come near enough.
+        The spline; some deviations exceed the tolerance where even as many knots as points do
+        not suffice.
     """
     most = max(min(len(points), _MOST_INTERVALS), _FEWEST_INTERVALS)
     allowed = noise + _KNOT_SHARE * tolerance
@@ -76,17 +76,17 @@ def smoothest_within(
         knots = UniformKnots(0.0, end, intervals, degree, closed)
         return PenalizedSpline(parameters[:, None], points - centre, knots)
 
-    def missed(coefficients: np.ndarray) -> np.ndarray:
+    def distances_of(coefficients: np.ndarray) -> np.ndarray:
         return deviation(spline.at_points(coefficients + centre))
 
     def near(coefficients: np.ndarray) -> bool:
-        found = missed(coefficients)
+        found = distances_of(coefficients)
         return bool(found.max() <= _INSIDE * tolerance or _rms(found) <= noise)
 
     intervals = _FEWEST_INTERVALS
     while intervals < most:
         spline = on(intervals)
-        if _rms(missed(spline.fit(_LEAST))) <= allowed:
+        if _rms(distances_of(spline.fit(_LEAST))) <= allowed:
             break
         intervals *= 2
     attainable = None
@@ -95,25 +95,25 @@ def smoothest_within(
         spline = on(intervals)
         roughness = spline.strongest(near, _LEAST, _STEP)
         coefficients = spline.fit(roughness)
-        attainable = attainable or float(missed(coefficients).max())
+        attainable = attainable or float(distances_of(coefficients).max())
         if attainable > tolerance:
-            coefficients, _ = spline.pulled_in(roughness, tolerance, _INSIDE, missed)
-        deviations = missed(coefficients)
+            coefficients, _ = spline.pull_in(roughness, tolerance, _INSIDE, distances_of)
+        deviations = distances_of(coefficients)
         if deviations.max() <= tolerance or intervals == most:
             curve = spline.knots[0].curve(coefficients + centre)
             return SmoothFit(curve, deviations, attainable)
 
 
 def noise_level(parameters: np.ndarray, points: np.ndarray, *, across: bool) -> float:
-    """Root mean square of the noise of points, from how badly neighbours predict each other.
+    """Return the root mean square noise of points, from their prediction by neighbours.
 
     Each point is compared with the cubic polynomial through two neighbours on either side.
-    What the cubic misses of a smooth curve counts as noise too, where points are sparse.
+    Where points are sparse, the error of the cubic on a smooth curve counts as noise, too.
 
     Args:
         parameters: [n], not decreasing.
         points: [n, dimension].
-        across: True to leave out what lies along the curve.
+        across: True to ignore the part along the curve.
 
     Returns:
         The noise; zero of less than five points.

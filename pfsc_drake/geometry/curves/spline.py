@@ -30,7 +30,7 @@ def interpolate(
     parametrization: Parametrization = "chord",
     parameters: ArrayLike | None = None,
 ) -> PiecewisePolynomialCurve:
-    """Spline of degree smoothness + 1 through waypoints, of class C^smoothness.
+    """Return a spline of degree smoothness + 1 through waypoints, of class C^smoothness.
 
     Args:
         waypoints: Points [n, dimension], m. If `closed`, the last one may repeat the first.
@@ -68,7 +68,7 @@ def interpolate(
 
 
 def close_polygon(points: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a polygon, and the lengths of its sides.
+    """Return the corners of a polygon, and the lengths of its sides.
 
     Args:
         points: [n, dimension], m. If `closed`, the last one may repeat the first.
@@ -97,7 +97,7 @@ def close_polygon(points: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndar
 def interpolate_at(
     parameters: np.ndarray, points: np.ndarray, degree: int, *, closed: bool
 ) -> PiecewisePolynomialCurve:
-    """Spline of the degree given through points at given parameters.
+    """Return a spline of a degree through points at prescribed parameters.
 
     Args:
         parameters: theta [n], strictly increasing.
@@ -120,12 +120,12 @@ def interpolate_at(
 def piecewise(
     spline: BSpline, starts: np.ndarray, end: float, *, closed: bool
 ) -> PiecewisePolynomialCurve:
-    """A B-spline as a curve of polynomials.
+    """Return a B-spline as a curve of polynomials.
 
     Args:
         spline: Spline of simple knots; defined over a whole period, wherever it begins, if
             `closed`.
-        starts: Where the pieces start, [pieces].
+        starts: First parameters of the pieces, [pieces].
         end: End of the last piece; end of the period if `closed`.
         closed: True for a periodic curve.
 
@@ -150,11 +150,11 @@ def piecewise(
 def _periodic_spline(
     parameters: np.ndarray, points: np.ndarray, degree: int
 ) -> tuple[BSpline, np.ndarray]:
-    """Periodic interpolating spline and the parameters at which its pieces start.
+    """Return the periodic interpolating spline and the parameters at which its pieces start.
 
     The knots of an even degree lie midway between the waypoints, in every interval:
-    SciPy's own periodic knots leave out one interval and put a knot on a waypoint, which
-    makes the curve depend on where the lap starts.
+    SciPy's own periodic knots omit one interval and put a knot on a waypoint, which
+    makes the curve depend on the start of the period.
     """
     count = len(points)
     period = parameters[-1] - parameters[0]
@@ -176,10 +176,10 @@ def _periodic_spline(
 
 
 def _fold_columns(matrix: csr_array, period: int) -> csr_array:
-    """Sum of the columns that are whole periods apart, [rows, period]."""
+    """Return the sum of the columns that are whole periods apart, [rows, period]."""
     entries = matrix.tocoo()
-    place = (entries.row, entries.col % period)
-    return csr_array((entries.data, place), shape=(matrix.shape[0], period))
+    indices = (entries.row, entries.col % period)
+    return csr_array((entries.data, indices), shape=(matrix.shape[0], period))
 
 
 @dataclass(frozen=True)
@@ -208,8 +208,8 @@ class UniformKnots:
     @property
     def knots(self) -> np.ndarray:
         """All knots, those outside of the domain too, [intervals + 2 degree + 1]."""
-        places = np.arange(-self.degree, self.intervals + self.degree + 1)
-        return self.begin + self.step * places
+        multiples = np.arange(-self.degree, self.intervals + self.degree + 1)
+        return self.begin + self.step * multiples
 
     @property
     def count(self) -> int:
@@ -222,7 +222,7 @@ class UniformKnots:
         return self.begin + self.step * (np.arange(self.count) - (self.degree - 1) / 2.0)
 
     def entries(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers and values of the B-splines not zero at parameters [n], [n, degree + 1] each."""
+        """Return indices and values of nonzero B-splines at parameters [n], [n, degree + 1]."""
         knots = self.knots
         # Knots are multiples of a step: the ends are not exactly on them.
         inside = np.clip(theta, knots[self.degree], knots[-self.degree - 1])
@@ -231,26 +231,26 @@ class UniformKnots:
         return matrix.indices.reshape(shape) % self.count, matrix.data.reshape(shape)
 
     def basis(self, theta: np.ndarray) -> csr_array:
-        """B-splines at parameters [n] within the domain, [n, count]."""
+        """Return B-splines at parameters [n] within the domain, [n, count]."""
         columns, values = self.entries(theta)
         rows = np.broadcast_to(np.arange(len(theta))[:, None], columns.shape)
-        place = (rows.ravel(), columns.ravel())
-        return csr_array((values.ravel(), place), shape=(len(theta), self.count))
+        indices = (rows.ravel(), columns.ravel())
+        return csr_array((values.ravel(), indices), shape=(len(theta), self.count))
 
-    def unfolded(self, coefficients: np.ndarray) -> np.ndarray:
-        """Coefficients of all knots from the distinct ones, along the first axis."""
+    def unfold(self, coefficients: np.ndarray) -> np.ndarray:
+        """Return coefficients of all knots from the distinct ones, along the first axis."""
         return coefficients[np.arange(self.intervals + self.degree) % self.count]
 
     def curve(self, coefficients: np.ndarray) -> PiecewisePolynomialCurve:
-        """The spline in this direction, [count, dimension], as a curve of polynomials."""
+        """Return the spline in this direction, [count, dimension], as a curve of polynomials."""
         knots = self.knots
-        spline = BSpline(knots, self.unfolded(coefficients), self.degree)
+        spline = BSpline(knots, self.unfold(coefficients), self.degree)
         starts = knots[self.degree : -self.degree - 1]
         return piecewise(spline, starts, self.end, closed=self.closed)
 
 
 def accumulate(chords: np.ndarray, parametrization: Parametrization) -> np.ndarray:
-    """Parameters of waypoints from the distances of neighbours.
+    """Return parameters of waypoints from the distances of neighbours.
 
     Args:
         chords: Distances [n - 1], m, positive.
@@ -287,7 +287,7 @@ def check_smoothness(smoothness: int) -> None:
 
 
 def check_parameters(parameters: ArrayLike, count: int) -> np.ndarray:
-    """Parameters of waypoints as an array, strictly increasing.
+    """Return parameters of waypoints as an array, strictly increasing.
 
     Args:
         parameters: theta [count].

@@ -16,7 +16,7 @@ def read_obj_vertices(file: FilePath) -> np.ndarray:
         file: The file.
 
     Raises:
-        InputError: It cannot be read, has no vertices, or one that is none.
+        InputError: It cannot be read, has no vertices, or a malformed one.
     """
     vertices = []
     for number, line in enumerate(read_regular_file(file, "OBJ").splitlines(), start=1):
@@ -53,7 +53,7 @@ _MAX_HEADER = 1 << 16
 
 
 class _Element(NamedTuple):
-    """What a header says of a kind of element; a property without a type is a list."""
+    """Element declared by a header; a property without a type is a list."""
 
     name: str
     number: int
@@ -103,7 +103,7 @@ def read_ply_vertices(file: FilePath) -> np.ndarray:
 
 
 def _header(file: FilePath, lines: list[str]) -> tuple[str, list[_Element]]:
-    """Byte order, none for text, and the elements."""
+    """Return the byte order, empty for text, and the elements."""
     order, elements = None, []
     for number, line in enumerate(lines[1:], start=2):
         match line.split():
@@ -125,11 +125,13 @@ def _header(file: FilePath, lines: list[str]) -> tuple[str, list[_Element]]:
 
 
 def _text_rows(lines: list[bytes], labels: list[str]) -> np.ndarray | None:
-    """Vertices [n, 3] of lines, None if they are none."""
-    places = [labels.index(axis) for axis in "xyz"]
+    """Return the vertices [n, 3] of lines, or None if they are malformed."""
+    columns = [labels.index(axis) for axis in "xyz"]
     rows = [line.split() for line in lines]
     try:
-        return np.array([[float(row[place]) for place in places] for row in rows]) if rows else None
+        return (
+            np.array([[float(row[column]) for column in columns] for row in rows]) if rows else None
+        )
     except (ValueError, IndexError):
         return None
 
@@ -137,7 +139,7 @@ def _text_rows(lines: list[bytes], labels: list[str]) -> np.ndarray | None:
 def _binary_rows(
     data: bytes, order: str, before: list[_Element], vertex: _Element
 ) -> np.ndarray | None:
-    """Vertices [n, 3] of a binary file, None if they are not there."""
+    """Return the vertices [n, 3] of a binary file, or None if they are missing."""
     sizes = [
         element.number * sum(np.dtype(kind).itemsize for _, kind in element.properties)
         for element in before
@@ -190,7 +192,7 @@ def read_stl(file: FilePath) -> Triangles:
 
 
 def _binary(data: bytes) -> np.ndarray | None:
-    """Corners of a binary file, shape (t, 3, 3); None if its length says that it is none.
+    """Return the corners of a binary file, shape (t, 3, 3); None if its length does not fit.
 
     The length decides, since binary files may well begin with "solid".
     """
@@ -204,11 +206,11 @@ def _binary(data: bytes) -> np.ndarray | None:
 
 
 def _text(data: bytes, file: FilePath) -> np.ndarray:
-    """Corners of a text file, shape (t, 3, 3)."""
+    """Return corners of a text file, shape (t, 3, 3)."""
     words = data.split()
-    places = np.flatnonzero(np.array([word.lower() == b"vertex" for word in words], dtype=bool))
+    columns = np.flatnonzero(np.array([word.lower() == b"vertex" for word in words], dtype=bool))
     try:
-        numbers = [float(word) for i in places for word in words[i + 1 : i + 4]]
+        numbers = [float(word) for i in columns for word in words[i + 1 : i + 4]]
         return np.array(numbers).reshape(-1, 3, 3)
     except ValueError:
         raise InputError(f"{file}: is no STL file, neither binary nor text") from None

@@ -14,7 +14,7 @@ from pfsc_drake.errors import (
     did_you_mean,
     in_one_line,
     nearest_file,
-    shortened,
+    shorten,
     suggestion,
 )
 from pfsc_drake.geometry.progress import Progress
@@ -30,11 +30,11 @@ _KINDS = {
 
 
 def read_regular_file(name: str | FilePath, kind: str) -> bytes:
-    """Return what a file holds.
+    """Return the content of a file.
 
     Args:
         name: Name of a regular file of at most 256 MiB.
-        kind: What it should be, for messages, as "CSV".
+        kind: Expected kind of file, for messages, such as "CSV".
 
     Raises:
         InputError: It cannot be read, is not regular or too large.
@@ -57,17 +57,17 @@ def read_regular_file(name: str | FilePath, kind: str) -> bytes:
 def unreadable(name: str | FilePath, kind: str, reason: str | None = None) -> InputError:
     """Return the error that refuses a file, by default because it is not text."""
     what = reason or "not a text file"
-    return InputError(f"{shortened(str(name), 1000)}: {what}; a readable {kind} file is required")
+    return InputError(f"{shorten(str(name), 1000)}: {what}; a readable {kind} file is required")
 
 
 MAX_ROWS = 1_000_000
 _ROWS_PER_REPORT = 50_000
 _LARGEST = 1e12
-# in the order in which they are looked for in the names of columns; white space is the last
+# in the order in which they are searched in the names of columns; white space is the last
 _SEPARATORS = (";", "\t", "|", ",")
 _G_CODE = re.compile(r"(N\d+\s*)?G\d{1,3}(\.\d)?(\s.*)?")
 _G_CODE_BEGINS = 20  # lines
-# How near to a known name, and of how many letters, a name is a slip of the pen.
+# Similarity to a known name and length from which a name counts as misspelt.
 _SLIP, _SHORTEST_SLIP = 0.75, 4
 
 
@@ -75,7 +75,7 @@ class NumberTable(NamedTuple):
     """Columns of numbers.
 
     Attributes:
-        lines: Where in the file the rows stand, [n].
+        lines: Line numbers of the rows in the file, [n].
         header: Names of the columns, [m].
         rows: [n, m].
         ignored: Names of further columns.
@@ -87,7 +87,7 @@ class NumberTable(NamedTuple):
     ignored: list[str]
 
     def notes(self, name: str) -> tuple[str, ...]:
-        """Sentences on what was not read.
+        """Return sentences on ignored columns.
 
         Args:
             name: Name of the file.
@@ -113,14 +113,14 @@ def read_numbers(
     """Read a CSV file.
 
     The first line that is neither empty nor a comment (#) names the columns. Semicolons, tabs,
-    bars, commas or white space separate them; where it is no comma, numbers may have a decimal
-    comma.
+    bars, commas or white space separate them; with other separators than commas numbers may have a
+    decimal comma.
 
     Args:
         name: Name of a regular file of at most 256 MiB and 1,000,000 rows.
-        what: What rows are, for messages, as "waypoints".
-        check_header: Refuses names of columns; told where they stand and the names.
-        progress: Told the fraction read and what is done.
+        what: Name of the rows in messages, such as "waypoints".
+        check_header: Refuses names of columns; called with their location and the names.
+        progress: Callback with the fraction read and the name of the step.
         known: Columns that are read, of those that pass `check_header`; all by default.
 
     Raises:
@@ -177,7 +177,7 @@ def _refuse_g_code(name: str, rows: list[str]) -> None:
 
 
 def check_columns(
-    place: str,
+    location: str,
     header: list[str],
     known: list[str],
     required: list[str],
@@ -187,11 +187,11 @@ def check_columns(
     """Refuse columns that are unknown, there twice, or missing.
 
     Args:
-        place: File and line, for messages.
+        location: File and line, for messages.
         header: Names of columns.
         known: Names that are allowed.
         required: Names that must be there.
-        others: Whether unknown names are allowed that are neither numbers nor nearly known.
+        others: Whether unknown names are allowed that are neither numbers nor misspelt ones.
 
     Raises:
         InputError: If a column is unknown, there twice, or missing.
@@ -199,7 +199,7 @@ def check_columns(
     problems = []
     for label in dict.fromkeys(header):
         if label not in known:
-            if others and not _looks_known(label, known):
+            if others and not _resembles_known(label, known):
                 continue
             hint = suggestion(label, known)
             if NUMBER.fullmatch(label):
@@ -210,7 +210,7 @@ def check_columns(
                 break
         elif header.count(label) > 1:
             problems.append(f"column '{label}' twice; once is allowed")
-    # one that is written wrongly is not missing besides
+    # a misspelt column is not reported as missing, too
     if not problems:
         missing = [f"'{label}'" for label in required if label not in header]
         verb = "is missing; it is required" if len(missing) == 1 else "are missing; required"
@@ -219,11 +219,11 @@ def check_columns(
             there = f"; further columns are {further}" if further else ""
             problems.append(f"column{'s' * (len(missing) > 1)} {', '.join(missing)} {verb}{there}")
     if problems:
-        raise InputError(f"{place}: {in_one_line(problems)}")
+        raise InputError(f"{location}: {in_one_line(problems)}")
 
 
-def _looks_known(label: str, known: list[str]) -> bool:
-    """Whether a name may be meant as one of the known ones, or is none at all."""
+def _resembles_known(label: str, known: list[str]) -> bool:
+    """Return whether a name is empty, a number, or probably a misspelt known one."""
     if not label or NUMBER.fullmatch(label.replace(",", ".")):
         return True
     if label.lower() in (name.lower() for name in known):
@@ -232,13 +232,13 @@ def _looks_known(label: str, known: list[str]) -> bool:
 
 
 def quote(text: str, longest: int = 40) -> str:
-    """Text for a message, its middle left out if it is long."""
+    """Return a text for a message, its middle omitted if it is long."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]}...{text[-half:]}"
 
 
 def _contents(name: str) -> Iterator[tuple[int, str, float]]:
-    """Lines that say something: number, text without comment, and the fraction of the file."""
+    """Yield lines with content: number, text without comment, and the fraction of the file."""
     try:
         text = read_regular_file(name, "CSV").decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -267,13 +267,13 @@ UNITS = tuple(_METRES)
 
 
 def metres(unit: str) -> float:
-    """Return how many metres a unit is.
+    """Return the length of a unit in metres.
 
     Args:
         unit: One of `UNITS`.
 
     Raises:
-        InputError: If it is none.
+        InputError: If the unit is unknown.
     """
     if unit not in _METRES:
         raise InputError(f"unit: '{unit}'; one of {', '.join(UNITS)} is required")

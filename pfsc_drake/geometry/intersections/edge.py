@@ -1,4 +1,4 @@
-"""Edges: the curves in which two surfaces meet."""
+"""Edges: the curves in which two surfaces intersect."""
 
 import math
 from typing import NamedTuple
@@ -22,18 +22,18 @@ from pfsc_drake.geometry.intersections.meeting import (
 from pfsc_drake.geometry.intersections.trace import Trace, Tracer
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
-# Of the size of a curve: how far from it its points may be.
+# Of the size of a curve: largest distance of its points from it.
 _EXACT = 1e-10
 
 
 def line_or_ellipse(points: np.ndarray, is_closed: bool) -> Curve | None:
-    """The straight line, circle or ellipse that points are on, or None if they are on none.
+    """Return the straight line, circle or ellipse that points are on, or None if there is none.
 
-    It begins at the first point and goes the way of the others; points are off it by 1e-10 of
+    It begins at the first point and runs in the order of the others; points are off it by 1e-10 of
     its size at most.
 
     Args:
-        points: Along a curve, exact, five or more if it is closed, [n, 3], m.
+        points: Exact points along a curve, five or more if it is closed, [n, 3], m.
         is_closed: Whether the last is a neighbour of the first; only such ellipses are known.
     """
     middle = points.mean(axis=0)
@@ -52,7 +52,7 @@ def line_or_ellipse(points: np.ndarray, is_closed: bool) -> Curve | None:
 def _ellipse(
     points: np.ndarray, middle: np.ndarray, axes: np.ndarray, allowed: float
 ) -> FourierCurve | None:
-    """The ellipse in a plane through ``middle + points @ axes``, or None."""
+    """Return the ellipse in a plane through ``middle + points @ axes``, or None."""
     scale = np.abs(points).max()
     x, y = (points / scale).T
     # a x^2 + b x y + c y^2 + d x + e y = 1
@@ -71,9 +71,9 @@ def _ellipse(
     if scale * np.abs(np.linalg.norm(unit, axis=1) - 1.0).max() > allowed:
         return None
     begin = math.atan2(unit[0, 1], unit[0, 0])
-    way = 1.0 if np.cross([*unit[0], 0.0], [*unit[1], 0.0])[2] > 0.0 else -1.0
+    sense = 1.0 if np.cross([*unit[0], 0.0], [*unit[1], 0.0])[2] > 0.0 else -1.0
     cosine, sine = math.cos(begin), math.sin(begin)
-    turned = root @ np.array([[cosine, -way * sine], [sine, way * cosine]])
+    turned = root @ np.array([[cosine, -sense * sine], [sine, sense * cosine]])
     return FourierCurve(
         middle + scale * center @ axes, [scale * turned[:, 0] @ axes], [scale * turned[:, 1] @ axes]
     )
@@ -81,22 +81,22 @@ def _ellipse(
 
 TOLERANCE = 1e-6
 _LEAST_TOLERANCE = 1e-9
-# Where within each piece of a spline it is looked how far from the edge it is.
+# Points within each piece of a spline at which its distance from the edge is evaluated.
 _CHECKS = np.linspace(0.05, 0.95, 8)
-# Of the tolerance: what may be seen there, so that it holds in between, too.
-_KEPT = 0.35
+# Of the tolerance: largest distance there, so that the tolerance holds in between, too.
+_CHECKED_SHARE = 0.35
 _MOST_REFINEMENTS, _MOST_NODES = 16, 20_000
-# Of the size: how far from a place of an edge one that is nearer to a point may be.
+# Of the size: length along an edge within which the closest point to a point is searched.
 _AROUND = 0.05
 
 
 class Edge(NamedTuple):
-    """A curve in which two surfaces meet.
+    """Curve in which two surfaces intersect.
 
     Attributes:
-        curve: Along ``n_1 x n_2``; a line, a circle or an ellipse where it is one, else a spline.
+        curve: The curve along ``n_1 x n_2``: a line, a circle, an ellipse, or else a spline.
         theta: Parameters of both surfaces at nodes along it, not wrapped, [n, 4].
-        deviation: How far the curve is from the edge, m.
+        deviation: Largest distance of the curve from the edge, m.
     """
 
     curve: Curve
@@ -107,9 +107,9 @@ class Edge(NamedTuple):
 def find_edges(
     first: Surface, second: Surface, *, smoothness: int, tolerance: float = TOLERANCE
 ) -> list[Edge]:
-    """All edges of two surfaces, the one of most nodes first.
+    """Return all edges of two surfaces, the one of most nodes first.
 
-    What is smaller than the samples of :func:`sample_grid` may be overlooked.
+    Edges smaller than the samples of :func:`sample_grid` may be overlooked.
 
     Args:
         first: Surface of class C^2; all edges are cut where it or the other one ends.
@@ -118,15 +118,15 @@ def find_edges(
         tolerance: Largest deviation of a spline, m.
 
     Raises:
-        InputError: They do not meet, coincide, or touch somewhere instead of crossing; says where.
+        InputError: They do not intersect, coincide, or touch somewhere; says where.
     """
-    meeting, tolerance = Meeting([first, second]), _checked(tolerance)
-    theta = _places(meeting)
+    meeting, tolerance = Meeting([first, second]), _check_tolerance(tolerance)
+    theta = _points_on_edges(meeting)
     require_crossing(meeting, theta)
     tracer, edges = Tracer(meeting), []
     while len(theta):
         trace = tracer.trace(theta[0])
-        edges.append(_fitted(meeting, trace, smoothness, tolerance))
+        edges.append(_fit(meeting, trace, smoothness, tolerance))
         theta = theta[1:][~_on_trace(meeting, trace, theta[1:])]
     return sorted(edges, key=lambda edge: -len(edge.theta))
 
@@ -139,7 +139,7 @@ def find_edge(
     smoothness: int,
     tolerance: float = TOLERANCE,
 ) -> Edge:
-    """The edge of two surfaces that is nearest to a point; a closed one begins there.
+    """Return the edge of two surfaces nearest to a point; a closed one begins there.
 
     Args:
         first: As for :func:`find_edges`.
@@ -154,30 +154,30 @@ def find_edge(
     point, meeting, tolerance = (
         np.asarray(near, float),
         Meeting([first, second]),
-        _checked(tolerance),
+        _check_tolerance(tolerance),
     )
     if point.shape != (3,) or not np.all(np.isfinite(point)):
         raise InputError(f"near: {point.tolist()}; 3 finite numbers, in m, are required")
-    theta = _places(meeting)
+    theta = _points_on_edges(meeting)
     far = np.linalg.norm(meeting.partials(theta, 0)[0, :, 0] - point, axis=1)
     nearest = theta[np.argmin(far)][None]
     require_crossing(meeting, nearest)
     nearest = _nearer(meeting, nearest, point)
-    return _fitted(meeting, Tracer(meeting).trace(nearest[0]), smoothness, tolerance)
+    return _fit(meeting, Tracer(meeting).trace(nearest[0]), smoothness, tolerance)
 
 
 def _nearer(meeting: Meeting, theta: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Parameters [1, 4] of the place on an edge, around a given one, that is nearest to a point."""
-    place = meeting.partials(theta, 0)[0, :, 0]
+    """Return the parameters [1, 4] of an edge's closest point to a point, near a first guess."""
+    sigma = meeting.partials(theta, 0)[0, :, 0]
     tangent = np.cross(*meeting.normals(theta))
     tangent /= np.linalg.norm(tangent)
 
-    def at(way: float) -> np.ndarray:
-        there, good = meeting.solve(theta, (place + way * tangent, tangent))
+    def at(offset: float) -> np.ndarray:
+        there, good = meeting.solve(theta, (sigma + offset * tangent, tangent))
         return there if good[0] else theta
 
-    def distance(way: float) -> float:
-        return float(np.linalg.norm(meeting.partials(at(way), 0)[0, 0, 0] - point))
+    def distance(offset: float) -> float:
+        return float(np.linalg.norm(meeting.partials(at(offset), 0)[0, 0, 0] - point))
 
     around = _AROUND * meeting.size
     options = {"xatol": SAME * meeting.size}
@@ -185,14 +185,14 @@ def _nearer(meeting: Meeting, theta: np.ndarray, point: np.ndarray) -> np.ndarra
     return at(float(found.x))
 
 
-def _checked(tolerance: float) -> float:
+def _check_tolerance(tolerance: float) -> float:
     if not _LEAST_TOLERANCE <= tolerance < np.inf:
         raise InputError(f"tolerance: {tolerance} m; {_LEAST_TOLERANCE:g} m or more is required")
     return tolerance
 
 
-def _places(meeting: Meeting) -> np.ndarray:
-    """Parameters of places on all edges, [n, 4]."""
+def _points_on_edges(meeting: Meeting) -> np.ndarray:
+    """Return the parameters of points on all edges, [n, 4]."""
     theta, good = meeting.solve(starts(meeting.surfaces))
     if not good.any():
         raise InputError(
@@ -203,26 +203,26 @@ def _places(meeting: Meeting) -> np.ndarray:
 
 
 def _on_trace(meeting: Meeting, trace: Trace, theta: np.ndarray) -> np.ndarray:
-    """Whether places on edges, [n, 4], are on one that has been traced, [n]."""
+    """Return whether points on edges, [n, 4], are on a traced one, [n]."""
     if not len(theta):
         return np.zeros(0, dtype=bool)
     nodes = meeting.partials(trace.theta, 0)[0, :, 0]
-    places = meeting.partials(theta, 0)[0, :, 0]
-    far = np.linalg.norm(nodes - places[:, None], axis=2)
+    points = meeting.partials(theta, 0)[0, :, 0]
+    far = np.linalg.norm(nodes - points[:, None], axis=2)
     nearest, far = far.argmin(axis=1), far.min(axis=1)
     steps = np.linalg.norm(np.diff(nodes, axis=0, append=nodes[:1]), axis=1)
     if not trace.is_closed:
         steps[-1] = 0.0
     local = np.maximum(steps, np.roll(steps, 1))[nearest]
     tangents = np.cross(*meeting.normals(theta))
-    begun, good = meeting.solve(trace.theta[nearest], (places, tangents))
-    off = np.linalg.norm(meeting.partials(begun, 0)[0, :, 0] - places, axis=1)
+    projected, good = meeting.solve(trace.theta[nearest], (points, tangents))
+    off = np.linalg.norm(meeting.partials(projected, 0)[0, :, 0] - points, axis=1)
     same = 10.0 * SAME * meeting.size
     return np.asarray((good & (off < same) & (far < local)) | (far < same))
 
 
-def _fitted(meeting: Meeting, trace: Trace, smoothness: int, tolerance: float) -> Edge:
-    """A curve through the nodes of an edge, and more of them where it would miss it."""
+def _fit(meeting: Meeting, trace: Trace, smoothness: int, tolerance: float) -> Edge:
+    """Return a curve through the nodes of an edge, refined until it is near enough."""
     theta = trace.theta
     for _ in range(_MOST_REFINEMENTS):
         points = meeting.partials(theta, 0)[0, :, 0]
@@ -239,10 +239,10 @@ def _fitted(meeting: Meeting, trace: Trace, smoothness: int, tolerance: float) -
                 points, smoothness=smoothness, closed=trace.is_closed, parameters=parameters
             )
             off = _deviations(meeting, curve, parameters, begin, end)
-            if off.max() <= _KEPT * tolerance:
+            if off.max() <= _CHECKED_SHARE * tolerance:
                 return Edge(curve, theta, float(off.max()))
-            far = off > _KEPT * tolerance
-        theta = _refined(meeting, theta, begin, end, far)
+            far = off > _CHECKED_SHARE * tolerance
+        theta = _refine(meeting, theta, begin, end, far)
         if len(theta) > _MOST_NODES:
             break
     raise InputError(
@@ -254,16 +254,16 @@ def _fitted(meeting: Meeting, trace: Trace, smoothness: int, tolerance: float) -
 def _neighbours(
     meeting: Meeting, theta: np.ndarray, is_closed: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parameters at both ends of all pieces between nodes, [pieces, 4] each."""
+    """Return parameters at both ends of all pieces between nodes, [pieces, 4] each."""
     if not is_closed:
         return theta[:-1], theta[1:]
-    # the first node again, as many turns on as lead to it
+    # the first node again, unwrapped towards the last one
     turns = np.round((theta[-1] - theta[0]) / meeting.lengths) * meeting.closed
     return theta, np.vstack([theta[1:], theta[:1] + turns * meeting.lengths])
 
 
 def _arc_lengths(meeting: Meeting, theta: np.ndarray, is_closed: bool) -> np.ndarray:
-    """Lengths along the edge up to its nodes, by arcs of circles; of a closed one its whole too."""
+    """Return arc lengths of an edge's nodes, by circular arcs; of a closed edge its length, too."""
     begin, end = _neighbours(meeting, theta, is_closed)
     chords = np.linalg.norm(
         meeting.partials(end, 0)[0, :, 0] - meeting.partials(begin, 0)[0, :, 0], axis=1
@@ -277,7 +277,7 @@ def _arc_lengths(meeting: Meeting, theta: np.ndarray, is_closed: bool) -> np.nda
 def _deviations(
     meeting: Meeting, curve: Curve, parameters: np.ndarray, begin: np.ndarray, end: np.ndarray
 ) -> np.ndarray:
-    """Largest distance of each piece of a curve from the edge, [pieces], m."""
+    """Return the largest distance of each piece of a curve from the edge, [pieces], m."""
     off = np.zeros(len(begin))
     for share in _CHECKS:
         at = curve.derivatives(parameters[:-1] + share * np.diff(parameters), 1)
@@ -288,10 +288,10 @@ def _deviations(
     return off
 
 
-def _refined(
+def _refine(
     meeting: Meeting, theta: np.ndarray, begin: np.ndarray, end: np.ndarray, far: np.ndarray
 ) -> np.ndarray:
-    """Nodes with one more in the middle of each of some pieces."""
+    """Return the nodes with one more in the middle of each piece that is too far off."""
     ends = [meeting.partials(part[far], 0)[0, :, 0] for part in (begin, end)]
     chords = ends[1] - ends[0]
     lengths = np.linalg.norm(chords, axis=1)

@@ -1,4 +1,4 @@
-"""Where surfaces meet, by Newton's method; where they touch; corners of three."""
+"""Intersections of surfaces by Newton's method, their tangency, and corners of three."""
 
 import itertools
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
 
 _ITERATIONS = 40
-# Of the lengths of the domain: the longest step, and one that is none.
+# Of the lengths of the domain: the longest step, and a negligible one.
 _MAX_STEP, _SETTLED = 0.1, 1e-13
-# Of the surfaces' size: distances that are none.
+# Of the surfaces' size: negligible distances.
 SAME = 1e-9
-# Added to what is inverted, relative to its trace: where surfaces touch it is singular.
+# Added to the matrix to invert, relative to its trace: where surfaces touch it is singular.
 _DAMPING = 1e-15
 
 
@@ -38,7 +38,7 @@ class Meeting:
         self.size = min(_extent(surface) for surface in surfaces)
 
     def partials(self, theta: np.ndarray, order: int) -> np.ndarray:
-        """Partial derivatives of all surfaces.
+        """Return the partial derivatives of all surfaces.
 
         Args:
             theta: Parameters within the domains, but for closed directions, shape [n, 2 m].
@@ -54,19 +54,19 @@ class Meeting:
         return np.array(parts)
 
     def inside(self, theta: np.ndarray) -> np.ndarray:
-        """Parameters moved to the nearest of their domains where these are open, [n, 2 m]."""
+        """Return parameters clipped to their domains in open directions, [n, 2 m]."""
         return np.where(self.closed, theta, np.clip(theta, self.begin, self.end))
 
     def normals(self, theta: np.ndarray) -> np.ndarray:
-        """Unit normals of all surfaces, shape [m, n, 3]."""
+        """Return the unit normals of all surfaces, shape [m, n, 3]."""
         partials = self.partials(theta, 1)
         cross = np.cross(partials[:, :, 1], partials[:, :, 2])
         return np.asarray(cross / np.linalg.norm(cross, axis=-1, keepdims=True))
 
     def gaps(self, theta: np.ndarray) -> np.ndarray:
-        """Largest distance of the places on the other surfaces from that on the first, [n], m."""
-        places = self.partials(theta, 0)[:, :, 0]
-        return np.asarray(np.linalg.norm(places[1:] - places[0], axis=-1).max(axis=0))
+        """Return the largest distance of the first surface's point from the others', [n], m."""
+        points = self.partials(theta, 0)[:, :, 0]
+        return np.asarray(np.linalg.norm(points[1:] - points[0], axis=-1).max(axis=0))
 
     def solve(
         self, theta: np.ndarray, planes: tuple[np.ndarray, np.ndarray] | None = None
@@ -74,9 +74,9 @@ class Meeting:
         """Move parameters by the least, in shares of the domains, until the surfaces meet.
 
         Args:
-            theta: Where to begin, shape [n, 2 m].
-            planes: Points and normals, [n, 3] each, of planes that the places are to lie in, too;
-                with them an edge is met at one place.
+            theta: Initial parameters, shape [n, 2 m].
+            planes: Points and normals, [n, 3] each, of planes that contain the points, too; each
+                meets an edge at one point.
 
         Returns:
             Parameters, [n, 2 m], and whether the surfaces meet there, [n].
@@ -100,19 +100,19 @@ class Meeting:
     def _equations(
         self, theta: np.ndarray, planes: tuple[np.ndarray, np.ndarray] | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals [n, e], m, and their slopes in shares of the domains, [n, e, 2 m]."""
+        """Return residuals [n, e], m, and their slopes in shares of the domains, [n, e, 2 m]."""
         partials, m = self.partials(theta, 1), len(self.surfaces)
-        place, tangents = partials[:, :, 0], partials[:, :, 1:].transpose(0, 1, 3, 2)
+        sigma, tangents = partials[:, :, 0], partials[:, :, 1:].transpose(0, 1, 3, 2)
         rows = 3 * (m - 1)
         residual = np.zeros((len(theta), rows + (planes is not None)))
         slopes = np.zeros((*residual.shape, 2 * m))
         for k in range(1, m):
             part = slice(3 * k - 3, 3 * k)
-            residual[:, part] = place[0] - place[k]
+            residual[:, part] = sigma[0] - sigma[k]
             slopes[:, part, :2], slopes[:, part, 2 * k : 2 * k + 2] = tangents[0], -tangents[k]
         if planes is not None:
             point, normal = planes
-            residual[:, -1] = np.einsum("ni,ni->n", normal, place[0] - point)
+            residual[:, -1] = np.einsum("ni,ni->n", normal, sigma[0] - point)
             slopes[:, -1, :2] = np.einsum("ni,nij->nj", normal, tangents[0])
         return residual, slopes * self.lengths
 
@@ -123,23 +123,23 @@ def _extent(surface: Surface) -> float:
     return float(np.linalg.norm(np.ptp(surface.partials(theta, 0)[:, 0], axis=0)))
 
 
-def numbers(place: np.ndarray) -> str:
-    """Return a place for a message, [3], m."""
-    rounded = np.round(place, 9) + 0.0
+def numbers(point: np.ndarray) -> str:
+    """Return the text of a point, [3], m, for messages."""
+    rounded = np.round(point, 9) + 0.0
     return "[" + ", ".join(f"{value:.6g}" for value in rounded) + "] m"
 
 
 # Radius of the ball around a sample over half of the diagonal to its neighbours: surfaces bend.
 _MARGIN = 1.25
-# More starts would take long; that many are there where surfaces coincide.
+# More starts would take long; coincident surfaces have that many.
 _MOST_STARTS = 20_000
 
 
 def starts(surfaces: Sequence[Surface]) -> np.ndarray:
-    """Parameters of samples that are so near that their surfaces may meet between them.
+    """Return the parameters of samples between which their surfaces may meet.
 
-    Samples are as fine as :func:`sample_grid` makes them; what is of all surfaces lies in
-    the balls around one sample of each.
+    Samples are those of :func:`sample_grid`; a common point of all surfaces lies in the balls
+    around one sample of each.
 
     Args:
         surfaces: m = 2 or 3.
@@ -168,17 +168,17 @@ def starts(surfaces: Sequence[Surface]) -> np.ndarray:
 
 
 def distinct(meeting: Meeting, theta: np.ndarray, distance: float) -> np.ndarray:
-    """Parameters [n, 2 m] of which no two places are nearer than a distance [m], the first kept."""
-    places = meeting.partials(theta, 0)[0, :, 0]
-    kept: list[int] = []
-    for row, place in enumerate(places):
-        if not kept or np.linalg.norm(places[kept] - place, axis=1).min() > distance:
-            kept.append(row)
-    return theta[kept]
+    """Return parameters [n, 2 m] without points closer than a distance [m] to an earlier one."""
+    points = meeting.partials(theta, 0)[0, :, 0]
+    rows: list[int] = []
+    for row, point in enumerate(points):
+        if not rows or np.linalg.norm(points[rows] - point, axis=1).min() > distance:
+            rows.append(row)
+    return theta[rows]
 
 
 def _radii(grid: SampleGrid) -> np.ndarray:
-    """Radii of balls around samples that hold the surface between them, [n_1, n_2]."""
+    """Return radii of balls around samples that contain the surface between them, [n_1, n_2]."""
     square = np.zeros(grid.position.shape[:2])
     for axis in (0, 1):
         step = np.moveaxis(grid.spacing(axis), axis, 0)
@@ -192,7 +192,7 @@ def _radii(grid: SampleGrid) -> np.ndarray:
 
 
 def _near(one: np.ndarray, r: np.ndarray, other: np.ndarray, s: np.ndarray) -> list[list[int]]:
-    """For each ball around the points of one those of another, by radius, that it meets."""
+    """Return for each ball around the points of one the balls of another that it meets."""
     found = cKDTree(other).query_ball_point(one, r + s.max())
     return [
         [j for j in near if np.linalg.norm(one[i] - other[j]) <= r[i] + s[j]] if near else []
@@ -201,7 +201,7 @@ def _near(one: np.ndarray, r: np.ndarray, other: np.ndarray, s: np.ndarray) -> l
 
 
 def _touch(points: list[np.ndarray], radii: list[np.ndarray], group: tuple[int, ...]) -> bool:
-    """Whether the balls of the second and the third surface meet, too."""
+    """Return whether the balls of the second and the third surface meet, too."""
     j, k = group
     return bool(np.linalg.norm(points[1][j] - points[2][k]) <= radii[1][j] + radii[2][k])
 
@@ -214,19 +214,19 @@ def _apart(points: list[np.ndarray]) -> str:
     )
 
 
-# Sine of the angle between normals below which surfaces touch: the distance from a place at which
-# they do is found but roughly.
+# Sine of the angle between normals below which surfaces touch: points of tangency are only found
+# roughly.
 _TOUCHING = 1e-3
 # Difference of curvatures times the size, below which surfaces that touch are one.
 _ONE = 1e-4
 
 
 def require_crossing(meeting: Meeting, theta: np.ndarray) -> None:
-    """Refuse places at which two surfaces have one tangent plane.
+    """Refuse points at which two surfaces have one tangent plane.
 
     Args:
         meeting: Two surfaces of class C^2.
-        theta: Parameters of places that they have in common, [n, 4].
+        theta: Parameters of common points, [n, 4].
 
     Raises:
         InputError: They touch or coincide there; says which and where.
@@ -250,7 +250,7 @@ def require_crossing(meeting: Meeting, theta: np.ndarray) -> None:
 
 
 def _bending(meeting: Meeting, k: int, theta: np.ndarray) -> np.ndarray:
-    """Second fundamental form of surface k in the directions of space, [3, 3], 1/m."""
+    """Return the second fundamental form of surface k in the directions of space, [3, 3], 1/m."""
     partials = meeting.partials(theta[None], 2)[k, 0]
     normal = np.cross(partials[1], partials[2])
     normal /= np.linalg.norm(normal)
@@ -267,9 +267,9 @@ _ONE_CORNER = 1e-6
 
 
 def find_corners(first: Surface, second: Surface, third: Surface) -> np.ndarray:
-    """All places at which three surfaces meet.
+    """Return all points at which three surfaces meet.
 
-    What is smaller than the samples of :func:`sample_grid` may be overlooked.
+    Corners closer than the samples of :func:`sample_grid` may be overlooked.
 
     Args:
         first: Surface of class C^1.
@@ -277,7 +277,7 @@ def find_corners(first: Surface, second: Surface, third: Surface) -> np.ndarray:
         third: Another.
 
     Returns:
-        Places [corners, 3], m, one or more, by x, then y, then z.
+        Points [corners, 3], m, one or more, by x, then y, then z.
 
     Raises:
         InputError: They meet nowhere within their bounds, or somewhere with normals that lie in a
@@ -300,5 +300,5 @@ def find_corners(first: Surface, second: Surface, third: Surface) -> np.ndarray:
             "normals do not lie in a plane"
         )
     one = _ONE_CORNER * meeting.size
-    places = meeting.partials(distinct(meeting, theta, one), 0)[0, :, 0]
-    return places[np.lexsort(np.round(places / one).T[::-1])]
+    points = meeting.partials(distinct(meeting, theta, one), 0)[0, :, 0]
+    return points[np.lexsort(np.round(points / one).T[::-1])]

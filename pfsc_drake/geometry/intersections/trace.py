@@ -1,4 +1,4 @@
-"""Tracing an edge of two surfaces from a place on it."""
+"""Tracing of an edge of two surfaces from a point on it."""
 
 import math
 from typing import NamedTuple
@@ -8,20 +8,20 @@ import numpy as np
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.intersections.meeting import Meeting, numbers
 
-# rad, by which the tangent may turn from one node to the next, and is wanted to.
-_MOST_TURN, _WANTED_TURN = 0.2, 0.1
+# rad: largest turn of the tangent from one node to the next, and the desired one.
+_MOST_TURN, _USUAL_TURN = 0.2, 0.1
 # Of the size of the smaller surface: longest, first and shortest step.
 _LONGEST, _FIRST, _SHORTEST = 1.0 / 24.0, 1e-3, 1e-7
 # Sine of the angle between the surfaces below which they touch.
 TOUCHING = 1e-4
-# Of the size: steps between which it is not asked whether the edge leaves and comes back.
+# Of the size: shorter steps are not checked for an edge that leaves and comes back.
 _GRAZING = 1e-4
 _BETWEEN = np.linspace(0.0, 1.0, 12)[1:-1, None]
 _MOST_NODES, _ATTEMPTS = 20_000, 6
 # Of a neighbouring step: steps that make no piece of their own.
 _TINY = 0.03
 _ITERATIONS = 10
-# Of the lengths of the domain: steps that are none, and places beyond an end that are on it.
+# Of the lengths of the domain: negligible steps, and distances beyond an end that count as on it.
 _SETTLED, _SAME_SHARE = 1e-13, 1e-9
 
 
@@ -39,16 +39,16 @@ class Trace(NamedTuple):
 
 class _Node(NamedTuple):
     theta: np.ndarray
-    place: np.ndarray
+    point: np.ndarray
     tangent: np.ndarray
-    steps: np.ndarray  # of the parameters per way along the edge, [4]
+    steps: np.ndarray  # of the parameters per length along the edge, [4]
 
 
 class Tracer:
-    """Follows the edge of two surfaces along ``n_1 x n_2``, the cross product of their normals.
+    """Predictor-corrector tracing of the edge of two surfaces along ``n_1 x n_2``.
 
-    A step along the tangent, then Newton's method within the plane across it; as long as the
-    tangent turns by 0.1 rad on it. It ends where it began, or where a surface does.
+    A step along the tangent over which it turns by 0.1 rad, then Newton's method within the plane
+    across it. Tracing ends at its start, or at the border of a surface.
 
     Args:
         meeting: Two surfaces of class C^2.
@@ -61,10 +61,10 @@ class Tracer:
         self._open = np.flatnonzero(~meeting.closed).tolist()
 
     def trace(self, theta: np.ndarray) -> Trace:
-        """Nodes of the whole edge.
+        """Return the nodes of the whole edge.
 
         Args:
-            theta: Parameters of a place on it, [4].
+            theta: Parameters of a point on it, [4].
 
         Raises:
             InputError: The surfaces touch on it, or it is too long and too bent.
@@ -78,18 +78,18 @@ class Tracer:
                 backward, back_again = self._go(start, -1.0, longest)
                 nodes = [*backward[:0:-1], *nodes]
             if not back_again:
-                return Trace(self._evened(np.array(nodes), is_closed), is_closed)
-            longest *= 0.25  # it stepped over where the other way ended
+                return Trace(self._without_tiny_steps(np.array(nodes), is_closed), is_closed)
+            longest *= 0.25  # it stepped over the end of the other direction
         raise InputError(
             f"surfaces: their edge runs along the border of one of them near"
-            f" {numbers(start.place)}; larger or smaller bounds are required"
+            f" {numbers(start.point)}; larger or smaller bounds are required"
         )
 
-    def _evened(self, theta: np.ndarray, is_closed: bool) -> np.ndarray:
-        """Nodes without those that stand next to another, before an end or where a lap closes."""
-        places = self._meeting.partials(theta, 0)[0, :, 0]
+    def _without_tiny_steps(self, theta: np.ndarray, is_closed: bool) -> np.ndarray:
+        """Return the nodes without those very close to another, at an end or a closure."""
+        points = self._meeting.partials(theta, 0)[0, :, 0]
         keep = np.ones(len(theta), dtype=bool)
-        steps = np.linalg.norm(np.diff(places, axis=0, append=places[:1]), axis=1)
+        steps = np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1)
         count = len(steps) if is_closed else len(steps) - 1
         for k in range(count):
             longest = max(steps[(k - 1) % count], steps[(k + 1) % count])
@@ -98,7 +98,7 @@ class Tracer:
         return theta[keep]
 
     def _node(self, theta: np.ndarray) -> _Node:
-        """Tangent and pace at a place of the edge."""
+        """Return the tangent and parameter rates at a point of the edge."""
         p, s_1, s_2, n = self._tangents(0, theta)
         _, r_1, r_2, m = self._tangents(1, theta)
         cross = np.cross(n / np.linalg.norm(n), m / np.linalg.norm(m))
@@ -118,24 +118,24 @@ class Tracer:
         return rows[0], rows[1], rows[2], np.cross(rows[1], rows[2])
 
     def _go(self, start: _Node, sign: float, longest: float) -> tuple[list[np.ndarray], bool]:
-        """Nodes from the start on, and whether they came back to it."""
+        """Return the nodes from the start on, and whether they came back to it."""
         size = self._meeting.size
         nodes, here, step = [start.theta], start, _FIRST * size
         left = False
         while len(nodes) < _MOST_NODES:
-            there = self._corrected(here, sign * step)
+            there = self._next_node(here, sign * step)
             turn = math.inf
             if there is not None:
                 turn = math.acos(min(1.0, max(-1.0, float(here.tangent @ there.tangent))))
             if there is None or turn > _MOST_TURN:
                 step *= 0.5
                 if step < _SHORTEST * size:
-                    raise self._touching(here.place)
+                    raise self._touching(here.point)
                 continue
             before, after = (
-                sign * float((node.place - start.place) @ start.tangent) for node in (here, there)
+                sign * float((node.point - start.point) @ start.tangent) for node in (here, there)
             )
-            near = np.linalg.norm(there.place - start.place) < 1.5 * step
+            near = np.linalg.norm(there.point - start.point) < 1.5 * step
             if left and near and before < 0.0 <= after and there.tangent @ start.tangent > 0.0:
                 return nodes, True
             left = left or not near
@@ -150,20 +150,20 @@ class Tracer:
                 continue
             nodes.append(there.theta)
             here = there
-            step = min(longest, step * min(2.0, _WANTED_TURN / max(turn, 1e-9)))
+            step = min(longest, step * min(2.0, _USUAL_TURN / max(turn, 1e-9)))
         raise InputError(
-            f"surfaces: their edge needs more than {_MOST_NODES} nodes, near {numbers(here.place)};"
+            f"surfaces: their edge needs more than {_MOST_NODES} nodes, near {numbers(here.point)};"
             " smoother or smaller surfaces are required"
         )
 
-    def _corrected(self, node: _Node, way: float) -> _Node | None:
-        """The place a way further along the tangent, or None."""
-        goal = node.place + way * node.tangent
-        theta = self._solved(node.theta + way * node.steps, plane=(goal, node.tangent))
+    def _next_node(self, node: _Node, distance: float) -> _Node | None:
+        """Return the node a distance further along the tangent, or None."""
+        goal = node.point + distance * node.tangent
+        theta = self._solve(node.theta + distance * node.steps, plane=(goal, node.tangent))
         return None if theta is None else self._node(theta)
 
     def _border(self, here: np.ndarray, there: np.ndarray) -> np.ndarray | None:
-        """Where the edge leaves a surface between two nodes, or None if that is not clear."""
+        """Return where the edge leaves a surface between two nodes, or None if undetermined."""
         begin, end = self._meeting.begin, self._meeting.end
         outside = [k for k in self._open if not begin[k] <= there[k] <= end[k]]
         crossings = []
@@ -172,7 +172,7 @@ class Tracer:
             share = (value - here[k]) / (there[k] - here[k])
             crossings.append((share, k, value))
         for share, k, value in sorted(crossings):
-            theta = self._solved(here + share * (there - here), held=(k, value))
+            theta = self._solve(here + share * (there - here), fixed=(k, value))
             if theta is None:
                 continue
             within = self._meeting.inside(theta[None])[0]
@@ -180,10 +180,10 @@ class Tracer:
                 return within
         return None
 
-    def _leaves(self, here: _Node, there: _Node, way: float) -> bool:
-        """Whether the edge is out of bounds between two nodes within, by cubic polynomials."""
+    def _leaves(self, here: _Node, there: _Node, distance: float) -> bool:
+        """Return whether the edge is out of bounds between two nodes within, by cubics."""
         k, s = self._open, _BETWEEN
-        slope, last = way * here.steps[k], way * there.steps[k]
+        slope, last = distance * here.steps[k], distance * there.steps[k]
         rise = (there.theta - here.theta)[k]
         theta = here.theta[k] + s * (
             slope + s * (3.0 * rise - 2.0 * slope - last + s * (slope + last - 2.0 * rise))
@@ -192,17 +192,17 @@ class Tracer:
         return bool(np.any(beyond > _SAME_SHARE * self._meeting.lengths[k]))
 
     def _holds(self, theta: np.ndarray) -> bool:
-        """Whether a place is within the bounds of both surfaces."""
+        """Return whether a point is within the bounds of both surfaces."""
         return bool(np.all(self._meeting.inside(theta[None])[0] == theta))
 
-    def _solved(
+    def _solve(
         self,
         theta: np.ndarray,
         *,
         plane: tuple[np.ndarray, np.ndarray] | None = None,
-        held: tuple[int, float] | None = None,
+        fixed: tuple[int, float] | None = None,
     ) -> np.ndarray | None:
-        """Parameters where the surfaces meet in a plane, or with one parameter given, or None."""
+        """Return parameters where the surfaces meet in a plane or at a fixed parameter, or None."""
         theta, J, r = np.array(theta), np.zeros((4, 4)), np.zeros(4)
         for _ in range(_ITERATIONS):
             p, s_1, s_2, _ = self._tangents(0, theta)
@@ -213,8 +213,8 @@ class Tracer:
             if plane is not None:
                 r[3] = plane[1] @ (p - plane[0])
                 J[3, :2] = plane[1] @ s_1, plane[1] @ s_2
-            elif held is not None:
-                J[3, held[0]], r[3] = 1.0, theta[held[0]] - held[1]
+            elif fixed is not None:
+                J[3, fixed[0]], r[3] = 1.0, theta[fixed[0]] - fixed[1]
             try:
                 step = np.linalg.solve(J, r)
             except np.linalg.LinAlgError:
@@ -224,13 +224,13 @@ class Tracer:
             theta = theta - step
             if np.abs(step / self._meeting.lengths).max() < _SETTLED:
                 break
-        if held is not None:
-            theta[held[0]] = held[1]
+        if fixed is not None:
+            theta[fixed[0]] = fixed[1]
         p, q = self._tangents(0, theta)[0], self._tangents(1, theta)[0]
         return theta if np.linalg.norm(p - q) < 1e-10 * self._meeting.size else None
 
-    def _touching(self, place: np.ndarray) -> InputError:
+    def _touching(self, point: np.ndarray) -> InputError:
         return InputError(
-            f"surfaces: touch at {numbers(place)} instead of crossing each other; an edge is where "
+            f"surfaces: touch at {numbers(point)} instead of crossing each other; an edge is where "
             "their normals differ"
         )

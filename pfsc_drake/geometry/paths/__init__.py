@@ -1,1 +1,1 @@
-"""Paths: arc length, moving frame, projection, and what a law reads of them at each tick."""
+"""Paths: arc length, moving frame, projection, and the quantities of a law at each tick."""

@@ -21,14 +21,14 @@ class ArcLength:
     """s(theta), the integral of |sigma'| from the begin of the domain, (3.12).
 
     Tabulated once, to 1e-10 m, instead of summed up along the motion as in (3.73): it does
-    not drift and does not depend on the way the path was run through. On a closed curve
-    every lap adds the length; theta is not wrapped.
+    not drift and does not depend on the motion along the path. On a closed curve
+    every revolution adds the length; theta is not wrapped.
 
     Args:
         curve: Regular curve of any dimension.
 
     Attributes:
-        length: Length of the curve (of one lap), m.
+        length: Length of the curve (of one revolution), m.
 
     Raises:
         InputError: the curve is a point, or |sigma'| jumps between two breakpoints.
@@ -53,7 +53,7 @@ class ArcLength:
         self.length = float(sums[-1])
         if not self.length > 0.0:
             raise InputError(f"curve: length {self.length:g} m; a regular curve is required")
-        self._closed, self._laps = curve.closed, curve.laps
+        self._closed, self._revolutions = curve.closed, curve.revolutions
         self._begin, self._end = begin, end
         self._breaks, self._sums = breaks.tolist(), sums.tolist()
         self._function = PiecewisePolynomialCurve(breaks, table, known_smoothness=1)
@@ -66,36 +66,36 @@ class ArcLength:
     @overload
     def __call__(self, theta: np.ndarray) -> np.ndarray: ...
     def __call__(self, theta: float | np.ndarray) -> float | np.ndarray:
-        """Arc length s(theta).
+        """Return the arc length s(theta).
 
         Args:
             theta: Path parameter or array of them. Not wrapped: beyond the period of a
-                closed curve s goes on beyond `length`, and below zero before its begin.
+                closed curve s exceeds `length`, and is negative before its begin.
                 Outside of an open curve the value at its end is returned.
 
         Returns:
             s, m, of the same shape.
         """
         if isinstance(theta, np.ndarray):
-            laps = self._laps(theta)
-            local = np.clip(theta - laps * (self._end - self._begin), self._begin, self._end)
-            return self._function.derivatives(local, 0)[..., 0, 0] + laps * self.length
-        lap = 0
+            revolutions = self._revolutions(theta)
+            local = np.clip(theta - revolutions * (self._end - self._begin), self._begin, self._end)
+            return self._function.derivatives(local, 0)[..., 0, 0] + revolutions * self.length
+        revolution = 0
         if not self._begin <= theta <= self._end:
             if not self._closed:
                 return 0.0 if theta < self._begin else self.length
             period = self._end - self._begin
-            lap = math.floor((theta - self._begin) / period)
-            theta -= lap * period
+            revolution = math.floor((theta - self._begin) / period)
+            theta -= revolution * period
         piece = min(max(bisect_right(self._breaks, theta), 1), len(self._rows)) - 1
         u = theta - self._breaks[piece]
         u2 = u * u
         u3, u4 = u2 * u, u2 * u2
         powers = (1.0, u, u2, u3, u4, u2 * u3, u3 * u3, u3 * u4)
-        return self._rows[piece].dot(powers).item() + lap * self.length
+        return self._rows[piece].dot(powers).item() + revolution * self.length
 
     def parameter(self, s: float) -> float:
-        """The parameter theta with arc length s.
+        """Return the parameter theta with arc length s.
 
         Args:
             s: Arc length, m: any number on a closed curve, [0, length] on an open one.
@@ -111,8 +111,8 @@ class ArcLength:
         slack = 1e-9 * self.length
         if not self._closed and not -slack <= s <= self.length + slack:
             raise InputError(f"arc length: {s:.9g} m; the open path has [0, {self.length:.9g}] m")
-        laps = math.floor(s / self.length) if self._closed else 0
-        target = min(max(s - laps * self.length, 0.0), self.length)
+        revolutions = math.floor(s / self.length) if self._closed else 0
+        target = min(max(s - revolutions * self.length, 0.0), self.length)
         piece = min(bisect_right(self._sums, target), len(self._breaks) - 1) - 1
         start, coefficients = self._breaks[piece], self._coefficients[piece]
         low, high = start, self._breaks[piece + 1]
@@ -133,4 +133,4 @@ class ArcLength:
             if abs(step) <= 1e-15 * (self._end - self._begin):
                 break
             theta = theta + step if low <= theta + step <= high else (low + high) / 2.0
-        return theta + laps * (self._end - self._begin)
+        return theta + revolutions * (self._end - self._begin)

@@ -1,4 +1,4 @@
-"""Parallel transport frame along a curve, and one that is turned on a closed lap."""
+"""Parallel transport frame along a curve, and a frame turned about the tangent."""
 
 import math
 from typing import Protocol
@@ -15,7 +15,7 @@ from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 # of e_perp on an interval; by Gauss' points for its rate
 _DEGREE = 8
 _STAGES = 0.5 * (np.polynomial.legendre.leggauss(_DEGREE)[0] + 1.0)
-# places where the solution is checked, the residual that is allowed there times an interval's
+# points at which the solution is checked, the residual that is allowed there times an interval's
 # length, and the shortest interval as a share of the domain
 _BETWEEN = 0.5 * (np.append(_STAGES, 1.0) + np.insert(_STAGES, 0, 0.0))
 _RESIDUAL, _SHORTEST = 1e-12, 1e-12
@@ -31,19 +31,19 @@ class ParallelTransportFrame:
     the iteration (3.81) it needs no memory and does not depend on the speed.
 
     On a closed curve the frame comes back turned about e_par by the holonomy angle;
-    e_perp then also depends on the lap, which is taken from the unwrapped theta.
+    e_perp then also depends on the revolution, which follows from the unwrapped theta.
 
     Args:
         curve: Regular curve in R^3, at least of class C^1.
-        initial_normal: e_perp at the begin of the domain, [3]: made perpendicular to the
-            tangent and a unit vector. The default is the direction closest to the world's
+        initial_normal: e_perp at the begin of the domain, [3]; its part perpendicular to the
+            tangent is normalized. The default is the direction closest to the world's
             z, or x where the tangent is within 26 degrees of z.
 
     Attributes:
         turns: False: it does not turn about the tangent.
         holonomy: Angle from e_perp(theta) to e_perp(theta + period) about e_par, rad, in
             (-pi, pi]; zero for an open curve.
-        breakpoints: Between two of them e_perp is smooth, with those of the curve, [n].
+        breakpoints: Ends of the intervals in which e_perp is smooth, with those of the curve, [n].
 
     Raises:
         InputError: the curve is not three-dimensional or has a corner, or the initial
@@ -71,7 +71,7 @@ class ParallelTransportFrame:
         self.breakpoints = self._table.breakpoints
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Both normal vectors.
+        """Return both normal vectors.
 
         Args:
             theta: Unwrapped path parameters, shape [...].
@@ -85,24 +85,24 @@ class ParallelTransportFrame:
         """
         values = np.asarray(theta, dtype=float)
         tangents = _unit(self._curve.derivatives(values, 1)[..., 1, :])
-        laps = self._curve.laps(values)
-        local = np.clip(values - laps * self._curve.period, *self._curve.domain)
+        revolutions = self._curve.revolutions(values)
+        local = np.clip(values - revolutions * self._curve.period, *self._curve.domain)
         e_perp = self._table.derivatives(local, 0)[..., 0, :]
         along = np.sum(e_perp * tangents, axis=-1, keepdims=True)
         e_perp = _unit(e_perp - along * tangents)
         e_cross = np.cross(tangents, e_perp)
-        turn = (laps * self.holonomy)[..., None]
+        turn = (revolutions * self.holonomy)[..., None]
         c, s = np.cos(turn), np.sin(turn)
         return c * e_perp + s * e_cross, c * e_cross - s * e_perp
 
     def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 1..order of the angle by which it turns, all zero, [..., order]."""
+        """Return derivatives 1..order of the angle by which it turns, all zero, [..., order]."""
         return np.zeros((*np.shape(theta), order))
 
 
 @once_per_content()
 def _transport(curve: Curve, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Solution of (3.4): breakpoints, power coefficients, and e_perp at the last end."""
+    """Solve (3.4); return breakpoints, power coefficients, and e_perp at the last end."""
     begins, lengths, turns = _turns(curve)
     ends = np.append(begins[1:], curve.breakpoints[-1])
     # the curvature may jump at a breakpoint; the interval's own value counts
@@ -120,12 +120,12 @@ def _transport(curve: Curve, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _turns(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Solve (3.4) for every normal, on intervals that are as short as that takes.
+    """Solve (3.4) for every normal, on intervals that are as short as needed.
 
     With ``Omega = e_par x e_par'`` the normal obeys ``e_perp' = Omega x e_perp``, linear and with
-    coefficients that are known: so ``Phi' = [Omega]x Phi`` with ``Phi = 1`` at the begin of an
-    interval is solved by collocation on all intervals at once, and halves of those whose residual
-    is too large are tried again.
+    known coefficients. ``Phi' = [Omega]x Phi`` with ``Phi = 1`` at the begin of an interval is
+    solved by collocation on all intervals together; intervals whose residual is too large are
+    halved and solved again.
 
     Returns:
         Begins and lengths of the intervals, each (n,), and ``Phi'`` times the length at the
@@ -133,11 +133,11 @@ def _turns(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     begins, ends = curve.breakpoints[:-1], curve.breakpoints[1:]
     shortest = _SHORTEST * (ends[-1] - begins[0])
-    looked_at = np.concatenate([_STAGES, _BETWEEN])
+    nodes = np.concatenate([_STAGES, _BETWEEN])
     found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     while len(begins):
         lengths = ends - begins
-        A = _angular_rate(curve, begins[:, None] + lengths[:, None] * looked_at)
+        A = _angular_rate(curve, begins[:, None] + lengths[:, None] * nodes)
         A = A * lengths[:, None, None, None]
         stages, between = A[:, : len(_STAGES)], A[:, len(_STAGES) :]
         system = -np.einsum("ij,niab->niajb", _integrals(_STAGES), stages)
@@ -165,7 +165,7 @@ def _turns(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _angular_rate(curve: Curve, theta: np.ndarray) -> np.ndarray:
-    """Cross product matrix of ``e_par x e_par'``, [..., 3, 3]."""
+    """Return the cross product matrix of ``e_par x e_par'``, [..., 3, 3]."""
     slope, bend = np.moveaxis(curve.derivatives(theta, 2)[..., 1:, :], -2, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         x, y, z = np.moveaxis(
@@ -176,29 +176,29 @@ def _angular_rate(curve: Curve, theta: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def _values(places: np.ndarray) -> np.ndarray:
-    """Lagrange's polynomials of the collocation points at places in [0, 1], (places, s)."""
+def _values(points: np.ndarray) -> np.ndarray:
+    """Return Lagrange's polynomials of the collocation points at points in [0, 1], (points, s)."""
     degree = len(_STAGES) - 1
     basis = np.polynomial.legendre.legvander(2.0 * _STAGES - 1.0, degree)
     return np.linalg.solve(
-        basis.T, np.polynomial.legendre.legvander(2.0 * places - 1.0, degree).T
+        basis.T, np.polynomial.legendre.legvander(2.0 * points - 1.0, degree).T
     ).T
 
 
-def _integrals(places: np.ndarray) -> np.ndarray:
-    """Their integrals from 0 on, (places, s)."""
+def _integrals(points: np.ndarray) -> np.ndarray:
+    """Return the integrals of Lagrange's polynomials from 0 on, (points, s)."""
     nodes, weights = np.polynomial.legendre.leggauss(len(_STAGES))
-    within = places[:, None] * 0.5 * (nodes + 1.0)
+    within = points[:, None] * 0.5 * (nodes + 1.0)
     values = _values(within.ravel()).reshape(*within.shape, -1)
-    return 0.5 * places[:, None] * np.einsum("k,pks->ps", weights, values)
+    return 0.5 * points[:, None] * np.einsum("k,pks->ps", weights, values)
 
 
-def _initial_normal(tangent: np.ndarray, wanted: ArrayLike | None) -> np.ndarray:
-    if wanted is None:
+def _initial_normal(tangent: np.ndarray, requested: ArrayLike | None) -> np.ndarray:
+    if requested is None:
         vertical = abs(tangent[2]) > _VERTICAL
         direction = np.array([1.0, 0.0, 0.0] if vertical else [0.0, 0.0, 1.0])
     else:
-        direction = np.asarray(wanted, dtype=float)
+        direction = np.asarray(requested, dtype=float)
         if direction.shape != (3,) or not np.all(np.isfinite(direction)):
             raise InputError(f"initial normal: {direction.tolist()}; 3 finite values are required")
     across = direction - (direction @ tangent) * tangent
@@ -223,7 +223,7 @@ def manifold_axes(slope: np.ndarray, e_perp: np.ndarray) -> np.ndarray:
     """
     x, y, z = slope.tolist()
     norm = math.sqrt(x * x + y * y + z * z)
-    # a path that stands still has no direction, which is not finite rather than an error
+    # where the derivative vanishes there is no direction: NaN rather than an error
     x, y, z = (x / norm, y / norm, z / norm) if norm > 0.0 else (math.nan,) * 3
     u, v, w = e_perp.tolist()
     return np.array([[x, u, y * w - z * v], [y, v, z * u - x * w], [z, w, x * v - y * u]])
@@ -235,7 +235,7 @@ class Frame(Protocol):
     Attributes:
         turns: Whether it turns about the tangent, by an angle psi against parallel transport.
         holonomy: Angle about e_par from e_perp(theta) to e_perp(theta + period), rad.
-        breakpoints: Between two of them it is smooth, [n].
+        breakpoints: Ends of the intervals in which it is smooth, [n].
     """
 
     turns: bool
@@ -243,10 +243,10 @@ class Frame(Protocol):
     breakpoints: np.ndarray
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Both normal vectors e_perp and e_cross, each [..., 3]."""
+        """Return both normal vectors e_perp and e_cross, each [..., 3]."""
 
     def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 1..order of psi by theta, rad, [..., order]."""
+        """Return derivatives 1..order of psi by theta, rad, [..., order]."""
 
 
 class TurnedFrame:
@@ -270,12 +270,12 @@ class TurnedFrame:
         self.breakpoints = transported.breakpoints
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Both normal vectors e_perp and e_cross, each [..., 3]."""
+        """Return both normal vectors e_perp and e_cross, each [..., 3]."""
         e_perp, e_cross = self._transported.normals(theta)
         angle = self._psi.derivatives(theta, 0)[..., 0, :]
         c, s = np.cos(angle), np.sin(angle)
         return c * e_perp + s * e_cross, c * e_cross - s * e_perp
 
     def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """Derivatives 1..order of psi by theta, rad, [..., order]."""
+        """Return derivatives 1..order of psi by theta, rad, [..., order]."""
         return self._psi.derivatives(theta, order)[..., 1:, 0]

@@ -20,12 +20,12 @@ _SAMPLES_PER_SEGMENT = 64
 
 
 class PathWaypoints(NamedTuple):
-    """What a path was made of.
+    """Waypoints of a path.
 
     Attributes:
         positions: Waypoints [n, 3], m; the last may repeat the first.
-        parameters: theta of each, or of the path's nearest point, [n].
-        manner: Whether the path leads through them, or near them by smoothing or rounding.
+        parameters: theta of each, or of the path's closest point, [n].
+        manner: Whether the path passes through them, or near them by smoothing or rounding.
     """
 
     positions: np.ndarray
@@ -39,19 +39,19 @@ class Path:
     Args:
         position: Regular curve in R^3, m.
         orientation: Quaternions over the same parameter, or None for arms that only
-            position. Closed if `position` is, with a period of one or two laps.
+            position. Closed if `position` is, with a period of one or two revolutions.
         initial_normal: e_perp at the begin of the path, [3], see `ParallelTransportFrame`.
         frame: Frame along the path; one of parallel transport by default.
-        waypoints: What the path was made of, if it was.
-        notes: Sentences on what of a file was left out.
+        waypoints: Waypoints of the path, if it has some.
+        notes: Sentences on ignored parts of a file.
 
     Attributes:
         position: The curve sigma_t.
         orientation: The curve of quaternions, or None.
         arc_length: Arc length of `position`.
         frame: Frame along `position`.
-        waypoints: What the path was made of, or None.
-        notes: Sentences on what of a file was left out.
+        waypoints: Waypoints of the path, or None.
+        notes: Sentences on ignored parts of a file.
 
     Raises:
         InputError: the position is not a regular curve in R^3, or the orientation does not
@@ -82,7 +82,7 @@ class Path:
         self._evaluators: dict[int, PathEvaluator] = {}
 
     def __content__(self) -> object:
-        """Return what decides over it."""
+        """Return all objects that the path depends on."""
         return self.position, self.orientation, self.frame, self.waypoints
 
     @property
@@ -92,7 +92,7 @@ class Path:
 
     @property
     def length(self) -> float:
-        """Length of the path (of one lap), m."""
+        """Length of the path (of one revolution), m."""
         return self.arc_length.length
 
     def require_smoothness(self, k: int, purpose: str) -> None:
@@ -103,7 +103,7 @@ class Path:
 
         Args:
             k: Class C^k needed of the position; the orientation needs C^(k - 1).
-            purpose: What needs it, for the message.
+            purpose: Use that needs it, for the message.
 
         Raises:
             InputError: a derivative of too low an order jumps.
@@ -123,7 +123,7 @@ class Path:
             )
 
     def evaluator(self, order: int) -> PathEvaluator:
-        """What a law calls at each tick; made once for every order.
+        """Return the evaluator that a law calls at each tick, created once for every order.
 
         Args:
             order: Relative degree r of the law, 1..5.
@@ -145,11 +145,11 @@ class Path:
         return float(self.evaluator(1).find(np.asarray(point, dtype=float)))
 
     def pose(self, eta: float) -> tuple[np.ndarray, np.ndarray | None]:
-        """Reference pose at an arc length.
+        """Return the reference pose at an arc length.
 
         Args:
-            eta: Arc length, m. Beyond an end of an open path the position goes on along
-                the tangent and the orientation stays.
+            eta: Arc length, m. Beyond an end of an open path the position is extended along
+                the tangent and the orientation is constant.
 
         Returns:
             Position [3], m, and rotation matrix [3, 3], or None without orientation.
@@ -210,10 +210,10 @@ def _check_domains(position: Curve, orientation: OrientationCurve) -> None:
             f"path: position is {words[position.closed]}, orientation {words[orientation.closed]};"
             " both must be of the same kind"
         )
-    laps = round(orientation.period / position.period)
+    revolutions = round(orientation.period / position.period)
     if position.closed:
-        fits = abs(first - begin) <= slack and laps in (1, 2)
-        fits = fits and abs(orientation.period - laps * position.period) <= slack
+        fits = abs(first - begin) <= slack and revolutions in (1, 2)
+        fits = fits and abs(orientation.period - revolutions * position.period) <= slack
     else:
         fits = first <= begin + slack and last >= end - slack
     if not fits:
@@ -231,7 +231,7 @@ class PathTarget:
 
         p' = e_par eta' (1 - xi_1 k . e_perp - xi_2 k . e_cross) + xi_1' e_perp + xi_2' e_cross
 
-    A given frame, which turns by ``w = d psi / d eta``, adds
+    A prescribed frame, which turns by ``w = d psi / d eta``, adds
     ``w eta' (xi_1 e_cross - xi_2 e_perp)``.
 
     Args:

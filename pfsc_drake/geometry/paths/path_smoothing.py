@@ -12,10 +12,10 @@ from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.smoothing import SmoothFit, noise_level, smoothest_within
 from pfsc_drake.geometry.progress import Progress
 
-# Points nearer than this many tolerances say nothing of the way between them.
+# Points nearer than this many tolerances do not determine the path between them.
 _STRIDE = 3.0
 _ROUNDS = 3
-_FOOT_STEPS = 3
+_PROJECTION_STEPS = 3
 _LENGTH_SAMPLES = 16
 _FEWEST_CLOSED = 4
 
@@ -28,10 +28,10 @@ def smooth_positions(
     closed: bool,
     progress: Progress | None = None,
 ) -> tuple[PiecewisePolynomialCurve, np.ndarray]:
-    """The smoothest curve near noisy points, see `smoothest_within`.
+    """Return the smoothest curve near noisy points, see `smoothest_within`.
 
-    Its parameter is the arc length, nearly: a first guess is taken from points that are far
-    enough apart for the noise not to count, then each point gets the arc length of its foot.
+    Its parameter is approximately the arc length: the first guess uses points far enough apart
+    for the noise to be negligible, then each point gets the arc length of its projection.
 
     Args:
         points: [n, 3], m; neighbours may coincide. A closed curve returns from the last to
@@ -39,7 +39,7 @@ def smooth_positions(
         smoothness: k of the class C^k.
         tolerance: Largest distance of a point from the curve, m.
         closed: True for a closed curve.
-        progress: Told the fraction done and what is done.
+        progress: Callback with the fraction done and the name of the step.
 
     Returns:
         The curve on [0, theta_1], and theta of the points, [n].
@@ -74,7 +74,7 @@ def smooth_positions(
     for done in range(_ROUNDS):
         if progress is not None:
             progress((done + 1.0) / (_ROUNDS + 1.0), "smoothing the waypoints")
-        theta, end = _arc_lengths(found.curve, _feet(found.curve, theta, points))
+        theta, end = _arc_lengths(found.curve, _closest_parameters(found.curve, theta, points))
         found = fit(theta, end)
     _require_near(
         found,
@@ -95,18 +95,18 @@ def smooth_orientation(
     tolerance: float,
     closed: bool,
 ) -> OrientationCurve:
-    """The smoothest orientation near noisy ones, see `smoothest_within`.
+    """Return the smoothest orientation near noisy ones, see `smoothest_within`.
 
     Args:
         quaternions: (w, x, y, z), [n, 4], of length one.
         parameters: theta of each, [n], within [0, end].
-        end: End of the domain, or of the first lap if `closed`.
+        end: End of the domain, or of the first period if `closed`.
         smoothness: k of the class C^k.
         tolerance: Largest angle between an orientation and the curve there, rad.
         closed: True if it is periodic.
 
     Returns:
-        The curve; its period is two laps if the quaternion returns with its sign flipped.
+        The curve; its period is two revolutions if the quaternion returns with its sign flipped.
 
     Raises:
         InputError: neighbours are more than 170 degrees apart, or no curve is near enough.
@@ -117,7 +117,7 @@ def smooth_orientation(
         theta, q, end = np.concatenate([theta, theta + end]), np.vstack([q, -q]), 2.0 * end
 
     def angles(values: np.ndarray) -> np.ndarray:
-        # Half an angle is that between the quaternions; atan2 keeps the digits of small ones.
+        # The angle between quaternions is half of it; atan2 preserves the digits of small angles.
         along = np.sum(values * q, axis=1)
         across = np.linalg.norm(values - along[:, None] * q, axis=1)
         return np.asarray(2.0 * np.arctan2(across, along))
@@ -139,7 +139,7 @@ def smooth_orientation(
 
 
 def allows_tolerance(points: np.ndarray, tolerance: float, closed: bool) -> bool:
-    """Whether points reach far enough for a path that may miss them by a tolerance.
+    """Return whether points reach far enough for a path that may miss them by a tolerance.
 
     Args:
         points: [n, 3], m.
@@ -160,7 +160,7 @@ def _require_near(
     unit_of: tuple[float, str],
     is_allowed: Callable[[float], bool],
 ) -> None:
-    """Refuse a curve that is not near enough, with a tolerance that would do if there is one."""
+    """Refuse a curve that is not near enough, and propose a sufficient tolerance if possible."""
     scale, unit = unit_of
     worst = int(np.argmax(found.deviations))
     if found.deviations[worst] > tolerance:
@@ -178,34 +178,34 @@ def _require_near(
 def _accumulate_strides(
     points: np.ndarray, stride: float, closed: bool
 ) -> tuple[np.ndarray, float]:
-    """Lengths along the polygon of points that are a stride apart: theta [n], and its end.
+    """Return lengths along the polygon of points that are a stride apart: theta [n], and its end.
 
     The points between are projected on their side of the polygon.
     """
-    kept = [0]
+    rows = [0]
     x, y, z = points[0].tolist()
     square = stride * stride
     for row, (u, v, w) in enumerate(points.tolist()):
         if (u - x) ** 2 + (v - y) ** 2 + (w - z) ** 2 >= square:
-            kept.append(row)
+            rows.append(row)
             x, y, z = u, v, w
-    while closed and len(kept) > 1 and np.linalg.norm(points[kept[-1]] - points[0]) < stride:
-        kept.pop()
+    while closed and len(rows) > 1 and np.linalg.norm(points[rows[-1]] - points[0]) < stride:
+        rows.pop()
     if closed:
-        corners = points[[*kept, 0]]
+        corners = points[[*rows, 0]]
     else:
-        if len(kept) > 1:
-            kept.pop()
-        corners = points[[*kept, len(points) - 1]]
+        if len(rows) > 1:
+            rows.pop()
+        corners = points[[*rows, len(points) - 1]]
     sides = np.diff(corners, axis=0)
     lengths = np.linalg.norm(sides, axis=1)
-    if len(kept) < 2 or not np.all(lengths > 0.0):
+    if len(rows) < 2 or not np.all(lengths > 0.0):
         raise InputError(
             f"path.shape.tolerance: {stride / _STRIDE:g} m is too much for a path whose waypoints"
             f" reach {np.linalg.norm(points - points[0], axis=1).max():.3g} m from the first"
         )
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    side = np.searchsorted(kept, np.arange(len(points)), side="right") - 1
+    side = np.searchsorted(rows, np.arange(len(points)), side="right") - 1
     along = np.sum((points - corners[side]) * sides[side], axis=1) / lengths[side]
     theta = starts[side] + np.clip(along, 0.0, lengths[side])
     if not closed:
@@ -213,11 +213,11 @@ def _accumulate_strides(
     return theta, float(starts[-1])
 
 
-def _feet(curve: Curve, theta: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Parameters of the curve's points that are nearest to points, close to a guess."""
+def _closest_parameters(curve: Curve, theta: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the parameters of the curve's closest points to points, near a guess."""
     begin, end = curve.domain
     longest = 2.0 * float(np.diff(curve.breakpoints).max())
-    for _ in range(_FOOT_STEPS):
+    for _ in range(_PROJECTION_STEPS):
         values = curve.derivatives(theta, 1)
         slope = values[:, 1]
         step = np.sum((points - values[:, 0]) * slope, axis=1) / np.sum(slope**2, axis=1)
@@ -230,7 +230,7 @@ def _feet(curve: Curve, theta: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _arc_lengths(curve: Curve, theta: np.ndarray) -> tuple[np.ndarray, float]:
-    """Arc lengths at parameters, from the first of a closed curve on, and the length of all."""
+    """Return arc lengths at parameters, from the first of a closed curve on, and the length."""
     count = _LENGTH_SAMPLES * (len(curve.breakpoints) - 1)
     grid = np.linspace(*curve.domain, count + 1)
     speed = np.linalg.norm(curve.derivatives(grid, 1)[:, 1], axis=1)

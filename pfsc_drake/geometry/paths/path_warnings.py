@@ -1,4 +1,4 @@
-"""Warnings of paths and orientations out of proportion, with what would help."""
+"""Warnings of badly proportioned paths and orientations, with remedies."""
 
 import math
 from collections.abc import Callable
@@ -15,31 +15,31 @@ from pfsc_drake.geometry.rotation import euler_margin
 # m: robots' paths are shorter, and distances below count for nothing
 _LARGE, _SMALL = 20.0, 1e-4
 # of the distance of two waypoints: as on a circle through four, or less than on it
-_SWING, _NARROW = 0.2, 0.6
+_OVERSHOOT, _NARROW = 0.2, 0.6
 # from one waypoint to the next: change of the curvature beside the curvature, and rad
 _JUMP, _TURN, _FEWEST = 0.7, 0.002, 10
-# of the usual distance of two waypoints, which nobody means
+# of the usual distance of two waypoints, which is not intended
 _CLOSE = 1e-2
 # rad, from half a turn
 _HAIRPIN = math.radians(2.0)
-# rad, beyond which a turn is a corner, unless turns to and fro follow each other
+# rad, beyond which a turn is a corner, unless turns alternate in sign
 _CORNER, _TO_AND_FRO = 0.3, -0.3
-# what tolerance to try, beside the noise
+# proposed tolerance, relative to the noise
 _TIMES_NOISE = 5.0
 # rad/m, and beside the orientations of neighbouring waypoints, or beside the curvature
 _FAST, _FASTER = 20.0, 3.0
-# rad: nearer the law's rows are 60 times those of a turn, and 6 times
+# rad: below, rows of the law are 60 times larger than those of a turn, and 6 times
 _LEAST, _LITTLE = np.deg2rad(1.0), np.deg2rad(10.0)
 _OTHER = {"zyx": "zyz", "zyz": "zyx"}
 
 
 def path_warnings(path: Path, shape: ShapeReport, keys: str = "path.shape.") -> list[str]:
-    """Return what is out of proportion in a path, one sentence each.
+    """Return warnings of a badly proportioned path, one sentence each.
 
     Args:
         path: The path.
         shape: Its numbers, see :func:`shape_report`.
-        keys: What stands before the names of options that would help.
+        keys: Prefix of the names of options that would help.
     """
     found = [*path.notes, _fast_turn(path, shape)]
     if path.waypoints is not None:
@@ -49,25 +49,27 @@ def path_warnings(path: Path, shape: ShapeReport, keys: str = "path.shape.") -> 
         ]
         if path.waypoints.manner == "interpolated":
             bends = (
-                _noise(path, shape, keys) or _swing(shape, keys) or _narrow_bend(path, shape, keys)
+                _noise(path, shape, keys)
+                or _overshoot(shape, keys)
+                or _narrow_bend(path, shape, keys)
             )
             found += [bends and (_close_waypoints(path.waypoints, shape, keys) or bends)]
     return [sentence for sentence in found if sentence]
 
 
 def euler_warnings(
-    convention: str | None, R_d: np.ndarray, block: str, place: Callable[[int], str]
+    convention: str | None, R_d: np.ndarray, block: str, location: Callable[[int], str]
 ) -> list[str]:
-    """Return what to say of a reference near the singularity of its Euler angles, if it is.
+    """Return a warning of a reference near the singularity of its Euler angles, if it is.
 
     Args:
         convention: Convention of the angles that are coordinates; None where they are not.
         R_d: Orientations of the reference, shape (samples, 3, 3).
-        block: Block of the scenario that tells the orientation.
-        place: Where a sample is, in words.
+        block: Block of the scenario with the orientation.
+        location: Function that describes the position of a sample in words.
 
     Raises:
-        InputError: If it is so near that there are no such coordinates.
+        InputError: If it is so near that the coordinates are undefined.
     """
     if convention is None:
         return []
@@ -83,17 +85,17 @@ def euler_warnings(
         instead += (
             f", or {key}.convention: {other}, whose angles are {np.rad2deg(there):.3g} deg from it"
         )
-    said = (
+    sentence = (
         f"{key}.jacobian = analytic: the {convention} angles of the reference are "
-        f"{np.rad2deg(margin):.3g} deg from their singularity {place(worst)}; write {instead}"
+        f"{np.rad2deg(margin):.3g} deg from their singularity {location(worst)}; write {instead}"
     )
     if margin < _LEAST:
-        raise InputError(said)
-    return [said]
+        raise InputError(sentence)
+    return [sentence]
 
 
 def closing_gap(path: Path) -> float | None:
-    """Distance [m] of an open path's ends, if it is so short that the path looks closed.
+    """Return the distance [m] of an open path's ends, if the path appears to be closed.
 
     Args:
         path: The path.
@@ -109,7 +111,7 @@ def closing_gap(path: Path) -> float | None:
 
 
 def turning_back(positions: np.ndarray) -> str | None:
-    """Return what to say of waypoints of which a path turns back on itself, or None.
+    """Return a warning of waypoints at which a path turns back on itself, or None.
 
     Args:
         positions: Positions of the waypoints [m], shape (n, 3).
@@ -125,12 +127,12 @@ def turning_back(positions: np.ndarray) -> str | None:
     return (
         f"the path turns back on itself, by {angle:.4g} deg at waypoint {number}, where the tool "
         "would have to stop: to go there and back end the path there and write "
-        "reference.points: [0, LENGTH, 0], or lead the waypoints round the turn"
+        "reference.points: [0, LENGTH, 0], or place waypoints around the turn"
     )
 
 
 def far_waypoints(positions: np.ndarray) -> str | None:
-    """Return what to say of waypoints that look like millimetres, or None.
+    """Return a warning of waypoints that appear to be in millimetres, or None.
 
     Args:
         positions: Positions of the waypoints [m], shape (n, 3).
@@ -146,13 +148,20 @@ def _nearly_closed(path: Path, waypoints: PathWaypoints, keys: str) -> str | Non
     if gap is None:
         return None
     return (
-        f"the path is open, and its ends are {_length(gap)} apart: if it is to go round, write "
+        f"the path is open, and its ends are {_length(gap)} apart: for a closed path write "
         f"{keys}closed: true"
     )
 
 
-def _noise(path: Path, shape: ShapeReport, keys: str) -> str | None:
-    """Curvature that differs from waypoint to waypoint as much as it is large."""
+def noise_tolerance(path: Path) -> float | None:
+    """Return a tolerance [m] for noisy waypoints, or None if they are not noisy.
+
+    Waypoints are noisy if the curvature of the path through them changes from one to the next by
+    its own size.
+
+    Args:
+        path: A path through its waypoints.
+    """
     waypoints = path.waypoints
     if waypoints is None or len(waypoints.positions) < _FEWEST:
         return None
@@ -174,39 +183,67 @@ def _noise(path: Path, shape: ShapeReport, keys: str) -> str | None:
     if np.linalg.norm(turns, axis=1).max() > _CORNER and similar > _TO_AND_FRO:
         return None
     noise = _TIMES_NOISE * noise_level(waypoints.parameters, waypoints.positions, across=True)
-    tolerance = _round_up(noise)
-    said = (
-        f"the path bends to and fro from waypoint to waypoint, with a radius of down to "
+    return _round_up(noise)
+
+
+def _noise(path: Path, shape: ShapeReport, keys: str) -> str | None:
+    """Return a warning of curvature that changes from waypoint to waypoint by its own size."""
+    waypoints, tolerance = path.waypoints, noise_tolerance(path)
+    if waypoints is None or tolerance is None:
+        return None
+    sentence = (
+        f"the path bends to and fro from waypoint to waypoint, with a radius down to "
         f"{_length(shape.smallest_radius)} at eta = {shape.smallest_radius_at:.4g} m, as paths "
         f"through noisy points do: "
     )
     if allows_tolerance(waypoints.positions, tolerance, path.closed):
-        return f"{said}write {keys}tolerance (m), perhaps {tolerance:g}"
-    return f"{said}the way is too short for their scatter: add waypoints, or measure them anew"
+        return f"{sentence}write {keys}tolerance (m), perhaps {tolerance:g}"
+    return f"{sentence}the path is too short for their scatter: add waypoints, or measure them anew"
 
 
-def _swing(shape: ShapeReport, keys: str) -> str | None:
+def overshoots(shape: ShapeReport) -> bool:
+    """Return whether a path is far beside the straight lines between its waypoints.
+
+    Args:
+        shape: Numbers of the path.
+    """
     off, chord = shape.distance_from_polygon, shape.chord_there
-    if off is None or chord is None or off <= max(_SMALL, _SWING * chord):
+    return off is not None and chord is not None and off > max(_SMALL, _OVERSHOOT * chord)
+
+
+def _overshoot(shape: ShapeReport, keys: str) -> str | None:
+    off, chord = shape.distance_from_polygon, shape.chord_there
+    if off is None or chord is None or not overshoots(shape):
         return None
     return (
-        f"the path swings {_length(off)} beside the straight line between two waypoints "
+        f"the path overshoots by {_length(off)} beside the straight line between two waypoints "
         f"{_length(chord)} apart, at eta = {shape.distance_from_polygon_at:.4g} m: add waypoints "
         f"there, or write {keys}corner_distance (m) for straight lines with rounded corners"
     )
 
 
-def _close_waypoints(waypoints: PathWaypoints, shape: ShapeReport, keys: str) -> str | None:
-    """Two waypoints in nearly one place, whose direction is chance, as a cause of bends."""
-    lengths = np.linalg.norm(np.diff(waypoints.positions, axis=0), axis=1)
+def coincident_waypoint(positions: np.ndarray) -> int | None:
+    """Return the index of a waypoint that nearly coincides with the next one, or None.
+
+    Args:
+        positions: Positions of the waypoints [m], shape (n, 3).
+    """
+    lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     nearest = int(np.argmin(lengths))
-    usual = float(np.median(lengths))
-    if lengths[nearest] >= min(_CLOSE * usual, _SMALL):
+    return nearest if lengths[nearest] < min(_CLOSE * np.median(lengths), _SMALL) else None
+
+
+def _close_waypoints(waypoints: PathWaypoints, shape: ShapeReport, keys: str) -> str | None:
+    """Return a warning of two nearly coincident waypoints, whose direction is random."""
+    nearest = coincident_waypoint(waypoints.positions)
+    if nearest is None:
         return None
+    lengths = np.linalg.norm(np.diff(waypoints.positions, axis=0), axis=1)
+    usual = float(np.median(lengths))
     return (
         f"waypoints {nearest + 1} and {nearest + 2} are {1e6 * lengths[nearest]:.3g} um apart, "
-        f"others {_length(usual)}: between them the path has a direction by chance, and bends with "
-        f"a radius of down to {1e6 * shape.smallest_radius:.3g} um: take one of the two out, or "
+        f"others {_length(usual)}: between them the path has a random direction, and bends with "
+        f"a radius down to {1e6 * shape.smallest_radius:.3g} um: take one of the two out, or "
         f"write {keys}tolerance (m)"
     )
 
@@ -243,7 +280,7 @@ def _fast_turn(path: Path, shape: ShapeReport) -> str | None:
         lengths = np.abs(np.diff(path.arc_length(theta)))
         apart = lengths > 0.5 * np.median(lengths)
         usual = float(np.max(turns[apart] / lengths[apart], initial=usual))
-        beside = "its waypoints ask for"
+        beside = "its waypoints require"
     if rate < _FASTER * usual:
         return None
     return (
@@ -257,6 +294,6 @@ def _length(value: float) -> str:
 
 
 def _round_up(value: float) -> float:
-    """One digit, upwards."""
+    """Return a value rounded up to one digit."""
     unit = 10.0 ** math.floor(math.log10(value)) if value > 0.0 else 1.0
     return math.ceil(value / unit) * unit

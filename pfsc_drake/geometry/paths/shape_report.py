@@ -1,4 +1,4 @@
-"""The numbers that tell whether a path is what its maker meant."""
+"""Numbers by which a user checks the shape of a path."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,10 @@ from pfsc_drake.geometry.paths.geometric_path import Path, PathWaypoints
 
 _SAMPLES_PER_SEGMENT = 16
 _FEWEST_SAMPLES = 2048
-# Samples that are evaluated at once.
+# Samples that are evaluated together.
 _CHUNK = 20_000
-# Newton steps to the points of a path that are nearest to its waypoints.
-_FOOT_STEPS = 10
+# Newton steps to the closest points of a path to its waypoints.
+_PROJECTION_STEPS = 10
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class ShapeReport:
     """Numbers of a path's shape.
 
     Attributes:
-        length: Length (of one lap), m.
+        length: Length (of one revolution), m.
         smallest_radius: Smallest radius of curvature, m; infinite on a straight line.
         smallest_radius_at: eta there, m.
         distance_from_points: Largest distance of a waypoint from the path, m; None without.
@@ -89,7 +89,7 @@ def shape_report(path: Path) -> ShapeReport:
 
 
 def _curvatures(path: Path, theta: np.ndarray) -> np.ndarray:
-    """Size of the curvature vector, 1/m, and of its derivative by arc length, 1/m^2: [n, 2]."""
+    """Return curvature, 1/m, and the norm of the curvature vector's rate, 1/m^2: [n, 2]."""
     _, d1, d2, d3 = path.position.derivatives(theta, 3).transpose(1, 0, 2)
     square = np.sum(d1 * d1, axis=1, keepdims=True)
     along = np.sum(d1 * d2, axis=1, keepdims=True)
@@ -103,12 +103,12 @@ def _curvatures(path: Path, theta: np.ndarray) -> np.ndarray:
 
 
 def _largest_miss(curve: Curve, waypoints: PathWaypoints) -> float:
-    """Largest distance of a waypoint from the curve near its parameter, m."""
+    """Return the largest distance of a waypoint from the curve near its parameter, m."""
     theta, points = waypoints.parameters, waypoints.positions[: len(waypoints.parameters)]
     begin, end = curve.domain
     longest = float(np.diff(curve.breakpoints).max())
     least = np.full(len(points), np.inf)
-    for _ in range(_FOOT_STEPS):
+    for _ in range(_PROJECTION_STEPS):
         values = curve.derivatives(theta, 1)
         off, slope = points - values[:, 0], values[:, 1]
         least = np.minimum(least, np.linalg.norm(off, axis=1))
@@ -122,18 +122,18 @@ def _largest_miss(curve: Curve, waypoints: PathWaypoints) -> float:
 def _distances_from_polygon(
     path: Path, theta: np.ndarray, chunks: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of each sample from the nearest of three sides, m, and that side's length, m."""
+    """Return each sample's distance from the nearest of three sides, and that side's length, m."""
     waypoints = path.waypoints
     assert waypoints is not None
     order = np.argsort(waypoints.parameters, kind="stable")
-    corners, places = waypoints.positions[order], waypoints.parameters[order]
+    corners, parameters = waypoints.positions[order], waypoints.parameters[order]
     if path.closed and np.any(corners[-1] != corners[0]):
         corners = np.vstack([corners, corners[:1]])
-        places = np.append(places, places[0] + path.position.period)
+        parameters = np.append(parameters, parameters[0] + path.position.period)
     starts, sides = corners[:-1], np.diff(corners, axis=0)
     squares = np.sum(sides**2, axis=1)
     sigma = np.concatenate([path.position.derivatives(part, 0)[:, 0] for part in chunks])
-    own = np.searchsorted(places[1:-1], theta, side="right")
+    own = np.searchsorted(parameters[1:-1], theta, side="right")
     best, chord = np.full(len(theta), np.inf), np.zeros(len(theta))
     for shift in (-1, 0, 1):
         side = own + shift
@@ -148,7 +148,7 @@ def _distances_from_polygon(
 
 
 def _angle_rates(path: Path, theta: np.ndarray) -> np.ndarray:
-    """Angular velocity by arc length, rad/m: [n]."""
+    """Return the angular velocity by arc length, rad/m: [n]."""
     assert path.orientation is not None
     q, dq = path.orientation.derivatives(theta, 1).transpose(1, 0, 2)
     square = np.sum(q * q, axis=1, keepdims=True)

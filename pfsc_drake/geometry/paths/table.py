@@ -1,4 +1,4 @@
-"""Everything that depends on the path parameter alone, as one table of polynomials."""
+"""All quantities that depend on the path parameter alone, as one table of polynomials."""
 
 import math
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ _SAME = 1e-13
 class PathTable(NamedTuple):
     """Polynomials of degree 7 in u = theta - theta_s on each piece s of a path.
 
-    A closed path with an orientation of two laps has a table of two laps.
+    A closed path with an orientation of two revolutions has a table of two revolutions.
 
     Attributes:
         breakpoints: theta_s and the last end, [pieces + 1].
         rows: Coefficients of the path point, laid out by `PathPointLayout` with theta,
-            alpha and status left zero, [pieces, layout.size, 8], lowest power first.
+            alpha and status zero, [pieces, layout.size, 8], lowest power first.
     """
 
     breakpoints: np.ndarray
@@ -46,7 +46,7 @@ def tabulate(
     frame: Frame,
     layout: PathPointLayout,
 ) -> PathTable:
-    """Table of a path.
+    """Return the table of a path.
 
     Each quantity agrees to 1e-13 of its size on the path, or to the rounding errors of the curve
     itself where these are larger (polynomials of high degree on long segments).
@@ -56,7 +56,7 @@ def tabulate(
         orientation: Curve of quaternions, or None.
         arc_length: Arc length of `position`.
         frame: Frame along `position`.
-        layout: Which quantities, and where they go.
+        layout: Layout of the quantities.
 
     Raises:
         InputError: the path would need more than 200,000 pieces.
@@ -89,18 +89,18 @@ def tabulate(
 
 
 def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
-    """Size of each quantity among samples [n, layout.size]: [layout.size].
+    """Return the size of each quantity among samples [n, layout.size]: [layout.size].
 
     It is the largest value of a component, and not less than a part of the largest norm of its
-    vector: what is zero but for rounding errors (as components of e_perp and of the derivatives
-    are on a tilted plane) is not to be followed for its own sake, which would never end.
+    vector: quantities that are zero up to rounding errors (as components of e_perp and of the
+    derivatives are on a tilted plane) would otherwise need pieces without end.
     """
     scale = np.ones(layout.size)
     vectors = [(layout.eta, 1), (layout.normal, 3), (layout.position, 3), (layout.quaternion, 4)]
-    for place, dimension in vectors:
-        parts = np.abs(points[:, place]).reshape(len(points), -1, dimension)
+    for columns, dimension in vectors:
+        parts = np.abs(points[:, columns]).reshape(len(points), -1, dimension)
         norm = np.linalg.norm(parts, axis=2).max(axis=0)[:, None]
-        scale[place] = np.maximum(parts.max(axis=0), _SMALL_COMPONENT * norm).ravel()
+        scale[columns] = np.maximum(parts.max(axis=0), _SMALL_COMPONENT * norm).ravel()
     if layout.turning:
         scale[layout.turn] = _turn_scale(points, layout)
     scale[scale == 0.0] = 1.0
@@ -108,9 +108,9 @@ def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
 
 
 def _turn_scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
-    """Size of the derivatives of psi, [order]: of a frame that turns as fast as the path bends.
+    """Return the size of the derivatives of psi, [order], for a frame that turns with the path.
 
-    A torsion that is constant but for rounding errors has derivatives of no size of their own.
+    Derivatives of a torsion that is constant up to rounding errors have no scale of their own.
     """
     sizes = np.abs(points[:, layout.turn]).max(axis=0)
     position = points[:, layout.position].reshape(len(points), -1, 3)
@@ -123,7 +123,7 @@ def _turn_scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
 def _common_breakpoints(
     position: Curve, orientation: OrientationCurve | None, frame: Frame
 ) -> np.ndarray:
-    """Where any of the quantities need not be smooth, [n]."""
+    """Return the parameters at which any of the quantities need not be smooth, [n]."""
     begin, end = position.domain
     parts = [position.breakpoints, frame.breakpoints]
     if orientation is not None and not orientation.constant:
@@ -140,14 +140,14 @@ def _common_breakpoints(
 
 # Of the domain of the path: the longest run-out.
 _LONGEST = 0.1
-# How much a term of the Taylor series may turn the quaternion, relative to its length, or the
+# Largest turn by a term of the Taylor series: of the quaternion, relative to its length, or of the
 # frame, rad.
 _TURN = 0.15
 
 
 @dataclass(frozen=True)
 class Continuation:
-    """How a path goes on beyond one of its ends.
+    """Continuation of a path beyond one of its ends.
 
     Attributes:
         position: The curve in R^3.
@@ -171,11 +171,11 @@ def continuations(
     frame: Frame,
     order: int,
 ) -> tuple[Continuation, Continuation]:
-    """Return how an open path goes on before its begin and after its end.
+    """Return the continuations of an open path before its begin and after its end.
 
-    Its position goes over to a straight line and its orientation to a constant one, in
+    The position changes to a straight line and the orientation to a constant one, in
     class C^(order + 1) and C^order as the path itself, within at most a tenth of its domain; a
-    frame that turns about the tangent comes to rest in the same way.
+    frame that turns about the tangent comes to rest likewise.
 
     Args:
         position: Open curve sigma_t in R^3.
@@ -184,7 +184,7 @@ def continuations(
         frame: Frame along ``position``.
         order: Relative degree r of the law.
     """
-    made = []
+    results = []
     for end, sign in zip(position.domain, (-1.0, 1.0), strict=True):
         p = position.derivatives(end, order + 1)
         q = None if orientation is None else orientation.derivatives(end, order)
@@ -192,25 +192,25 @@ def continuations(
         length = sign * _run_out_length(p, q, psi, _LONGEST * position.period)
         curve = RunOut(p, p[1], end, length)
         turning = None if q is None else OrientationCurve(RunOut(q, 0.0 * q[0], end, length))
-        way = ArcLength(curve)
+        own_length = ArcLength(curve)
         transported = _frame_through(curve, frame.normals(end)[0], end)
         through: Frame = transported
         if frame.turns:
             through = TurnedFrame(transported, RunOut(psi, np.zeros(1), end, length))
-        made.append(
+        results.append(
             Continuation(
                 curve,
                 turning,
-                way,
-                arc_length.length if sign > 0.0 else -way.length,
+                own_length,
+                arc_length.length if sign > 0.0 else -own_length.length,
                 through,
             )
         )
-    return made[0], made[1]
+    return results[0], results[1]
 
 
 def _run_out_length(p: np.ndarray, q: np.ndarray | None, psi: np.ndarray, longest: float) -> float:
-    """Length in which no term of the Taylor series takes the curve far from its tangent."""
+    """Return a length in which no term of the Taylor series leads far from the tangent."""
     lengths = [straightening_length(p, longest)]
     turns = [] if q is None else [(q, _TURN * float(np.linalg.norm(q[0])))]
     for derivatives, allowed in (*turns, (psi, _TURN)):
@@ -222,7 +222,7 @@ def _run_out_length(p: np.ndarray, q: np.ndarray | None, psi: np.ndarray, longes
 
 
 def _frame_through(curve: RunOut, normal: np.ndarray, theta: float) -> ParallelTransportFrame:
-    """Parallel transport frame with a given normal at one end of the curve."""
+    """Return the parallel transport frame with a prescribed normal at one end of the curve."""
     begin = curve.domain[0]
     if theta == begin:
         return ParallelTransportFrame(curve, normal)

@@ -7,28 +7,28 @@ import casadi as ca
 import numpy as np
 
 _NODES = 8  # of the quadrature of a span's arc length
-_BENDS = 5  # places of a span at which its curvature is looked at
+_BENDS = 5  # points of a span at which its curvature is evaluated
 
 
 class UniformSpline:
     """B-spline of degree p over the knots 0, 1, 2, .., of class C^(p - 1).
 
-    Span i is ``theta = i .. i + 1``. It is made of the control points i .. i + p and of no others:
-    a control point that is added at the end adds one span and changes none. Control point k has
-    its largest weight at the site ``k - (p - 1) / 2``.
+    Span i is ``theta = i .. i + 1``. It depends on the control points i .. i + p only: a control
+    point that is added at the end adds one span and changes none. Control point k has its largest
+    weight at the site ``k - (p - 1) / 2``.
 
-    Control points c that lie beside way points w, ``c_k = w_k - s (w_(k-1) - 2 w_k + w_(k+1))``
-    with ``s = (p + 1) / 24``, make a spline that leads by the way points with an error of the
-    fourth order of their distance: its value at a site is ``c + s (second difference of c) + ..``
+    Control points c beside waypoints w, ``c_k = w_k - s (w_(k-1) - 2 w_k + w_(k+1))`` with
+    ``s = (p + 1) / 24``, define a spline that passes the waypoints with an error of the fourth
+    order of their distance: its value at a site is ``c + s (second difference of c) + ..``
 
     Args:
         degree: p, from 2 on.
 
     Attributes:
         degree: p.
-        basis: Coefficients of the p + 1 basis functions of a span by powers of u, the part of the
-            span that has been gone through, lowest power first, shape (p + 1, p + 1).
-        reach: Control points on each side of a site that decide over the spline there.
+        basis: Coefficients of the p + 1 basis functions of a span by powers of u, the fraction of
+            the span, lowest power first, shape (p + 1, p + 1).
+        reach: Control points on each side of a site that the spline there depends on.
         sharpening: s.
     """
 
@@ -60,7 +60,7 @@ class UniformSpline:
 
         Args:
             points: Its control points as columns, shape (dimension, p + 1).
-            u: Part of the span, 0 to 1.
+            u: Fraction of the span, 0 to 1.
             order: Highest derivative.
         """
         coefficients = points @ ca.DM(self.basis)
@@ -72,15 +72,15 @@ class UniformSpline:
             found.append(value)
         return found
 
-    def sharpened(self, before: ca.SX, at: ca.SX, after: ca.SX) -> ca.SX:
-        """Return the control point beside a way point between two others."""
+    def sharpen(self, before: ca.SX, at: ca.SX, after: ca.SX) -> ca.SX:
+        """Return the control point beside a waypoint between two others."""
         return at - self.sharpening * (before - 2.0 * at + after)
 
     def point_function(self, dimension: int, order: int) -> ca.Function:
         """Return ``(points, u) -> derivatives`` 0..order, flat, those of each order together.
 
         Args:
-            dimension: Of the control points, which come flat, one after the other.
+            dimension: Dimension of the control points, which are flat, one after the other.
             order: Highest derivative.
         """
         points, u = ca.SX.sym("points", dimension * (self.degree + 1)), ca.SX.sym("u")
@@ -90,22 +90,22 @@ class UniformSpline:
 
     @cached_property
     def length(self) -> ca.Function:
-        """``(points, u) -> way``: arc length from the begin of a span, of points (3 (p + 1),)."""
+        """``(points, u) -> length``: arc length from a span's begin, of points (3 (p + 1),)."""
         points, u = ca.SX.sym("points", 3 * (self.degree + 1)), ca.SX.sym("u")
         columns = ca.reshape(points, 3, self.degree + 1)
-        way = ca.SX(0.0)
+        length = ca.SX(0.0)
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         for node, weight in zip(nodes, weights, strict=True):
             slope = self.derivatives(columns, u * (1.0 + node) / 2.0, 1)[1]
-            way += weight / 2.0 * u * ca.norm_2(slope)
-        return ca.Function("span_length", [points, u], [way], {"cse": True})
+            length += weight / 2.0 * u * ca.norm_2(slope)
+        return ca.Function("span_length", [points, u], [length], {"cse": True})
 
     @cached_property
     def shape(self) -> ca.Function:
         """``points -> [curvature, jerk]`` of a span, of points (3 (p + 1),).
 
         The largest curvature [1/m], and the largest third derivative by theta over the third power
-        of the first one [1/m^2], of several places of the span.
+        of the first one [1/m^2], among several points of the span.
         """
         points = ca.SX.sym("points", 3 * (self.degree + 1))
         columns = ca.reshape(points, 3, self.degree + 1)

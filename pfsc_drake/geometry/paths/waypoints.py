@@ -55,7 +55,7 @@ _ORIENTATIONS = {
     "quaternion": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
 }
-# The last of roll, pitch, yaw may stand alone.
+# The last of roll, pitch, yaw may be the only column.
 _YAW_ALONE = {"rpy": "yaw", "rpy_deg": "yaw_deg"}
 _KNOWN = [*_POSITION, _PARAMETER, *(label for group in _ORIENTATIONS.values() for label in group)]
 
@@ -69,7 +69,7 @@ class WaypointTable:
         quaternions: (w, x, y, z), [n, 4], or None without orientation.
         parameters: theta [n], strictly increasing, or None to choose them by distance.
         yaw_alone: Whether the orientation is a turn about z alone, tilts being unknown.
-        notes: Sentences on what of a file was left out.
+        notes: Sentences on ignored parts of a file.
     """
 
     positions: np.ndarray
@@ -90,11 +90,11 @@ def read_waypoints(
     same in degrees as `zyx_deg_1, ...`, `zyz_deg_1, ...` or `roll_deg, ...`, `yaw` or `yaw_deg`
     alone, the rotation vector `rx, ry, rz` [rad], `qw, qx, qy, qz`, or `r11, r12, ..., r33`; and
     optionally `theta`. Further columns are ignored. Without `theta` rows that equal the one before
-    are left out, as recorders write them where a tool rests.
+    are skipped: recorders write them while a tool rests.
 
     Args:
         csv_path: File name, of a regular file of at most 256 MiB and 1,000,000 waypoints.
-        progress: Told the fraction read and what is done.
+        progress: Callback with the fraction read and the name of the step.
         unit: Unit of `x, y, z`.
 
     Returns:
@@ -138,16 +138,16 @@ def read_waypoints(
 
 
 def _without_repeats(name: str, table: NumberTable) -> tuple[NumberTable, tuple[str, ...]]:
-    """Leave out rows that equal the one before, and say so."""
+    """Remove rows that equal the one before, and report them."""
     repeats = np.concatenate([[False], np.all(np.diff(table.rows, axis=0) == 0.0, axis=1)])
     count = int(np.count_nonzero(repeats))
     if not count or _PARAMETER in table.header:
         return table, ()
     first = table.lines[int(np.argmax(repeats))]
     lines = [line for line, repeated in zip(table.lines, repeats, strict=True) if not repeated]
-    said = "1 row equals" if count == 1 else f"{count} rows equal"
+    phrase = "1 row equals" if count == 1 else f"{count} rows equal"
     return table._replace(lines=lines, rows=table.rows[~repeats]), (
-        f"{name}: {said} the row before, first in line {first}, and left out; waypoints are"
+        f"{name}: {phrase} the row before, first in line {first}, and left out; waypoints are"
         " counted from 1 without them",
     )
 
@@ -158,7 +158,7 @@ def waypoints_text(table: WaypointTable, comment: str = "") -> str:
     Positions are rounded to 0.1 um, quaternions to 1e-9.
 
     Args:
-        table: The waypoints; their parameters are left out.
+        table: The waypoints; their parameters are omitted.
         comment: One line, written first.
     """
     orientation = () if table.quaternions is None else _ORIENTATIONS["quaternion"]
@@ -172,23 +172,23 @@ def waypoints_text(table: WaypointTable, comment: str = "") -> str:
     return "\n".join(lines) + "\n"
 
 
-def _check_header(place: str, header: list[str]) -> None:
+def _check_header(location: str, header: list[str]) -> None:
     present = {
         kind: group for kind, group in _ORIENTATIONS.items() if any(key in header for key in group)
     }
-    check_columns(place, header, _KNOWN, [], others=True)
+    check_columns(location, header, _KNOWN, [], others=True)
     if len(present) > 1:
         kinds = " and ".join(f"'{group[0]}...'" for group in present.values())
-        raise InputError(f"{place}: columns {kinds}; one kind of orientation allowed")
+        raise InputError(f"{location}: columns {kinds}; one kind of orientation allowed")
     required = list(_POSITION)
     for kind, group in present.items():
         if [label for label in group if label in header] != [_YAW_ALONE.get(kind)]:
             required += group
-    check_columns(place, header, _KNOWN, required, others=True)
+    check_columns(location, header, _KNOWN, required, others=True)
 
 
 def _to_quaternions(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.ndarray:
-    """Unit quaternions [n, 4] from the columns of one kind of orientation."""
+    """Return the unit quaternions [n, 4] from the columns of one kind of orientation."""
     convention = kind.removesuffix("_deg")
     if convention in EULER_TO_QUATERNION:
         return EULER_TO_QUATERNION[convention](_angles(name, lines, kind, values))
@@ -215,7 +215,7 @@ def _to_quaternions(name: str, lines: list[int], kind: str, values: np.ndarray) 
 
 
 def _angles(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.ndarray:
-    """Euler angles [n, 3], rad, of columns in rad or degrees."""
+    """Return the Euler angles [n, 3], rad, of columns in rad or degrees."""
     degrees = kind.endswith("_deg")
     largest = _LARGEST_DEGREES if degrees else _LARGEST_ANGLE
     far = np.argwhere(np.abs(values) > largest)
@@ -239,7 +239,7 @@ MAX_INTERPOLATED = 50_000
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a smooth path may be from its waypoints.
+    """Largest deviation of a smooth path from its waypoints.
 
     Attributes:
         position: m, positive.
@@ -260,7 +260,7 @@ def path_from_waypoints(
     corner_distance: float | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Path through waypoints, or near them.
+    """Return a path through waypoints, or near them.
 
     Args:
         table: Waypoints. For a closed path the last may repeat the first; it must if the
@@ -268,11 +268,11 @@ def path_from_waypoints(
         smoothness: k of the class C^k of position and orientation, 2..6.
         closed: True for a closed path.
         parametrization: "chord" or "centripetal", see `interpolate`.
-        tolerance: If given, the smoothest path that comes as near as this to all waypoints,
-            see `smooth_positions`; neighbours may then coincide. A number is that of positions, m.
-        corner_distance: If given, m: the path consists of straight lines, blended up to this
+        tolerance: If set, the smoothest path within this distance of all waypoints,
+            see `smooth_positions`; neighbours may then coincide. A number applies to positions, m.
+        corner_distance: If set, m: the path consists of straight lines, blended up to this
             distance from each corner (at most half of the line), see `round_corners`.
-        progress: Told the fraction done and what is done.
+        progress: Callback with the fraction done and the name of the step.
 
     Returns:
         The path; its `waypoints` are those of the table.
@@ -370,23 +370,23 @@ def _rounded_path(table: WaypointTable, smoothness: int, closed: bool, distance:
     theta = accumulate(chords, "chord")
     widths = blend_distances(points, distance, closed=closed)
 
-    def rounded(values: np.ndarray, around: bool) -> Curve:
+    def round_off(values: np.ndarray, around: bool) -> Curve:
         return round_corners(values, theta, widths, smoothness=smoothness, closed=around)
 
-    position, orientation = rounded(points, closed), None
+    position, orientation = round_off(points, closed), None
     if table.quaternions is not None:
         q = table.quaternions
         if closed and len(q) < len(points):
             q = np.vstack([q, q[:1]])
         q = check_neighbours(q)
-        orientation = OrientationCurve(rounded(q, closed))
+        orientation = OrientationCurve(round_off(q, closed))
     waypoints = PathWaypoints(points, theta, "rounded")
     notes = (*table.notes, *_cut_corners(chords, distance))
     return Path(position, orientation, waypoints=waypoints, notes=notes)
 
 
 def _cut_corners(chords: np.ndarray, distance: float) -> tuple[str, ...]:
-    """Say where lines are too short for the distance that was asked for."""
+    """Report lines that are too short for the requested distance."""
     short = np.flatnonzero(chords < 2.0 * distance * (1.0 - _ROUNDING))
     if len(chords) < 2 or not short.size:
         return ()

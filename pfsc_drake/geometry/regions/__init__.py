@@ -1,1 +1,1 @@
-"""Regions that a tool may not enter: signed global distances to what bounds them."""
+"""Regions that a tool may not enter: signed global distances to their boundaries."""

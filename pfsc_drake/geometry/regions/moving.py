@@ -1,4 +1,4 @@
-"""Regions that move as it is prescribed, by a clock of their own."""
+"""Regions with a prescribed motion over their own clock."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -14,12 +14,12 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PieceTable, PiecewisePolynomialCurve
 from pfsc_drake.geometry.regions.region import Distance, Region, axes_along, checked_point
 
-# Jumps of a repeated course, of its extent (and of that over the square of its duration).
+# Largest jumps of a repeated motion, relative to its extent and to its rates.
 _SAME = 1e-9
 
 
-class Course(Protocol):
-    """One coordinate of a motion over a clock, of class C^2.
+class Motion(Protocol):
+    """Coordinate of a motion over a clock, of class C^2.
 
     Attributes:
         largest_rate: Largest absolute rate, m/s or rad/s.
@@ -28,28 +28,28 @@ class Course(Protocol):
     largest_rate: float
 
     def at(self, clock: ca.MX) -> ca.MX:
-        """Value at a time of the clock [s], m or rad, as an expression."""
+        """Return the value at a time of the clock [s], m or rad, as an expression."""
 
 
-class CurveCourse:
-    """A course along a curve of dimension 1, whose parameter is the clock.
+class CurveMotion:
+    """Motion along a curve of dimension 1, whose parameter is the clock.
 
     Args:
-        curve: Curve of class C^2, at rest at its ends; before and after it rests.
-        repeat: Whether it begins again when it has ended.
+        curve: Curve of class C^2, at rest at its ends; before and after it the motion rests.
+        repeat: Whether the motion is repeated.
 
     Attributes:
         largest_rate: Largest absolute rate, m/s or rad/s.
 
     Raises:
-        InputError: The curve has another dimension, is not of class C^2, or ends elsewhere than it
-            begins and is to be repeated.
+        InputError: The curve has another dimension, is not of class C^2, or is repeated and ends
+            elsewhere than it begins.
     """
 
     def __init__(self, curve: PiecewisePolynomialCurve, *, repeat: bool = False) -> None:
         if curve.dimension != 1 or curve.smoothness < 2:
             raise InputError(
-                f"course: dimension {curve.dimension}, class C^{curve.smoothness:g}; 1 and C^2 or"
+                f"motion: dimension {curve.dimension}, class C^{curve.smoothness:g}; 1 and C^2 or"
                 " smoother are required"
             )
         self._begin, self._end = curve.domain
@@ -62,26 +62,30 @@ class CurveCourse:
         rates = np.abs(ends[:, 1:]) > _SAME * scales[1:]
         if np.any(rates):
             raise InputError(
-                f"course: moves by {ends[:, 1].tolist()} a second at its ends; must be at rest"
+                f"motion: moves by {ends[:, 1].tolist()} a second at its ends; must be at rest"
                 " there"
             )
         if repeat and abs(ends[1, 0] - ends[0, 0]) > _SAME * extent:
             raise InputError(
-                f"course: begins at {ends[0, 0]:g} and ends at {ends[1, 0]:g}; both must be the"
+                f"motion: begins at {ends[0, 0]:g} and ends at {ends[1, 0]:g}; both must be the"
                 " same for it to repeat"
             )
         self.largest_rate = _largest_rate(curve)
 
     def at(self, clock: ca.MX) -> ca.MX:
-        """Value at a time of the clock [s], m or rad, as an expression."""
+        """Return the value at a time of the clock [s], m or rad, as an expression."""
         if self._repeat:
-            laps = ca.floor((clock - self._begin) / self._period)
-            clock = clock - laps * self._period
+            periods = ca.floor((clock - self._begin) / self._period)
+            clock = clock - periods * self._period
         return self._table(ca.fmin(ca.fmax(clock, self._begin), self._end))
 
 
+class CurveCourse(CurveMotion):
+    """Former name of :class:`CurveMotion`, for existing scripts."""
+
+
 def _largest_rate(curve: PiecewisePolynomialCurve) -> float:
-    """Largest absolute derivative, at ends of pieces or where the second one vanishes."""
+    """Return the largest rate, at ends of pieces or where the second derivative vanishes."""
     largest = 0.0
     for length, powers in zip(np.diff(curve.breakpoints), curve.coefficients[..., 0], strict=True):
         rate = np.polynomial.Polynomial(powers).deriv()
@@ -92,22 +96,24 @@ def _largest_rate(curve: PiecewisePolynomialCurve) -> float:
 
 
 class MovingRegion(ABC):
-    """An admissible region whose boundary moves, as a rigid body that follows a course.
+    """Admissible region whose boundary moves as a rigid body.
 
-    At any time of its clock the distance is as that of a :class:`Region`. What is said of its
-    motion are expressions.
+    At any time of its clock it has the distance of a :class:`Region`. Its motion is given by
+    expressions.
 
     Args:
-        region: Where it is while its course is zero.
-        course: Over the clock.
+        region: The region at zero displacement.
+        motion: Displacement over the clock.
     """
 
-    def __init__(self, region: Region, course: Course) -> None:
-        self._region, self._course = region, course
+    def __init__(self, region: Region, motion: Motion) -> None:
+        self._region, self._motion = region, motion
 
     @abstractmethod
     def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
-        """Where a point is, as seen from what moves, while its course is zero, [3], m.
+        """Return a point in the frame of the moving region, [3], m.
+
+        The frame coincides with the world's at zero displacement.
 
         Args:
             point: World axes, [3], m.
@@ -115,30 +121,30 @@ class MovingRegion(ABC):
         """
 
     @abstractmethod
-    def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
-        """Where a vector points that moves with the region, [3].
+    def rotate(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
+        """Return the direction in the world of a vector that moves with the region, [3].
 
         Args:
-            vector: While the course is zero, [3].
+            vector: The vector at zero displacement, [3].
             clock: s.
         """
 
     @abstractmethod
-    def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
-        """Way from one time of the clock to another of what moves with the region, [3], m.
+    def displacement(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
+        """Return the displacement of a point of the moving region between two times, [3], m.
 
         Args:
-            point: Where it is at first, world axes, [3], m.
+            point: Its position at the first time, world axes, [3], m.
             clock: s.
             clock_next: s.
         """
 
     @abstractmethod
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
-        """Largest speed of what moves with the region and is within a sphere, m/s.
+        """Return the largest speed of points of the moving region within a sphere, m/s.
 
-        No distance of a point there changes faster while the point rests and the clock runs at the
-        pace of time.
+        No distance of a resting point there changes faster while the clock runs at the rate of
+        time.
 
         Args:
             centre: [3], m.
@@ -157,7 +163,7 @@ class MovingRegion(ABC):
         return ca.Function(
             "signed_distance",
             [point, clock],
-            [h, self.turned(n, clock)],
+            [h, self.rotate(n, clock)],
             ["point", "clock"],
             ["h", "n"],
         )
@@ -171,7 +177,7 @@ class MovingRegion(ABC):
         """
         point, now, then = _point_and_clocks()
         h_next, n = self.signed_distance(point, then)
-        h = h_next + ca.dot(n, self.way(point, now, then))
+        h = h_next + ca.dot(n, self.displacement(point, now, then))
         return ca.Function(
             "signed_distances",
             [point, now, then],
@@ -181,7 +187,7 @@ class MovingRegion(ABC):
         )
 
     def distance_at(self, x: float, y: float, z: float, clock: float) -> Distance:
-        """Signed distance to the boundary where it is at a time of the clock.
+        """Return the signed distance to the boundary at a time of the clock.
 
         Args:
             x: Coordinate x of the tool point, world axes, finite, m.
@@ -193,14 +199,14 @@ class MovingRegion(ABC):
             See :meth:`Region.distance`.
         """
         h, *n = self._region.distance(*self._at_rest(x, y, z, clock))
-        return h, *self._turned(*n, clock)
+        return h, *self._rotate(*n, clock)
 
     def distances_over(
         self, x: float, y: float, z: float, clock: float, clock_next: float
     ) -> Distance:
-        """Signed distances before and after the boundary moves on.
+        """Return the signed distances before and after a motion of the boundary.
 
-        Of the surface that will be the nearest, which may be another one than that now.
+        Both are distances to the surface that is the nearest one after the motion.
 
         Args:
             x: Coordinate x of the tool point, which rests, world axes, finite, m.
@@ -213,19 +219,19 @@ class MovingRegion(ABC):
             h before and after, m, and n after.
         """
         h_next, n_x, n_y, n_z = self.distance_at(x, y, z, clock_next)
-        w_x, w_y, w_z = self._way(x, y, z, clock, clock_next)
+        w_x, w_y, w_z = self._displacement(x, y, z, clock, clock_next)
         return h_next + n_x * w_x + n_y * w_y + n_z * w_z, h_next, n_x, n_y, n_z
 
     def placement(self, clock: float) -> tuple[np.ndarray, np.ndarray]:
-        """Where what moves with the region is, as seen from where it is at rest.
+        """Return the pose of the moving region relative to zero displacement.
 
         Args:
             clock: s.
 
         Returns:
-            Rotation R, [3, 3], and way p, [3], m: a point y at rest has come to R y + p.
+            Rotation R, [3, 3], and translation p, [3], m: a point y moves to R y + p.
         """
-        rotation = np.array([self._turned(*axis, clock) for axis in np.eye(3)]).T
+        rotation = np.array([self._rotate(*axis, clock) for axis in np.eye(3)]).T
         return rotation, -rotation @ self._at_rest(0.0, 0.0, 0.0, clock)
 
     @cached_property
@@ -233,86 +239,86 @@ class MovingRegion(ABC):
         return PlainFunction(_function_of_clock("at_rest", self.at_rest))
 
     @cached_property
-    def _turned(self) -> PlainFunction:
-        return PlainFunction(_function_of_clock("turned", self.turned))
+    def _rotate(self) -> PlainFunction:
+        return PlainFunction(_function_of_clock("turned", self.rotate))
 
     @cached_property
-    def _way(self) -> PlainFunction:
-        given = _point_and_clocks()
-        return PlainFunction(ca.Function("way", given, [self.way(*given)]))
+    def _displacement(self) -> PlainFunction:
+        arguments = _point_and_clocks()
+        return PlainFunction(ca.Function("way", arguments, [self.displacement(*arguments)]))
 
 
 class ShiftedRegion(MovingRegion):
-    """A region that moves along a direction.
+    """Region that moves along a direction.
 
     Args:
-        region: Where it is while its course is zero.
-        course: Way along the direction [m].
+        region: The region at zero displacement.
+        motion: Displacement along the direction [m].
         direction: Direction vector of any length, [3].
 
     Raises:
         InputError: No direction.
     """
 
-    def __init__(self, region: Region, course: Course, direction: ArrayLike) -> None:
-        super().__init__(region, course)
+    def __init__(self, region: Region, motion: Motion, direction: ArrayLike) -> None:
+        super().__init__(region, motion)
         self._direction = ca.DM(axes_along(direction)[2])
 
     def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
-        """Where a point is, as seen from what moves, while its course is zero, [3], m."""
-        return point - self._course.at(clock) * self._direction
+        """Return a point in the frame of the moving region, [3], m."""
+        return point - self._motion.at(clock) * self._direction
 
-    def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
-        """Where a vector points that moves with the region, [3]."""
+    def rotate(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
+        """Return the direction in the world of a vector that moves with the region, [3]."""
         return vector
 
-    def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
-        """Way from one time of the clock to another of what moves with the region, [3], m."""
-        return (self._course.at(clock_next) - self._course.at(clock)) * self._direction
+    def displacement(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
+        """Return the displacement of a point of the moving region between two times, [3], m."""
+        return (self._motion.at(clock_next) - self._motion.at(clock)) * self._direction
 
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
-        """Largest speed of what moves with the region and is within a sphere, m/s."""
-        return self._course.largest_rate
+        """Return the largest speed of points of the moving region within a sphere, m/s."""
+        return self._motion.largest_rate
 
 
 class TurningRegion(MovingRegion):
-    """A region that turns about an axis.
+    """Region that turns about an axis.
 
     Args:
-        region: Where it is while its course is zero.
-        course: Angle about the axis [rad].
-        point: On the axis, [3], m.
+        region: The region at angle zero.
+        motion: Angle about the axis [rad].
+        point: Point on the axis, [3], m.
         axis: Vector along the axis, of any length, [3].
 
     Raises:
         InputError: No point or no direction.
     """
 
-    def __init__(self, region: Region, course: Course, point: ArrayLike, axis: ArrayLike) -> None:
-        super().__init__(region, course)
+    def __init__(self, region: Region, motion: Motion, point: ArrayLike, axis: ArrayLike) -> None:
+        super().__init__(region, motion)
         self._point = np.array(checked_point("point", point))
         self._axes = axes_along(axis)
 
     def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
-        """Where a point is, as seen from what moves, while its course is zero, [3], m."""
-        return self._point + self._rotated(point - self._point, -self._course.at(clock))
+        """Return a point in the frame of the moving region, [3], m."""
+        return self._point + self._rotate_by(point - self._point, -self._motion.at(clock))
 
-    def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
-        """Where a vector points that moves with the region, [3]."""
-        return self._rotated(vector, self._course.at(clock))
+    def rotate(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
+        """Return the direction in the world of a vector that moves with the region, [3]."""
+        return self._rotate_by(vector, self._motion.at(clock))
 
-    def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
-        """Way from one time of the clock to another of what moves with the region, [3], m."""
-        away, angle = point - self._point, self._course.at(clock_next) - self._course.at(clock)
-        return self._rotated(away, angle) - away
+    def displacement(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
+        """Return the displacement of a point of the moving region between two times, [3], m."""
+        away, angle = point - self._point, self._motion.at(clock_next) - self._motion.at(clock)
+        return self._rotate_by(away, angle) - away
 
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
-        """Largest speed of what moves with the region and is within a sphere, m/s."""
+        """Return the largest speed of points of the moving region within a sphere, m/s."""
         away = self._axes[:2] @ (np.asarray(centre, dtype=float) - self._point)
-        return self._course.largest_rate * (float(np.linalg.norm(away)) + radius)
+        return self._motion.largest_rate * (float(np.linalg.norm(away)) + radius)
 
-    def _rotated(self, vector: ca.MX, angle: ca.MX) -> ca.MX:
-        """A vector turned about the axis by an angle."""
+    def _rotate_by(self, vector: ca.MX, angle: ca.MX) -> ca.MX:
+        """Return a vector turned about the axis by an angle."""
         across = ca.DM(self._axes[:2])
         u, v = ca.vertsplit(across @ vector)
         cosine, sine = ca.cos(angle), ca.sin(angle)

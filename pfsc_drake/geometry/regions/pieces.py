@@ -1,4 +1,4 @@
-"""The nearest point of a curved boundary: pieces of it, bounded from below, and a tree of them."""
+"""Closest point of a curved boundary: pieces with lower bounds of distance, and a tree of them."""
 
 import heapq
 import math
@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-# Pieces on each side of a foot that are told to have no other, ...
+# Pieces on each side of a closest point that are excluded from having another one, ...
 BLOCK = 2
 # ... and their largest extent in radii of one.
 _BLOCK_EXTENT = 2.0 * BLOCK + 1.0
@@ -25,7 +25,7 @@ class Pieces:
     Each lies within a distance, its sag, of a flat disc about its centre.
 
     Attributes:
-        centre: On the boundary, [n_1, n_2, 3], m.
+        centre: Centres of the pieces on the boundary, [n_1, n_2, 3], m.
         normal: Unit normals of the discs, [n_1, n_2, 3].
         radius: Radius of the discs, [n_1, n_2], m.
         sag: [n_1, n_2], m.
@@ -42,12 +42,12 @@ class Pieces:
     closed: tuple[bool, bool]
 
 
-class BoundaryFoot(Protocol):
-    """A place of the boundary to which the distance is a local minimum."""
+class BoundaryPoint(Protocol):
+    """Point of the boundary to which the distance is a local minimum."""
 
     @property
     def distance(self) -> float:
-        """Of the point from there, m."""
+        """Distance to the boundary point, m."""
 
     @property
     def piece(self) -> tuple[int, int] | None:
@@ -58,7 +58,7 @@ class BoundaryFoot(Protocol):
         """Whether the point is on the other side of the boundary than its normal there."""
 
 
-FootType = TypeVar("FootType", bound=BoundaryFoot)
+PointType = TypeVar("PointType", bound=BoundaryPoint)
 
 
 class _Leaf(NamedTuple):
@@ -81,24 +81,24 @@ class _Ball(NamedTuple):
     radius: float
 
 
-class NearestFoot(Generic[FootType]):
-    """Nearest of all feet on a boundary, by branch and bound.
+class ClosestBoundaryPoint(Generic[PointType]):
+    """Closest point of a whole boundary, by branch and bound.
 
     Balls around groups of pieces, and the flat discs of single ones, bound the distance from below;
-    Newton's method is started on those pieces alone that may be nearer than what was found. Around
-    a foot the distance has no other minimum as far as it is shorter than the radius of curvature,
-    so that its neighbours need not be tried.
+    Newton's method is started only on pieces that may be nearer than the best point found. Around
+    a local minimum shorter than the radius of curvature there is no other one, so that the
+    neighbouring pieces need not be tried.
 
     Args:
         pieces: All of the boundary.
-        project: Local minimum near the middle of a piece: from a point, m, and the numbers of the
-            piece.
+        project: Local minimum near the middle of a piece, from a point, m, and the piece's row and
+            column.
     """
 
     def __init__(
         self,
         pieces: Pieces,
-        project: Callable[[float, float, float, int, int], FootType],
+        project: Callable[[float, float, float, int, int], PointType],
     ) -> None:
         self._project = project
         self._shape = pieces.radius.shape
@@ -106,11 +106,11 @@ class NearestFoot(Generic[FootType]):
         self._alone = [alone_within(pieces, bend).ravel().tolist() for bend in pieces.bends]
         self._balls, self._leaves = _tree(pieces)
 
-    def __call__(self, x: float, y: float, z: float) -> FootType:
-        """Nearest foot of a point, m."""
+    def __call__(self, x: float, y: float, z: float) -> PointType:
+        """Return the closest boundary point to a point, m."""
         balls, leaves, sqrt = self._balls, self._leaves, math.sqrt
-        best: FootType | None = None
-        # what a piece's centre is away, or the foot found
+        best: PointType | None = None
+        # distance of a piece's centre, or of the closest point found
         least = math.inf
         shielded: list[tuple[int, int]] = []
         heap = [(0.0, len(balls) - 1, -1)]
@@ -123,14 +123,14 @@ class NearestFoot(Generic[FootType]):
                 row, column = divmod(piece, columns)
                 if any(self._beside(row, column, *other) for other in shielded):
                     continue
-                foot = self._project(x, y, z, row, column)
-                if best is None or foot.distance < best.distance:
-                    best = foot
-                    least = min(least, foot.distance)
-                if foot.piece is not None:
-                    place = foot.piece[0] * columns + foot.piece[1]
-                    if foot.distance < self._alone[foot.below][place]:
-                        shielded.append(foot.piece)
+                closest_point = self._project(x, y, z, row, column)
+                if best is None or closest_point.distance < best.distance:
+                    best = closest_point
+                    least = min(least, closest_point.distance)
+                if closest_point.piece is not None:
+                    index = closest_point.piece[0] * columns + closest_point.piece[1]
+                    if closest_point.distance < self._alone[closest_point.below][index]:
+                        shielded.append(closest_point.piece)
                 continue
             for number, a, b, c, radius in balls[node]:
                 a, b, c = x - a, y - b, z - c
@@ -152,10 +152,10 @@ class NearestFoot(Generic[FootType]):
         assert best is not None
         return best
 
-    def _beside(self, row: int, column: int, foot_row: int, foot_column: int) -> bool:
-        """Whether a piece is within the block around a foot."""
+    def _beside(self, row: int, column: int, block_row: int, block_column: int) -> bool:
+        """Return whether a piece is within the block around another one."""
         rows, columns = self._shape
-        apart, across = abs(row - foot_row), abs(column - foot_column)
+        apart, across = abs(row - block_row), abs(column - block_column)
         if self._closed[0]:
             apart = min(apart, rows - apart)
         if self._closed[1]:
@@ -164,7 +164,7 @@ class NearestFoot(Generic[FootType]):
 
 
 def _tree(pieces: Pieces) -> tuple[list[list[_Ball]], list[list[_Leaf]]]:
-    """Balls around ever larger blocks of neighbouring pieces.
+    """Return balls around ever larger blocks of neighbouring pieces.
 
     Returns:
         For each node the balls in it and the pieces in it, one of both empty; the last is the root.
@@ -198,7 +198,7 @@ def _tree(pieces: Pieces) -> tuple[list[list[_Ball]], list[list[_Leaf]]]:
 
 
 def _wider(centre: np.ndarray, stride: tuple[int, int]) -> tuple[int, int]:
-    """Numbers of pieces along blocks that are twice as long where they are shorter."""
+    """Return numbers of pieces along blocks that are twice as long where they are shorter."""
     extent = []
     for axis in (0, 1):
         chords = np.linalg.norm(np.diff(centre, axis=axis), axis=-1)
@@ -209,7 +209,7 @@ def _wider(centre: np.ndarray, stride: tuple[int, int]) -> tuple[int, int]:
 
 
 def _balls(pieces: Pieces, stride: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Centres and radii of balls around blocks of pieces, [m_1, m_2, 3] and [m_1, m_2], m."""
+    """Return centres and radii of balls around blocks, [m_1, m_2, 3] and [m_1, m_2], m."""
     starts = [np.arange(0, n, k) for n, k in zip(pieces.radius.shape, stride, strict=True)]
 
     def over_blocks(function: np.ufunc, values: np.ndarray) -> np.ndarray:
@@ -223,10 +223,10 @@ def _balls(pieces: Pieces, stride: tuple[int, int]) -> tuple[np.ndarray, np.ndar
 
 
 def alone_within(pieces: Pieces, bends: np.ndarray) -> np.ndarray:
-    """Distance below which a foot on a piece is the only one of its block, [n_1, n_2], m.
+    """Return the distance below which a closest point is the only one of its block, [n_1, n_2], m.
 
     Along a geodesic f = |y - sigma|^2 / 2 has the second derivative 1 - (y - sigma) . n kappa, and
-    (y - sigma) . n is at most the distance and what the block bends by.
+    (y - sigma) . n is at most the distance plus the sag of the block.
 
     Args:
         pieces: All of the boundary.
@@ -243,33 +243,33 @@ def alone_within(pieces: Pieces, bends: np.ndarray) -> np.ndarray:
         return np.where(bend > 0.0, 1.0 / bend - 0.5 * most * extent**2, math.inf)
 
 
-# Most pieces that Newton's method is started on; where it takes more, many feet are as near to
-# some parts of a thousand.
+# Most pieces that Newton's method is started on; more are only needed where many local minima are
+# equal to some parts of a thousand.
 _MOST_TRIED = 8
-# Of what is known of a foot: its distance, the number of its piece, and whether the point is below.
+# Rows of a local minimum: its distance, the number of its piece, and whether the point is below.
 DISTANCE, PIECE, BELOW = range(3)
 ON_NO_PIECE = -1.0
 
 
-def nearest_foot(pieces: Pieces, foot: ca.Function) -> ca.Function:
-    """Function ``point -> foot`` of the nearest of all feet on the pieces of a boundary.
+def closest_boundary_point(pieces: Pieces, project: ca.Function) -> ca.Function:
+    """Return the function ``point -> closest_point`` of all pieces of a boundary.
 
-    As :class:`NearestFoot` finds it, but without a tree: the bounds of all pieces are evaluated,
-    and those that may be nearer than what was found are tried in the order of their bounds.
+    It is the search of :class:`ClosestBoundaryPoint` without a tree: the bounds of all pieces are
+    evaluated, and pieces that may be nearer than the best are tried in the order of their bounds.
 
     Args:
         pieces: All of the boundary; their numbers go along the second direction first.
-        foot: Local minimum near the middle of a piece, ``(point, number) -> foot``, shape (k,): its
-            distance [m]; the number of the piece it is on, -1 on an end; whether the point is on
-            the other side than the normal there; and what else is wanted to be known.
+        project: Local minimum near the middle of a piece, ``(point, number) -> minimum``, shape
+            (k,): its distance [m]; the number of its piece, -1 on an end; whether the point is on
+            the other side than the normal there; and any further quantities.
 
     Returns:
-        The function; of a point that is no number all is NaN.
+        The function; for a NaN or infinite point all values are NaN.
     """
     point = ca.MX.sym("point", 3)
     low = _bounds(pieces, point)
-    best = ca.vertcat(math.inf, math.nan * ca.MX.ones(foot.size1_out(0) - 1))
-    try_next = _unless_done(_try_next(pieces, foot))
+    best = ca.vertcat(math.inf, math.nan * ca.MX.ones(project.size1_out(0) - 1))
+    try_next = _unless_done(_try_next(pieces, project))
     for _ in range(_MOST_TRIED):
         may_be_nearer = ca.mmin(low) < best[DISTANCE] - NOT_NEARER
         low, best = try_next(may_be_nearer, low, best, point)
@@ -277,7 +277,7 @@ def nearest_foot(pieces: Pieces, foot: ca.Function) -> ca.Function:
 
 
 def _bounds(pieces: Pieces, point: ca.MX) -> ca.MX:
-    """Distance that each piece is not nearer than, [n], m."""
+    """Return lower bounds of the distance of each piece, [n], m."""
     away = [_row(pieces.centre[..., k]) for k in range(3)]
     away = [point[k] - column for k, column in enumerate(away)]
     normal = [_row(pieces.normal[..., k]) for k in range(3)]
@@ -287,16 +287,16 @@ def _bounds(pieces: Pieces, point: ca.MX) -> ca.MX:
     return ca.sqrt(height**2 + ca.fmax(beside, 0.0) ** 2) - _row(pieces.sag)
 
 
-def _try_next(pieces: Pieces, foot: ca.Function) -> ca.Function:
-    """``(low, best, point) -> (low, best)``: the piece with the least bound has been tried.
+def _try_next(pieces: Pieces, project: ca.Function) -> ca.Function:
+    """Return ``(low, best, point) -> (low, best)``, which tries the piece with the least bound.
 
-    So have those beside a foot that is the only one of its block.
+    Pieces beside a minimum that is the only one of its block count as tried, too.
     """
     count = pieces.radius.size
-    low, best = ca.MX.sym("low", count), ca.MX.sym("best", foot.size1_out(0))
+    low, best = ca.MX.sym("low", count), ca.MX.sym("best", project.size1_out(0))
     point, numbers = ca.MX.sym("point", 3), _row(np.arange(float(count)))
     number = ca.mmin(ca.if_else(low <= ca.mmin(low), numbers, count - 1.0))
-    found = foot(point, number)
+    found = project(point, number)
     piece = ca.fmax(found[PIECE], 0.0)
     above, below = (_row(alone_within(pieces, bend))[piece] for bend in pieces.bends)
     alone = ca.logic_and(
@@ -314,19 +314,19 @@ def _try_next(pieces: Pieces, foot: ca.Function) -> ca.Function:
 
 
 def _beside(pieces: Pieces, piece: ca.MX) -> ca.MX:
-    """Which pieces are within the block around one, [n]."""
+    """Return whether each piece is within the block around one, [n]."""
     row = ca.floor(piece / pieces.radius.shape[1])
-    places = row, piece - row * pieces.radius.shape[1]
+    indices = row, piece - row * pieces.radius.shape[1]
     within = ca.MX(1.0)
-    for place, of_each, count, closed in zip(
-        places,
+    for index, of_each, count, closed in zip(
+        indices,
         np.indices(pieces.radius.shape, dtype=float),
         pieces.radius.shape,
         pieces.closed,
         strict=True,
     ):
         if count > 1:
-            apart = ca.fabs(_row(of_each) - place)
+            apart = ca.fabs(_row(of_each) - index)
             if closed:
                 apart = ca.fmin(apart, count - apart)
             within = ca.logic_and(within, apart <= BLOCK)
@@ -334,12 +334,12 @@ def _beside(pieces: Pieces, piece: ca.MX) -> ca.MX:
 
 
 def _unless_done(advance: ca.Function) -> ca.Function:
-    """``(goes_on, low, best, point) -> (low, best)``, which costs nothing when all is done."""
-    given = advance.mx_in()
-    stay = ca.Function("stay", given, given[:2])
+    """Return ``(goes_on, low, best, point) -> (low, best)``, which skips finished searches."""
+    arguments = advance.mx_in()
+    stay = ca.Function("stay", arguments, arguments[:2])
     return ca.Function.if_else("try_next_unless_done", advance, stay)
 
 
 def _row(values: np.ndarray) -> ca.MX:
-    """One number for each piece."""
+    """Return one number for each piece, as a row."""
     return ca.MX(ca.DM(values.ravel()))

@@ -1,4 +1,4 @@
-"""Signed distance from a curve in the plane whose ends go on for ever."""
+"""Signed distance from a plane curve with straight extensions at its ends."""
 
 import math
 from typing import NamedTuple
@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.closest_point import ClosestPointFinder
 from pfsc_drake.geometry.curves.polynomial import PieceTable, PiecewisePolynomialCurve
-from pfsc_drake.geometry.foot import FootFinder
-from pfsc_drake.geometry.regions.pieces import ON_NO_PIECE, Pieces, nearest_foot
+from pfsc_drake.geometry.regions.pieces import ON_NO_PIECE, Pieces, closest_boundary_point
 from pfsc_drake.geometry.regions.region import direction
 
 # Of the tangent on a piece, rad, and most pieces of a cell.
@@ -21,20 +21,20 @@ _LONGEST_STEP = 1.0 / 32.0
 
 
 class PlaneCurve:
-    """Signed distance from a curve in the plane, positive to the right of its way.
+    """Signed distance from a plane curve, positive on its right.
 
-    Both ends of an open curve go on straight along their tangents, so that it divides the plane.
+    Both ends of an open curve are extended along their tangents, so that it divides the plane.
 
     Args:
         curve: Curve of dimension 2, m.
-        ends_at_axis: Whether what goes on ends where the first coordinate is zero.
+        ends_at_axis: Whether the extensions end where the first coordinate is zero.
 
     Attributes:
-        counter_clockwise: Whether a closed curve runs that way round.
-        signed_distance: Function ``place -> (h, n)``, both shape (2,) but h [m].
+        counter_clockwise: Whether a closed curve runs counter-clockwise.
+        signed_distance: Function ``point -> (h, n)``, both shape (2,) but h [m].
 
     Raises:
-        InputError: The curve is not of class C^2 or not regular, or meets what goes on.
+        InputError: The curve is not of class C^2 or not regular, or meets its extensions.
     """
 
     def __init__(self, curve: PiecewisePolynomialCurve, *, ends_at_axis: bool = False) -> None:
@@ -51,33 +51,33 @@ class PlaneCurve:
             known_smoothness=int(min(curve.smoothness, curve.degree)),
         )
         edges = _edges(lifted)
-        nearest = nearest_foot(_pieces(lifted, edges), _foot_of_piece(lifted, edges))
+        nearest = closest_boundary_point(_pieces(lifted, edges), _closest_on_piece(lifted, edges))
         corners = lifted.derivatives(edges, 0)[:, 0, :2]
         x, y = corners.T
         self.counter_clockwise = bool(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) > 0.0)
         rays = [] if curve.closed else _rays(lifted, ends_at_axis)
         _refuse_crossings(corners, rays)
 
-        place = ca.MX.sym("place", 2)
-        foot = nearest(ca.vertcat(place, 0.0))
-        h, n = foot[3], foot[4:]
+        point = ca.MX.sym("place", 2)
+        closest_point = nearest(ca.vertcat(point, 0.0))
+        h, n = closest_point[3], closest_point[4:]
         for ray in rays:
-            h, n = ray.nearer(place, h, n)
-        self.signed_distance = ca.Function("plane_curve", [place], [h, n], ["place"], ["h", "n"])
+            h, n = ray.nearer(point, h, n)
+        self.signed_distance = ca.Function("plane_curve", [point], [h, n], ["place"], ["h", "n"])
 
 
 class _Ray(NamedTuple):
-    """Where an end goes on: from a begin along t, with the right of the curve's way, n."""
+    """Straight extension of an end: from a begin along t, with n to the right of the curve."""
 
     begin: ca.DM
     t: ca.DM
     n: ca.DM
     length: float
 
-    def nearer(self, place: ca.MX, h: ca.MX, n: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """Signed distance and normal where this is nearer than what is known."""
-        way = place - self.begin
-        along, height = ca.dot(way, self.t), ca.dot(way, self.n)
+    def nearer(self, point: ca.MX, h: ca.MX, n: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """Return signed distance and normal, of this ray where it is nearer than h."""
+        offset = point - self.begin
+        along, height = ca.dot(offset, self.t), ca.dot(offset, self.n)
         over = ca.fmax(along - self.length, 0.0)
         away, outwards = direction(ca.vertcat(height, over), (1.0, 0.0))
         side = ca.copysign(1.0, height)
@@ -89,34 +89,37 @@ class _Ray(NamedTuple):
         )
 
 
-def _foot_of_piece(curve: PiecewisePolynomialCurve, edges: np.ndarray) -> ca.Function:
-    """Function ``(point, number) -> foot``, see :func:`nearest_foot`, with h and n, shape (6,)."""
+def _closest_on_piece(curve: PiecewisePolynomialCurve, edges: np.ndarray) -> ca.Function:
+    """Return ``(point, number) -> minimum``, see :func:`closest_boundary_point`, shape (6,).
+
+    Its further quantities are h and n.
+    """
     (begin, end), breakpoints = curve.domain, ca.MX(ca.DM(edges))
     middles = ca.MX(ca.DM(0.5 * (edges[1:] + edges[:-1])))
     table = PieceTable(curve.breakpoints, _with_derivatives(curve.coefficients))
 
-    def wrapped(theta: ca.MX) -> ca.MX:
+    def wrap(theta: ca.MX) -> ca.MX:
         return theta - curve.period * ca.floor((theta - begin) / curve.period)
 
     def terms(theta: ca.MX) -> ca.MX:
-        return ca.reshape(table(wrapped(theta) if curve.closed else theta), 3, 3)
+        return ca.reshape(table(wrap(theta) if curve.closed else theta), 3, 3)
 
     point, number = ca.MX.sym("point", 3), ca.MX.sym("number")
-    finder = FootFinder(terms, [(begin, end)], [curve.closed], _LONGEST_STEP)
-    foot = finder.find(point, middles[number])
-    position, tangent, _ = ca.horzsplit(terms(foot.theta))
-    way, scale = (point - position)[:2], ca.norm_2(tangent)
+    finder = ClosestPointFinder(terms, [(begin, end)], [curve.closed], _LONGEST_STEP)
+    closest_point = finder.find(point, middles[number])
+    position, tangent, _ = ca.horzsplit(terms(closest_point.theta))
+    offset, scale = (point - position)[:2], ca.norm_2(tangent)
     normal = ca.vertcat(tangent[1], -tangent[0]) / scale
-    along = ca.dot(way, normal)
-    away, outwards = direction(way, (0.0, 0.0))
+    along = ca.dot(offset, normal)
+    away, outwards = direction(offset, (0.0, 0.0))
     side = ca.copysign(1.0, along)
     is_normal = ca.logic_or(
-        away == 0.0, ca.logic_and(foot.converged, ca.logic_not(foot.beyond_end))
+        away == 0.0, ca.logic_and(closest_point.converged, ca.logic_not(closest_point.beyond_end))
     )
-    piece = ca.low(breakpoints, wrapped(foot.theta))
+    piece = ca.low(breakpoints, wrap(closest_point.theta))
     found = [
         away,
-        ca.if_else(foot.beyond_end, ON_NO_PIECE, piece),
+        ca.if_else(closest_point.beyond_end, ON_NO_PIECE, piece),
         along < 0.0,
         ca.if_else(is_normal, along, side * away),
         ca.if_else(is_normal, normal, side * outwards),
@@ -125,7 +128,7 @@ def _foot_of_piece(curve: PiecewisePolynomialCurve, edges: np.ndarray) -> ca.Fun
 
 
 def _with_derivatives(coefficients: np.ndarray) -> np.ndarray:
-    """Those of a curve and of its first two derivatives, [pieces, 9, powers]."""
+    """Return coefficients of a curve and of its first two derivatives, [pieces, 9, powers]."""
     powers, rows = coefficients.shape[1], []
     for order in range(3):
         row = np.polynomial.polynomial.polyder(coefficients, order, axis=1)
@@ -134,7 +137,7 @@ def _with_derivatives(coefficients: np.ndarray) -> np.ndarray:
 
 
 def _edges(curve: PiecewisePolynomialCurve) -> np.ndarray:
-    """Parameters between pieces on which the tangent turns little, [pieces + 1]."""
+    """Return parameters between pieces on which the tangent turns little, [pieces + 1]."""
     parts = np.linspace(0.0, 1.0, _SAMPLES)
     begin, length = curve.breakpoints[:-1, None], np.diff(curve.breakpoints)[:, None]
     # the ends of a cell are left to the cell beside
@@ -150,7 +153,7 @@ def _edges(curve: PiecewisePolynomialCurve) -> np.ndarray:
 
 
 def _pieces(curve: PiecewisePolynomialCurve, edges: np.ndarray) -> Pieces:
-    """Pieces of a plane curve in R^3."""
+    """Return pieces of a plane curve in R^3."""
     half = 0.5 * np.diff(edges)
     parts = np.linspace(-1.0, 1.0, 5)
     theta = 0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * parts
@@ -158,7 +161,7 @@ def _pieces(curve: PiecewisePolynomialCurve, edges: np.ndarray) -> Pieces:
     speed = np.linalg.norm(first, axis=-1)
     if not np.all(speed > 1e-9 * speed.max()):
         raise InputError("profile: its tangent vanishes; a regular curve is required of a region")
-    # no place is further from a sample than a quarter of the half
+    # no parameter is further from a sample than a quarter of the half
     bend = np.linalg.norm(second, axis=-1).max(axis=1)
     bend = bend + 0.25 * half * np.linalg.norm(third, axis=-1).max(axis=1)
     left = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
@@ -175,7 +178,7 @@ def _pieces(curve: PiecewisePolynomialCurve, edges: np.ndarray) -> Pieces:
 
 
 def _rays(curve: PiecewisePolynomialCurve, ends_at_axis: bool) -> list[_Ray]:
-    """What goes on at both ends of an open curve."""
+    """Return the straight extensions at both ends of an open curve."""
     rays = []
     for theta, onwards in zip(curve.domain, (-1.0, 1.0), strict=True):
         (x, y, _), tangent = curve.derivatives(theta, 1).tolist()
@@ -188,7 +191,7 @@ def _rays(curve: PiecewisePolynomialCurve, ends_at_axis: bool) -> list[_Ray]:
 
 
 def _refuse_crossings(corners: np.ndarray, rays: list[_Ray]) -> None:
-    """Ends that go on must not meet the curve or each other."""
+    """Refuse extensions that meet the curve or each other."""
     far = 10.0 * float(np.ptp(corners, axis=0).max())
     tails = []
     for k, ray in enumerate(rays):
@@ -197,18 +200,18 @@ def _refuse_crossings(corners: np.ndarray, rays: list[_Ray]) -> None:
         own = corners[2:] if k == 0 else corners[:-2]
         if _cross(*tails[k], own[:-1], own[1:]).any():
             raise InputError(
-                f"profile: its {'first' if k == 0 else 'last'} end, going on straight, meets it;"
-                " an open profile must divide what is on either side, or be closed"
+                f"profile: its {'first' if k == 0 else 'last'} end, extended straight, meets it;"
+                " an open profile must divide the plane into two sides, or be closed"
             )
     if len(tails) == 2 and _cross(*tails[0], tails[1][0][None], tails[1][1][None]).any():
         raise InputError(
-            "profile: its ends, going on straight, meet each other; an open profile must divide"
-            " what is on either side, or be closed"
+            "profile: its ends, extended straight, meet each other; an open profile must divide"
+            " the plane into two sides, or be closed"
         )
 
 
 def _cross(a: np.ndarray, b: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Whether the line from a to b crosses each of others, [n]."""
+    """Return whether the line from a to b crosses each of others, [n]."""
 
     def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
         u, v = q - p, r - p

@@ -1,4 +1,4 @@
-"""Admissible regions: what every one of them offers."""
+"""Admissible regions: their common interface."""
 
 import math
 from abc import ABC, abstractmethod
@@ -20,7 +20,7 @@ def checked_point(name: str, values: ArrayLike) -> Triple:
     """Return three finite numbers as floats.
 
     Raises:
-        InputError: They are none.
+        InputError: They are not three finite numbers.
     """
     v = np.asarray(values, dtype=float)
     if v.shape != (3,) or not np.all(np.isfinite(v)):
@@ -33,7 +33,7 @@ def checked_length(name: str, value: float) -> float:
     """Return a positive finite number as a float.
 
     Raises:
-        InputError: It is none.
+        InputError: It is not positive and finite.
     """
     if not 0.0 < value < math.inf:
         raise InputError(f"region {name}: {value} m; a positive number of metres is required")
@@ -41,7 +41,7 @@ def checked_length(name: str, value: float) -> float:
 
 
 def axes_along(axis: ArrayLike) -> np.ndarray:
-    """Unit vectors, the third along an axis, by rows, [3, 3].
+    """Return the unit vectors, the third along an axis, by rows, [3, 3].
 
     Args:
         axis: Vector along the axis, of any length, [3].
@@ -60,15 +60,15 @@ Symbol = Any
 
 
 class Region(ABC):
-    """A part of space whose boundary a tool must not cross, at rest (Sec. 5.1.1).
+    """Fixed part of space whose boundary a tool must not cross (Sec. 5.1.1).
 
-    The distance is that to the nearest point of the whole boundary, not one found from a guess. So
-    it is 1-Lipschitz: a tool that moved by dz is not nearer than ``h - |dz|``.
+    The distance is to the closest point of the whole boundary, not to one near a guess. It is
+    therefore 1-Lipschitz: after a motion by dz the tool is not nearer than ``h - |dz|``.
     """
 
     @abstractmethod
     def distance(self, x: float, y: float, z: float) -> Distance:
-        """Signed distance to the boundary, positive in the admissible region.
+        """Return the signed distance to the boundary, positive in the admissible region.
 
         Args:
             x: Coordinate x of the tool point, world axes, finite, m.
@@ -76,17 +76,17 @@ class Region(ABC):
             z: Coordinate z, likewise.
 
         Returns:
-            h, m, and its gradient, the unit normal n at the foot into the admissible region, as
-            plain floats. Where several points of the boundary are the nearest, that of one of them,
-            always the same.
+            h, m, and its gradient, the unit normal n at the closest point into the admissible
+            region, as plain floats. Where several points of the boundary are equally near, the
+            gradient belongs to one of them, always the same.
         """
 
     @property
     @abstractmethod
     def signed_distance(self) -> ca.Function:
-        """The same of symbols or numbers, a function ``(point) -> (h, n)``.
+        """Signed distance of symbols or numbers, a function ``(point) -> (h, n)``.
 
-        Of a point that is not finite h is no number.
+        For a NaN or infinite point h is NaN.
 
         Raises:
             InputError: The distance is no expression; says why.
@@ -94,17 +94,17 @@ class Region(ABC):
 
 
 class FormulaRegion(Region):
-    """A region whose distance is an expression.
+    """Region whose distance is an expression.
 
     Attributes:
-        symbol: What its expression is made of: scalars, or matrices where tables are looked up.
+        symbol: Type of its symbols: scalars, or matrices for table look-ups.
     """
 
     symbol: Any = ca.SX
 
     @abstractmethod
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """Signed distance and normal as expressions.
+        """Return the signed distance and normal as expressions.
 
         Args:
             point: The tool point, world axes, [3], m.
@@ -115,7 +115,7 @@ class FormulaRegion(Region):
 
     @cached_property
     def signed_distance(self) -> ca.Function:
-        """The same of symbols or numbers, a function ``(point) -> (h, n)``."""
+        """Signed distance of symbols or numbers, a function ``(point) -> (h, n)``."""
         point = self.symbol.sym("point", 3)
         h, n = self.formula(point)
         is_finite = ca.dot(point, point) < math.inf
@@ -132,12 +132,12 @@ class FormulaRegion(Region):
         return PlainFunction(self.signed_distance)
 
     def distance(self, x: float, y: float, z: float) -> Distance:
-        """Signed distance to the boundary, positive in the admissible region."""
+        """Return the signed distance to the boundary, positive in the admissible region."""
         return self._distance(x, y, z)
 
 
 def direction(vector: Symbol, otherwise: tuple[float, ...]) -> tuple[Symbol, Symbol]:
-    """Length and unit vector of a vector.
+    """Return the length and unit vector of a vector.
 
     Args:
         vector: [n].

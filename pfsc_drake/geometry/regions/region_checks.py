@@ -1,4 +1,4 @@
-"""Whether regions make sense together: around a start, and with each other."""
+"""Checks of regions: admissibility of a start, and compatibility with each other."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,18 +13,18 @@ from pfsc_drake.geometry.regions.region import Distance, Region, axes_along
 
 Regions = Mapping[str, Region | MovingRegion]
 
-# Points looked at, and how far from the start, m.
+# Points examined, and their largest distance from the start, m.
 _SAMPLES = 64
 _FAR = 0.5
 # Distances that differ by less are the same, m.
 _SAME = 1e-9
 # Steps towards the admissible side, and how far beyond each boundary, m.
 _MOST_STEPS, _BEYOND = 200, 1e-6
-# Starts and steps to places that two boundaries have in common, and pairs looked at.
+# Starts and steps of the search for common points of two boundaries, and pairs examined.
 _STARTS, _STEPS, _MOST_PAIRS = 8, 30, 300
-# Distance of such a place from both, and longest step to it, m.
+# Distance of a common point from both, and longest step to it, m.
 _COMMON, _LONGEST = 1e-9, 0.3
-# Where a gap is looked for beside it, m, and its share of that if it is a wedge.
+# Distance beside it at which a gap is measured, m, and the gap's share of that in a wedge.
 _BESIDE, _NARROW = 1e-3, 0.3
 # Angle between normals that are nearly one, deg, and the square of a sine that is rounding.
 _NEARLY_PARALLEL_DEG = 0.6
@@ -35,13 +35,13 @@ def refuse_forbidden_start(regions: Regions, start: ArrayLike, clock: float = 0.
     """Refuse a start on the forbidden side of a region.
 
     Args:
-        regions: By name.
+        regions: The regions by name.
         start: Tool point, [3], m.
         clock: Time of the regions' clock [s].
 
     Raises:
-        InputError: It is; says of which regions, how deep, and where the nearest admissible point
-            is that a search found, or that there is none near.
+        InputError: It is; names the regions, the depths, and the nearest admissible point that a
+            search found, if there is one.
     """
     y = np.asarray(start, dtype=float)
     depths = {name: _distance(region, y, clock)[0] for name, region in regions.items()}
@@ -54,15 +54,15 @@ def refuse_forbidden_start(regions: Regions, start: ArrayLike, clock: float = 0.
         hint = "no admissible point was found near it: regions exclude each other there"
     else:
         away = float(np.linalg.norm(found - y)) * 1e3
-        hint = f"{_place(found)} is admissible, {away:.4g} mm away"
-    raise InputError(f"start {_place(y)} is in a forbidden region, {which}; {hint}")
+        hint = f"{_text(found)} is admissible, {away:.4g} mm away"
+    raise InputError(f"start {_text(y)} is in a forbidden region, {which}; {hint}")
 
 
 def blocked_start(regions: Regions, start: ArrayLike, clock: float = 0.0) -> list[str]:
-    """Say of a start on the forbidden side of a region if there is no way out.
+    """Report a start on the forbidden side of a region from which no admissible point is near.
 
     Args:
-        regions: By name.
+        regions: The regions by name.
         start: Tool point, [3], m.
         clock: Time of the regions' clock [s].
 
@@ -74,23 +74,23 @@ def blocked_start(regions: Regions, start: ArrayLike, clock: float = 0.0) -> lis
     if not inside or _admissible_near(list(regions.values()), y, clock) is not None:
         return []
     return [
-        f"start {_place(y)} is in that of {' and '.join(inside)}, and no admissible point was found"
+        f"start {_text(y)} is in that of {' and '.join(inside)}, and no admissible point was found"
         " near it: regions exclude each other there, and squeeze the tool"
     ]
 
 
 def refuse_same_regions(regions: Regions, start: ArrayLike, clock: float = 0.0) -> None:
-    """Refuse regions that are given twice, or exclude each other with one boundary.
+    """Refuse identical regions, and regions that exclude each other with one boundary.
 
-    Two are told apart by distances at 64 points around the start.
+    Two regions are compared by distances at 64 points around the start.
 
     Args:
-        regions: By name.
+        regions: The regions by name.
         start: Tool point, [3], m.
         clock: Time of the regions' clock [s].
 
     Raises:
-        InputError: Two are the same, or one is what the other is not.
+        InputError: Two are the same, or one is the complement of the other.
     """
     points = _around(start, _SAMPLES)
     names = list(regions)
@@ -103,25 +103,25 @@ def refuse_same_regions(regions: Regions, start: ArrayLike, clock: float = 0.0) 
         if np.abs(table[i] + table[j]).max() < _SAME:
             raise InputError(
                 f"{names[i]} and {names[j]}: one boundary, with opposite sides admissible; must"
-                " leave room between them"
+                " leave space between them"
             )
 
 
 def tangent_regions(regions: Regions, start: ArrayLike, clock: float = 0.0) -> list[str]:
-    """Pairs of regions whose boundaries touch instead of crossing, near a start.
+    """Return pairs of regions whose boundaries touch instead of crossing, near a start.
 
-    Where they do, what both admit is a wedge without an angle, or nothing. Common places are looked
-    for from 8 points around the start, of the 300 pairs that are nearest to it; a place between
-    may be overlooked.
+    Where they touch, their common admissible space is a wedge without an angle, or empty. Common
+    points are searched from 8 points around the start, for the 300 pairs nearest to it; some may be
+    overlooked.
 
     Args:
-        regions: By name.
+        regions: The regions by name.
         start: Tool point, [3], m.
         clock: Time of the regions' clock [s].
 
     Returns:
         A sentence for each pair: where, and which angle the normals make, below 0.6 deg or above
-        179.4 deg; obstacles that stand on a boundary with a face are none.
+        179.4 deg; obstacles that stand on a boundary with a face do not count.
     """
     names = list(regions)
     away = {n: abs(_distance(regions[n], np.asarray(start, dtype=float), clock)[0]) for n in names}
@@ -132,9 +132,9 @@ def tangent_regions(regions: Regions, start: ArrayLike, clock: float = 0.0) -> l
         for begin in starts:
             touching = _touching(regions[one], regions[other], begin, clock)
             if touching is not None:
-                place, angle = touching
+                point, angle = touching
                 found.append(
-                    f"{one} and {other}: boundaries touch at {_place(place)},"
+                    f"{one} and {other}: boundaries touch at {_text(point)},"
                     f" {angle:.2g} deg between their normals"
                 )
                 break
@@ -153,12 +153,14 @@ def _moves(regions: Regions, *names: str) -> bool:
 
 
 def _around(start: ArrayLike, count: int) -> np.ndarray:
-    """Points in a ball, the first being the start, [count, 3], m."""
+    """Return points in a ball, the first being the start, [count, 3], m."""
     rng = np.random.default_rng(0)
-    way = rng.normal(size=(count, 3))
-    way *= (_FAR * rng.uniform(size=count) ** (1.0 / 3.0) / np.linalg.norm(way, axis=1))[:, None]
-    way[0] = 0.0
-    return np.asarray(np.asarray(start, dtype=float) + way)
+    offsets = rng.normal(size=(count, 3))
+    offsets *= (_FAR * rng.uniform(size=count) ** (1.0 / 3.0) / np.linalg.norm(offsets, axis=1))[
+        :, None
+    ]
+    offsets[0] = 0.0
+    return np.asarray(np.asarray(start, dtype=float) + offsets)
 
 
 def _admissible_near(
@@ -179,7 +181,7 @@ def _admissible_near(
 def _touching(
     one: Region | MovingRegion, other: Region | MovingRegion, begin: np.ndarray, clock: float
 ) -> tuple[np.ndarray, float] | None:
-    """Where two boundaries touch that have a place in common, and the angle of normals, deg.
+    """Return the point where two boundaries touch, and the angle between normals, deg.
 
     Newton's method to h = 0 of both, by the shortest steps; where boundaries touch each halves the
     distance.
@@ -196,7 +198,7 @@ def _touching(
             if angle > 180.0 - _NEARLY_PARALLEL_DEG and _narrows(one, other, y, n_1, clock):
                 return y, angle
             return None
-        # of normals that differ by rounding neither a common place nor a step is found
+        # normals that differ by rounding lead neither to a common point nor to a step
         if square < _PARALLEL:
             return None
         step = (h_1 - cosine * h_2) / square * np.array(n_1)
@@ -208,21 +210,21 @@ def _touching(
 def _narrows(
     one: Region | MovingRegion,
     other: Region | MovingRegion,
-    place: np.ndarray,
+    point: np.ndarray,
     normal: Sequence[float],
     clock: float,
 ) -> bool:
-    """Whether what is left between two boundaries that touch gets ever narrower towards a place.
+    """Return whether the gap between two touching boundaries narrows to nothing at a point.
 
-    Not where an obstacle stands on a plane: there is no gap under it, and beside it is room.
+    It does not where an obstacle stands on a plane: there is no gap under it, a wide one beside it.
     """
     axes = axes_along(normal)
     widest = 0.0
     for angle in np.linspace(0.0, 2.0 * math.pi, 9)[:-1]:
-        beside = place + _BESIDE * (math.cos(angle) * axes[0] + math.sin(angle) * axes[1])
+        beside = point + _BESIDE * (math.cos(angle) * axes[0] + math.sin(angle) * axes[1])
         widest = max(widest, sum(_distance(region, beside, clock)[0] for region in (one, other)))
     return 10.0 * _COMMON < widest < _NARROW * _BESIDE
 
 
-def _place(y: np.ndarray) -> str:
+def _text(y: np.ndarray) -> str:
     return "[" + ", ".join(f"{value:.6g}" for value in y) + "] m"

@@ -8,8 +8,13 @@ import numpy as np
 
 from pfsc_drake.compiled.bound_function import PlainFunction
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.foot import FootFinder
-from pfsc_drake.geometry.regions.pieces import ON_NO_PIECE, NearestFoot, Pieces, nearest_foot
+from pfsc_drake.geometry.closest_point import ClosestPointFinder
+from pfsc_drake.geometry.regions.pieces import (
+    ON_NO_PIECE,
+    ClosestBoundaryPoint,
+    Pieces,
+    closest_boundary_point,
+)
 from pfsc_drake.geometry.regions.region import Distance, FormulaRegion, Symbol, direction
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
 from pfsc_drake.geometry.surfaces.extended import SurfaceTable
@@ -26,7 +31,7 @@ _MOST_IN_FORMULA = 512
 _SAMPLES = 3
 
 
-class _SurfaceFoot(NamedTuple):
+class _SurfacePoint(NamedTuple):
     distance: float
     piece: tuple[int, int] | None
     below: bool
@@ -34,15 +39,15 @@ class _SurfaceFoot(NamedTuple):
 
 
 class SurfaceRegion(FormulaRegion):
-    """What lies on one side of a surface, a spline fit for instance.
+    """Region on one side of a surface, such as a spline fit.
 
-    The foot is the nearest point of the whole surface: pieces of it, whose bends are bounded from
-    samples, are ruled out unless they may be nearer than what Newton's method has found.
+    The distance is to the closest point of the whole surface: its pieces, whose curvature is
+    bounded from samples, are ruled out unless they may be nearer than the best point found.
 
-    An open surface is a sheet that ends at its border. Where the border is the nearest, the
-    distance is that from it, positive, and the gradient points away from it: what the surface does
-    not cover is admissible. So a tool that goes round the border is suddenly deep on the wrong
-    side; other regions have to keep it from there.
+    An open surface is a sheet that ends at its border. Where the border is nearest, h is the
+    distance to the border, positive, and the gradient points away from it: space beside the surface
+    is admissible. A tool that goes around the border is suddenly deep on the wrong side; other
+    regions have to prevent that.
 
     Args:
         surface: Surface of class C^2, of class C^3 between its breakpoints, a single sheet.
@@ -57,16 +62,16 @@ class SurfaceRegion(FormulaRegion):
     def __init__(self, surface: Surface, *, above: bool) -> None:
         edges = _edges(surface)
         self._pieces = _pieces(surface, edges)
-        self._foot = _foot_of_piece(surface, edges, 1.0 if above else -1.0)
-        self._project = PlainFunction(self._foot)
-        self._nearest = NearestFoot(self._pieces, self._foot_near)
+        self._closest = _closest_on_piece(surface, edges, 1.0 if above else -1.0)
+        self._project = PlainFunction(self._closest)
+        self._nearest = ClosestBoundaryPoint(self._pieces, self._closest_near)
 
     def distance(self, x: float, y: float, z: float) -> Distance:
-        """Signed distance to the boundary, positive in the admissible region."""
+        """Return the signed distance to the boundary, positive in the admissible region."""
         return self._nearest(x, y, z).signed
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """Signed distance and normal as expressions.
+        """Return the signed distance and normal as expressions.
 
         Raises:
             InputError: The surface has too many pieces.
@@ -77,18 +82,20 @@ class SurfaceRegion(FormulaRegion):
                 f"surface of {count} pieces: the nearest is searched for in a tree of them; a"
                 f" formula has at most {_MOST_IN_FORMULA}"
             )
-        foot = nearest_foot(self._pieces, self._foot)(point)
-        return foot[3], foot[4:]
+        closest_point = closest_boundary_point(self._pieces, self._closest)(point)
+        return closest_point[3], closest_point[4:]
 
-    def _foot_near(self, x: float, y: float, z: float, row: int, column: int) -> _SurfaceFoot:
+    def _closest_near(self, x: float, y: float, z: float, row: int, column: int) -> _SurfacePoint:
         columns = self._pieces.radius.shape[1]
         away, piece, below, *signed = self._project(x, y, z, row * columns + column)
-        place = None if piece == ON_NO_PIECE else divmod(int(piece), columns)
-        return _SurfaceFoot(away, place, bool(below), tuple(signed))
+        cell = None if piece == ON_NO_PIECE else divmod(int(piece), columns)
+        return _SurfacePoint(away, cell, bool(below), tuple(signed))
 
 
-def _foot_of_piece(surface: Surface, edges: list[np.ndarray], sign: float) -> ca.Function:
-    """Function ``(point, number) -> foot``, see :func:`nearest_foot`, with h and n, shape (7,).
+def _closest_on_piece(surface: Surface, edges: list[np.ndarray], sign: float) -> ca.Function:
+    """Return ``(point, number) -> minimum``, see :func:`closest_boundary_point`, shape (7,).
+
+    Its further quantities are h and n.
 
     Args:
         surface: The surface.
@@ -97,27 +104,35 @@ def _foot_of_piece(surface: Surface, edges: list[np.ndarray], sign: float) -> ca
     """
     point, number = ca.MX.sym("point", 3), ca.MX.sym("number")
     table, columns = SurfaceTable(surface), len(edges[1]) - 1
-    finder = FootFinder(lambda theta: table(theta, 2), surface.domain, surface.closed, LONGEST_STEP)
+    finder = ClosestPointFinder(
+        lambda theta: table(theta, 2), surface.domain, surface.closed, LONGEST_STEP
+    )
     row = ca.floor(number / columns)
     middles = [ca.MX(ca.DM(0.5 * (e[1:] + e[:-1]))) for e in edges]
-    foot = finder.find(point, ca.vertcat(middles[0][row], middles[1][number - row * columns]))
-    position, first, second = ca.horzsplit(table(foot.theta, 1))
+    closest_point = finder.find(
+        point, ca.vertcat(middles[0][row], middles[1][number - row * columns])
+    )
+    position, first, second = ca.horzsplit(table(closest_point.theta, 1))
     normal = ca.cross(first, second)
     normal = normal / ca.norm_2(normal)
     along = ca.dot(point - position, normal)
     away, outwards = direction(point - position, (0.0, 0.0, 0.0))
-    # of what is not above a normal, the way from the foot
-    side = ca.if_else(foot.beyond_end, 1.0, ca.copysign(1.0, sign * along))
+    # beside the border, the direction from the closest point
+    side = ca.if_else(closest_point.beyond_end, 1.0, ca.copysign(1.0, sign * along))
     is_normal = ca.logic_or(
-        away == 0.0, ca.logic_and(foot.converged, ca.logic_not(foot.beyond_end))
+        away == 0.0, ca.logic_and(closest_point.converged, ca.logic_not(closest_point.beyond_end))
     )
-    places = []
+    cells = []
     for k, ((begin, end), lines) in enumerate(zip(surface.domain, edges, strict=True)):
-        laps = ca.floor((foot.theta[k] - begin) / (end - begin)) if surface.closed[k] else 0.0
-        places.append(ca.low(ca.MX(ca.DM(lines)), foot.theta[k] - laps * (end - begin)))
+        revolutions = (
+            ca.floor((closest_point.theta[k] - begin) / (end - begin)) if surface.closed[k] else 0.0
+        )
+        cells.append(
+            ca.low(ca.MX(ca.DM(lines)), closest_point.theta[k] - revolutions * (end - begin))
+        )
     found = [
         away,
-        ca.if_else(foot.beyond_end, ON_NO_PIECE, columns * places[0] + places[1]),
+        ca.if_else(closest_point.beyond_end, ON_NO_PIECE, columns * cells[0] + cells[1]),
         along < 0.0,
         ca.if_else(is_normal, sign * along, side * away),
         ca.if_else(is_normal, sign * normal, side * outwards),
@@ -126,7 +141,7 @@ def _foot_of_piece(surface: Surface, edges: list[np.ndarray], sign: float) -> ca
 
 
 def normal_points_outwards(surface: Surface) -> bool:
-    """Whether the normal (4.3) of a surface that is closed in both directions points outwards.
+    """Return whether the normal (4.3) of a surface closed in both directions points outwards.
 
     By the sign of the volume that it encloses, the surface integral of sigma . e_perp / 3.
     """
@@ -142,20 +157,20 @@ def normal_points_outwards(surface: Surface) -> bool:
 
 
 def _edges(surface: Surface) -> list[np.ndarray]:
-    """Lines between pieces, one or more in each cell, on which the normal turns little."""
+    """Return lines between pieces, one or more in each cell, on which the normal turns little."""
     grid = sample_grid(surface)
     edges = []
     for axis, theta in enumerate((grid.theta_1, grid.theta_2)):
         turning = float(grid.turning(axis).max())
-        wanted = math.ceil(len(theta) * turning / _TURNING)
-        fewest = min(max(wanted, _FEWEST_PIECES), _MOST_PIECES)
+        count = math.ceil(len(theta) * turning / _TURNING)
+        fewest = min(max(count, _FEWEST_PIECES), _MOST_PIECES)
         lines = surface.grid(1, fewest)[axis]
         edges.append(np.append(lines, surface.domain[axis].end) if surface.closed[axis] else lines)
     return edges
 
 
 def _pieces(surface: Surface, edges: list[np.ndarray]) -> Pieces:
-    """Pieces of a surface between the lines of a grid."""
+    """Return pieces of a surface between the lines of a grid."""
     fine = [np.sort(np.concatenate([e, 0.5 * (e[1:] + e[:-1])])) for e in edges]
     theta = np.stack(np.meshgrid(*fine, indexing="ij"), axis=-1)
     partials = surface.partials(theta, 3)
@@ -164,10 +179,10 @@ def _pieces(surface: Surface, edges: list[np.ndarray]) -> Pieces:
     size = np.linalg.norm(partials, axis=-1)
 
     def largest(*order: int) -> np.ndarray:
-        """Largest derivative of an order among a piece's samples, [n_1, n_2]."""
+        """Return the largest derivative of an order among a piece's samples, [n_1, n_2]."""
         return _over_pieces(size[..., partial_index(*order)])
 
-    # no place is further from a sample than half of the way between two
+    # no point is further from a sample than half of the distance between two
     second_order = {
         order: largest(*order)
         + 0.5 * a * largest(order[0] + 1, order[1])
@@ -188,7 +203,7 @@ def _pieces(surface: Surface, edges: list[np.ndarray]) -> Pieces:
 
 
 def _over_pieces(values: np.ndarray) -> np.ndarray:
-    """Largest value among the samples of each piece, its edges included, [n_1, n_2]."""
+    """Return the largest value among the samples of each piece, its edges included, [n_1, n_2]."""
     rows = np.max([values[k : len(values) - 2 + k : 2] for k in range(_SAMPLES)], axis=0)
     return np.asarray(
         np.max([rows[:, k : rows.shape[1] - 2 + k : 2] for k in range(_SAMPLES)], axis=0)

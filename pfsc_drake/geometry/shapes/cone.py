@@ -22,7 +22,7 @@ from pfsc_drake.geometry.shapes.revolution import (
     TurnedRegion,
     turned_line,
 )
-from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs, pair, require_ends
+from pfsc_drake.geometry.shapes.shape import Pair, ShapeInputs, SurfaceResult, pair, require_ends
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.yaml.rules import Range
 
@@ -45,9 +45,9 @@ class Cone(OfRevolution):
         allowed = "positive numbers of m: a cone has no normal at its apex"
         require(self.distances[0] > 0.0, "distances", self.distances, allowed)
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
-        return MadeSurface(
+        return SurfaceResult(
             cone(float(np.deg2rad(self.opening_deg)), pair(self.distances), self.turned)
         )
 
@@ -57,15 +57,15 @@ class Cone(OfRevolution):
 
 
 def cone(opening_angle: float, distances: Pair, turned: Turned | None = None) -> ProductSurface:
-    """Cone whose apex is the origin; theta_2 is the distance from it along the surface, m.
+    """Return a cone whose apex is the origin; theta_2 is the distance from it, m.
 
     Args:
-        opening_angle: Between the axis and the surface, rad, above 0 and below pi/2.
+        opening_angle: Angle between axis and surface, rad, above 0 and below pi/2.
         distances: First and last theta_2, m, positive: the apex is no part of it.
         turned: Placement, angles and side.
 
     Raises:
-        InputError: Numbers that are no cone, or one with its apex.
+        InputError: Numbers that define no cone, or one with its apex.
     """
     if not 0.0 < opening_angle < math.pi / 2.0:
         raise InputError(
@@ -81,10 +81,10 @@ def cone(opening_angle: float, distances: Pair, turned: Turned | None = None) ->
 
 
 class ConeRegion(TurnedRegion):
-    """What lies inside or outside a cone, with its apex.
+    """Region inside or outside a cone, with its apex.
 
     Args:
-        opening_angle: Between the axis and the surface, rad, above 0 and below pi/2.
+        opening_angle: Angle between axis and surface, rad, above 0 and below pi/2.
         origin: The apex, [3], m.
         axis: Into the cone, of any length, [3].
         inside: Whether the side of the axis is admissible, not the other one.
@@ -104,7 +104,7 @@ class ConeRegion(TurnedRegion):
         self._slope = (math.sin(opening_angle), math.cos(opening_angle))
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """Distance in a half-plane that ends at the axis."""
+        """Return the distance in a half-plane that ends at the axis."""
         sine, cosine = self._slope
         beyond_apex = rho * sine + height * cosine <= 0.0
         from_apex, n = direction(ca.vertcat(rho, height), (0.0, -1.0))

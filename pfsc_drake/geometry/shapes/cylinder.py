@@ -18,7 +18,7 @@ from pfsc_drake.geometry.shapes.revolution import (
     check_positive,
     turned_line,
 )
-from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs, pair, require_ends
+from pfsc_drake.geometry.shapes.shape import Pair, ShapeInputs, SurfaceResult, pair, require_ends
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.yaml.rules import Length
 
@@ -39,9 +39,9 @@ class Cylinder(OfRevolution):
         super().__post_init__()
         require_ends("heights", self.heights)
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
-        return MadeSurface(cylinder(self.radius, pair(self.heights), self.turned))
+        return SurfaceResult(cylinder(self.radius, pair(self.heights), self.turned))
 
     def region(self, inputs: ShapeInputs, *, inside: bool) -> Region:
         """Return the region that it bounds."""
@@ -49,7 +49,7 @@ class Cylinder(OfRevolution):
 
 
 def cylinder(radius: float, heights: Pair, turned: Turned | None = None) -> ProductSurface:
-    """Cylinder; theta_1 is the angle, theta_2 the height along the axis, m, (4.50).
+    """Return a cylinder; theta_1 is the angle, theta_2 the height along the axis, m, (4.50).
 
     (4.50) is ``cylinder(r, heights, Turned((0, 0, c), rotation_from_axes(y, x), inward=True))``.
 
@@ -66,7 +66,7 @@ def cylinder(radius: float, heights: Pair, turned: Turned | None = None) -> Prod
 
 
 class CylinderRegion(TurnedRegion):
-    """What lies inside or outside a cylinder.
+    """Region inside or outside a cylinder.
 
     Args:
         radius: m, positive.
@@ -83,5 +83,5 @@ class CylinderRegion(TurnedRegion):
         self._radius = checked_length("radius", radius)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """Distance in a half-plane that ends at the axis."""
+        """Return the distance in a half-plane that ends at the axis."""
         return rho - self._radius, ca.SX(1.0), ca.SX(0.0)

@@ -1,4 +1,4 @@
-"""Surfaces fitted to points, as a workpiece is scanned."""
+"""Surfaces fitted to points of a scanned workpiece."""
 
 import dataclasses as dc
 from typing import Annotated, Literal, cast
@@ -11,10 +11,10 @@ from pfsc_drake.geometry.files.number_table import UNITS, Unit
 from pfsc_drake.geometry.regions.region import Region
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion, normal_points_outwards
 from pfsc_drake.geometry.shapes.shape import (
-    MadeSurface,
     PlacedSurface,
     ShapeInputs,
     Smoothness,
+    SurfaceResult,
 )
 from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
@@ -29,36 +29,36 @@ _BASES = ("auto", "plane", "cylinder")
 _SHORTEST_TOLERANCE = 1e-7  # m
 _Tolerance = Annotated[float, Range(_SHORTEST_TOLERANCE, FARTHEST, "m", besides=0.0)]
 _OfGrid = Annotated[list[bool], Count(2, 2, words="two of true and false")]
-# times the distance of points, from which on a place without any is a hole
+# radius of a hole, relative to the distance of points
 _HOLE = 2.0
-# how many times further apart neighbours are where a row ends unseen
+# distance of neighbours across an unrecognized end of a row, relative to the others
 _JUMP = 3.0
 
 
 @dc.dataclass
 class Fitted(PlacedSurface):
-    """A surface fitted to points, as a workpiece is scanned; placed as its file's axes are.
+    """A surface fitted to points of a scanned workpiece; its placement applies to the file's axes.
 
     Attributes:
         file: CSV file with columns ``x, y, z``, or vertices of an STL, OBJ or PLY file; relative
             to the scenario's folder.
         unit: Unit of its numbers: ``m``, ``cm``, ``mm``, ``inch``.
-        grid: ``[rows, columns]`` of points that are given row by row, theta_1 leading from row
-            to row; empty for scattered points.
+        grid: ``[rows, columns]`` of points in the order of rows, theta_1 increasing from row to
+            row; empty for scattered points.
         closed: Whether a grid closes from its last row, or column, to the first.
         tolerance: The smoothest surface that misses no point by more than this [m]; zero for the
-            surface that predicts points best that it has not seen.
+            surface that predicts left-out points best.
         interpolate: Whether the surface goes through all points, of a grid without noise.
-        smoothness: Class C^k; 0 chooses what the law needs.
-        base: Over which surface scattered points are heights: ``auto``, ``plane``, ``cylinder``.
-        base_axis: Axis of that cylinder; empty if it is to be found.
+        smoothness: Class C^k; 0 chooses the class that the law needs.
+        base: Surface over which scattered points are heights: ``auto``, ``plane``, ``cylinder``.
+        base_axis: Axis of that cylinder; empty to estimate it.
         base_point: A point on that axis [m].
         seen_from: A point on the side that the normal points to, world axes [m]; empty for
             upwards on a plane, outward on a cylinder.
         along: Direction that theta_1 leans to on a plane, world axes; empty for the longer side.
-        largest_hole: Largest distance of a place of the surface from the nearest scattered point
-            [m]; zero for four times the distance of points.
-        trim: Whether to take the largest part that has no larger hole, instead of refusing.
+        largest_hole: Largest distance on the surface to the nearest scattered point [m]; zero for
+            four times the distance of points.
+        trim: Whether to use the largest part that has no larger hole, instead of refusing.
     """
 
     file: str = dc.field(default="", metadata=FILE)
@@ -85,7 +85,7 @@ class Fitted(PlacedSurface):
             require(self.base == "cylinder", "base", self.base, "cylinder, with base_axis")
 
     def _require_of_grids(self) -> None:
-        """Refuse what says nothing of the points that are given."""
+        """Refuse options that do not apply to the kind of points."""
         if self.grid:
             scattered = {"base": self.base != "auto", "seen_from": bool(self.seen_from)}
             scattered |= {
@@ -93,9 +93,9 @@ class Fitted(PlacedSurface):
                 "largest_hole": self.largest_hole > 0.0,
                 "trim": self.trim,
             }
-            for key, given in scattered.items():
+            for key, is_set in scattered.items():
                 allowed = "for scattered points alone; leave out it or grid"
-                require(not given, key, getattr(self, key), allowed)
+                require(not is_set, key, getattr(self, key), allowed)
             both = self.interpolate and self.tolerance > 0.0
             require(not both, "tolerance", self.tolerance, "0 with interpolate: true")
         else:
@@ -108,7 +108,7 @@ class Fitted(PlacedSurface):
         """Whether it has an inside."""
         return all(self.closed)
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
         tell = inputs.progress or (lambda _fraction, _phase: None)
         file = inputs.file(self.file)
@@ -116,7 +116,7 @@ class Fitted(PlacedSurface):
         points, notes = read_surface_file(file, cast(Unit, self.unit))
         placed = points @ self.rotation.T + self.origin
         tell(0.0, f"fitting a surface to {len(points)} points")
-        fitted = self._near_grid if self.grid else self._scattered
+        fitted = self._fit_grid if self.grid else self._fit_scattered
         found = fitted(placed, self.smoothness or inputs.smoothness)
         return dc.replace(found, notes=(*notes, *found.notes))
 
@@ -127,7 +127,7 @@ class Fitted(PlacedSurface):
         above_is_inside = self.encloses and not normal_points_outwards(surface)
         return SurfaceRegion(surface, above=inside == above_is_inside)
 
-    def _near_grid(self, points: np.ndarray, smoothness: int) -> MadeSurface:
+    def _fit_grid(self, points: np.ndarray, smoothness: int) -> SurfaceResult:
         rows, columns = self.grid
         if rows * columns != len(points):
             raise InputError(
@@ -137,16 +137,16 @@ class Fitted(PlacedSurface):
         table, closed = points.reshape(rows, columns, 3), (self.closed[0], self.closed[1])
         self._refuse_swapped(points)
         if self.interpolate:
-            return MadeSurface(surface_through_grid(table, smoothness=smoothness, closed=closed))
+            return SurfaceResult(surface_through_grid(table, smoothness=smoothness, closed=closed))
         tolerance = self.tolerance or None
-        return MadeSurface(
+        return SurfaceResult(
             *smooth_surface_near_grid(
                 table, smoothness=smoothness, tolerance=tolerance, closed=closed
             )
         )
 
     def _refuse_swapped(self, points: np.ndarray) -> None:
-        """Refuse a grid whose rows jump, where those of the swapped one do not."""
+        """Refuse a grid whose rows jump, while rows of the swapped one do not."""
         rows, columns = self.grid
 
         def widest(count: int) -> float:
@@ -160,7 +160,7 @@ class Fitted(PlacedSurface):
                 "must be [rows, columns] of points that are given row by row"
             )
 
-    def _scattered(self, points: np.ndarray, smoothness: int) -> MadeSurface:
+    def _fit_scattered(self, points: np.ndarray, smoothness: int) -> SurfaceResult:
         base: BaseChoice = cast(Literal["auto", "plane", "cylinder"], self.base)
         if self.base_axis:
             base = Axis(self.base_point, self.base_axis)
@@ -182,13 +182,13 @@ class Fitted(PlacedSurface):
                 "seen_from says which side it is (upwards from a plane, outwards from a cylinder)",
             )
         if fit.hole > _HOLE * fit.spacing:
-            place = ", ".join(f"{value:.4g}" for value in fit.hole_at)
+            centre = ", ".join(f"{value:.4g}" for value in fit.hole_at)
             notes += (
-                f"{self.file}: no point within {1e3 * fit.hole:.3g} mm of [{place}] m, others are "
+                f"{self.file}: no point within {1e3 * fit.hole:.3g} mm of [{centre}] m, others are "
                 f"{1e3 * fit.spacing:.3g} mm apart: the surface bridges that hole; "
                 "largest_hole (m) refuses it",
             )
-        return MadeSurface(fit.surface, fit.residuals, notes)
+        return SurfaceResult(fit.surface, fit.residuals, notes)
 
 
 def _normal_in_the_middle(surface: Surface) -> np.ndarray:

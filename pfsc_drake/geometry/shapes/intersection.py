@@ -1,4 +1,4 @@
-"""Paths along the edge in which two surfaces meet."""
+"""Paths along the edge in which two surfaces intersect."""
 
 import dataclasses as dc
 from typing import Annotated, Any
@@ -16,13 +16,13 @@ from pfsc_drake.yaml.rules import MaybePoint, Parameters, Range
 
 @dc.dataclass
 class Intersection(Parameters, CurveShape):
-    """The edge in which two surfaces meet, along the cross product of their normals.
+    """The edge in which two surfaces intersect, along the cross product of their normals.
 
     Attributes:
-        surfaces: Both, as ``surface.shape``; the edge ends where one of them does.
-        near: A point [m]: of several edges the nearest is meant, and a closed one begins there;
+        surfaces: Both, as ``surface.shape``; the edge ends at the border of either.
+        near: A point [m] that selects the nearest of several edges; a closed one begins there;
             empty if there is only one.
-        tolerance: How far a spline may be from the edge, 1e-9 or more [m]. Lines, circles and
+        tolerance: Largest deviation of a spline from the edge, 1e-9 or more [m]. Lines, circles and
             ellipses are exact.
     """
 
@@ -38,7 +38,7 @@ class Intersection(Parameters, CurveShape):
         )
 
     def curve(self, inputs: ShapeInputs) -> Curve:
-        """Return the edge in which both surfaces meet."""
+        """Return the edge in which both surfaces intersect."""
         if len(self.surfaces) != 2:
             raise InputError(
                 "path.shape.surfaces: none given; must be 2, e.g. [!Plane {..}, !Sphere {..}]"
@@ -52,10 +52,10 @@ class Intersection(Parameters, CurveShape):
         except InputError as error:
             raise InputError(f"path.shape.{error}") from None
         if len(edges) > 1:
-            places = ", ".join(_place(edge) for edge in edges)
+            begins = ", ".join(_begin(edge) for edge in edges)
             raise InputError(
                 f"path.shape.near: none given, and the surfaces have {len(edges)} edges, through "
-                f"{places}; must be a point, [x, y, z] in m, next to the one that is meant"
+                f"{begins}; must be a point, [x, y, z] in m, next to the one that is meant"
             )
         return edges[0].curve
 
@@ -66,6 +66,6 @@ class Intersection(Parameters, CurveShape):
             raise InputError(f"path.shape.surfaces[{k}]: {error}") from None
 
 
-def _place(edge: Edge) -> str:
+def _begin(edge: Edge) -> str:
     begin = edge.curve.derivatives(edge.curve.domain[0], 0)[0]
     return f"[{', '.join(f'{value:.4g}' for value in begin)}]"

@@ -34,9 +34,9 @@ class OnSurface(Parameters):
 
     Attributes:
         thetas: Waypoints ``[theta_1, theta_2]``; two are joined by a straight line in the
-            parameters. Closed directions of the surface may be led round and round.
+            parameters. In closed directions of the surface they may exceed a period.
         file: CSV file with columns ``x, y, z`` instead, relative to the scenario's folder;
-            the path is where the surface is nearest to them.
+            the path goes through their closest points on the surface.
         unit: Unit of ``x, y, z``: ``m``, ``cm``, ``mm``, ``inch``.
         max_distance: Largest distance of these points from the surface [m].
         closed: Whether the path is closed.
@@ -66,7 +66,7 @@ class OnSurface(Parameters):
             inputs: Folder of files, and class of splines.
 
         Raises:
-            InputError: If surface or path cannot be made, or are not smooth enough.
+            InputError: If surface or path cannot be created, or are not smooth enough.
         """
         if bool(self.thetas) == bool(self.file):
             raise InputError(
@@ -74,10 +74,10 @@ class OnSurface(Parameters):
                 "file; write thetas: [[theta_1, theta_2], ..] or file: NAME"
             )
         try:
-            made = shape.smooth_sheet(inputs)
+            result = shape.smooth_sheet(inputs)
         except InputError as error:
             raise InputError(f"surface.shape: {error}") from None
-        surface, notes, smoothness = made.surface, made.notes, inputs.smoothness
+        surface, notes, smoothness = result.surface, result.notes, inputs.smoothness
         thetas = np.array(self.thetas)
         try:
             if self.file:

@@ -12,14 +12,14 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.region import Region, Symbol
 from pfsc_drake.geometry.shapes.plane import OverRectangle, graph
 from pfsc_drake.geometry.shapes.revolution import Meridian, TurnedRegion
-from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs
+from pfsc_drake.geometry.shapes.shape import Pair, ShapeInputs, SurfaceResult
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.yaml.rules import Range
 
 _MOST_BENT = 1e4  # 1/m
 # A bound, safe from rounding errors.
 _ABOVE = 1.0 + 1e-15
-# Newton's steps to the foot on a paraboloid, from 1e-12 to 1e12 in p and q.
+# Newton's steps to the closest point of a paraboloid, from 1e-12 to 1e12 in p and q.
 _STEPS = 8
 
 
@@ -33,9 +33,9 @@ class Paraboloid(OverRectangle):
 
     coefficient: Annotated[float, Range(-_MOST_BENT, _MOST_BENT, "1/m")] = 1.0
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
-        return MadeSurface(paraboloid(self.size, self.coefficient, self.origin, self.rotation))
+        return SurfaceResult(paraboloid(self.size, self.coefficient, self.origin, self.rotation))
 
     def region(self, inputs: ShapeInputs, *, inside: bool) -> Region:
         """Return the region that it bounds."""
@@ -48,7 +48,7 @@ def paraboloid(
     origin: ArrayLike = (0.0, 0.0, 0.0),
     rotation: ArrayLike | None = None,
 ) -> ProductSurface:
-    """Paraboloid of revolution as a graph, (4.53), (4.54).
+    """Return a paraboloid of revolution as a graph, (4.53), (4.54).
 
     sigma = o + theta_1 e_x + theta_2 e_y + c (theta_1^2 + theta_2^2) e_z; the normal points
     along e_z at the vertex, where the radius of curvature is 1 / (2 c).
@@ -60,7 +60,7 @@ def paraboloid(
         rotation: Columns e, [3, 3]; the identity by default.
 
     Raises:
-        InputError: A size, coefficient or placement that is none.
+        InputError: An invalid size, coefficient or placement.
     """
     if not math.isfinite(coefficient):
         raise InputError(f"paraboloid coefficient: {coefficient}; a finite number is required")
@@ -68,10 +68,10 @@ def paraboloid(
 
 
 class ParaboloidRegion(TurnedRegion):
-    """What lies inside or outside a paraboloid of revolution, (4.53) without its end.
+    """Region inside or outside an infinite paraboloid of revolution, (4.53).
 
-    Where it shall end, another region does so: one that stands on a plane goes on below that, where
-    nothing is admissible anyhow.
+    To bound it, add another region: a paraboloid on a plane extends below the plane, where nothing
+    is admissible.
 
     Args:
         coefficient: c of the height c rho^2 over the vertex, 1/m, not zero.
@@ -95,10 +95,10 @@ class ParaboloidRegion(TurnedRegion):
         self._upwards = math.copysign(1.0, coefficient)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """Distance in a half-plane that ends at the axis.
+        """Return the distance in a half-plane that ends at the axis.
 
-        The foot is at the largest root of a cubic, ``u^3 + p u = q`` with u = c times its radius.
-        Newton's method falls monotonically to it from above, and stays where it falls no longer.
+        The closest point is at the largest root of a cubic, ``u^3 + p u = q`` with u = c times its
+        radius. Newton's method decreases monotonically to it from above, and stops there.
         """
         c = self._coefficient
         height = height * self._upwards

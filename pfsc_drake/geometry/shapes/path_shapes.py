@@ -1,4 +1,4 @@
-"""Shapes of paths: what each of them offers; lines, circles and the bent lemniscate."""
+"""Shapes of paths: their common interface; lines, circles and the bent lemniscate."""
 
 import dataclasses as dc
 import math
@@ -16,7 +16,7 @@ from pfsc_drake.yaml.rules import Length, Numbers, Parameters, Point
 
 
 class PathShape(ABC):
-    """A shape that is a path by itself, as a person writes it."""
+    """Shape that is a path by itself."""
 
     @abstractmethod
     def path(self, orientation: OrientationParameters, inputs: ShapeInputs) -> Path:
@@ -27,7 +27,7 @@ class PathShape(ABC):
             inputs: Folder of files, and class of splines.
 
         Raises:
-            InputError: If a file cannot be used, or no path be made.
+            InputError: If a file cannot be used, or defines no path.
         """
 
 

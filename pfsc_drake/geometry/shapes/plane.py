@@ -17,10 +17,10 @@ from pfsc_drake.geometry.regions.region import (
 )
 from pfsc_drake.geometry.shapes.revolution import checked_ends
 from pfsc_drake.geometry.shapes.shape import (
-    MadeSurface,
     Pair,
     PlacedSurface,
     ShapeInputs,
+    SurfaceResult,
     pair,
     require_ends,
 )
@@ -60,9 +60,9 @@ class Plane(OverRectangle):
         """Whether it has an inside."""
         return False
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
-        return MadeSurface(plane(self.size, self.origin, self.rotation))
+        return SurfaceResult(plane(self.size, self.origin, self.rotation))
 
     def region(self, inputs: ShapeInputs, *, inside: bool) -> Region:
         """Return the region that it bounds."""
@@ -74,7 +74,7 @@ def plane(
     origin: ArrayLike = (0.0, 0.0, 0.0),
     rotation: ArrayLike | None = None,
 ) -> ProductSurface:
-    """Rectangle o + theta_1 e_x + theta_2 e_y, the normal being e_z.
+    """Return the rectangle o + theta_1 e_x + theta_2 e_y, the normal being e_z.
 
     Args:
         size: Largest theta_1 and theta_2, from zero, m; or first and last of each.
@@ -82,7 +82,7 @@ def plane(
         rotation: Columns e, [3, 3]; the identity by default.
 
     Raises:
-        InputError: A size or placement that is none.
+        InputError: An invalid size or placement.
     """
     return graph(size, 0.0, origin, rotation)
 
@@ -111,7 +111,7 @@ class HalfSpace(FormulaRegion):
     """The side of a plane that a normal points to.
 
     Args:
-        point: On the plane, [3], m.
+        point: Point on the plane, [3], m.
         normal: Into the admissible region, of any length, [3].
 
     Raises:
@@ -123,5 +123,5 @@ class HalfSpace(FormulaRegion):
         self._point = ca.DM(checked_point("point", point))
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """Signed distance and normal as expressions."""
+        """Return the signed distance and normal as expressions."""
         return ca.dot(self._normal, point - self._point), ca.SX(self._normal)

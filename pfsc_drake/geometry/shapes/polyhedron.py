@@ -31,7 +31,7 @@ class Box(PlacedShape):
     """A box, as an obstacle; its origin is its middle.
 
     Attributes:
-        size: Along its three axes [m]; one number for a cube.
+        size: Lengths along its three axes [m]; one number for a cube.
     """
 
     size: Annotated[list[float], Numbers(3, Range(SHORTEST, FARTHEST, "m"))] = dc.field(
@@ -61,11 +61,11 @@ class Box(PlacedShape):
 
 
 class PolyhedronRegion(FormulaRegion):
-    """What lies outside a convex polyhedron.
+    """Region outside a convex polyhedron.
 
-    The largest of the distances from its planes is the distance where the foot is on a face;
+    Where the closest point is on a face, the largest distance from the planes is the distance;
     beside edges and corners it would be too small. A convex polyhedron whose inside is admissible
-    is as many half-spaces.
+    is one half-space for each face.
 
     Args:
         corners: [n, 3], m; points within their hull do not matter.
@@ -94,7 +94,7 @@ class PolyhedronRegion(FormulaRegion):
             number.append(same[0] if same else len(planes))
             if not same:
                 planes.append(equation)
-        # of planes that are as near the last one counts
+        # among equally near planes the last one counts
         self._planes = sorted((float(a), float(b), float(c), float(d)) for a, b, c, d in planes)
         edges = {
             tuple(sorted(set(simplex.tolist()) - {int(simplex[k])}))
@@ -105,41 +105,44 @@ class PolyhedronRegion(FormulaRegion):
         self._edges = [_edge(points[a], points[b]) for a, b in sorted(edges)]
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """Signed distance and normal as expressions."""
+        """Return the signed distance and normal as expressions."""
         heights = [a * point[0] + b * point[1] + c * point[2] + d for a, b, c, d in self._planes]
         h, n = heights[0], ca.SX(self._planes[0][:3])
         for height, face in zip(heights[1:], self._planes[1:], strict=True):
             n = ca.if_else(height >= h, ca.DM(face[:3]), n)
             h = ca.fmax(h, height)
-        foot = point - h * n
-        over = [a * foot[0] + b * foot[1] + c * foot[2] + d for a, b, c, d in self._planes]
+        projection = point - h * n
+        over = [
+            a * projection[0] + b * projection[1] + c * projection[2] + d
+            for a, b, c, d in self._planes
+        ]
         on_face = ca.logic_or(h <= 0.0, reduce(ca.fmax, over) <= _ROUNDING)
         away, outwards = direction(self._from_edges(point), (1.0, 0.0, 0.0))
         return ca.if_else(on_face, h, away), ca.if_else(on_face, n, outwards)
 
     def _from_edges(self, point: Symbol) -> Symbol:
-        """Way from the nearest place of all edges."""
+        """Return the vector from the closest point of all edges."""
         least, nearest = ca.SX(math.inf), ca.SX.zeros(3)
         for begin, tangent, length in self._edges:
-            way = point - ca.DM(begin)
-            along = ca.fmin(ca.fmax(ca.dot(ca.DM(tangent), way), 0.0), length)
-            way -= along * ca.DM(tangent)
-            square = ca.dot(way, way)
-            nearest = ca.if_else(square < least, way, nearest)
+            offset = point - ca.DM(begin)
+            along = ca.fmin(ca.fmax(ca.dot(ca.DM(tangent), offset), 0.0), length)
+            offset -= along * ca.DM(tangent)
+            square = ca.dot(offset, offset)
+            nearest = ca.if_else(square < least, offset, nearest)
             least = ca.fmin(square, least)
         return nearest
 
 
 def box_corners(size: ArrayLike, centre: ArrayLike, rotation: ArrayLike | None) -> np.ndarray:
-    """Corners of a box, [8, 3], m.
+    """Return corners of a box, [8, 3], m.
 
     Args:
-        size: Along its axes, [3], m, positive.
+        size: Lengths along its axes, [3], m, positive.
         centre: [3], m.
         rotation: Its axes by columns, [3, 3].
 
     Raises:
-        InputError: A size or placement that is none.
+        InputError: An invalid size or placement.
     """
     lengths = np.asarray(size, dtype=float)
     if lengths.shape != (3,) or not np.all((lengths > 0.0) & (lengths < math.inf)):
@@ -150,7 +153,7 @@ def box_corners(size: ArrayLike, centre: ArrayLike, rotation: ArrayLike | None) 
 
 
 def _edge(begin: np.ndarray, end: np.ndarray) -> tuple[Triple, Triple, float]:
-    """Begin, direction and length of an edge."""
+    """Return begin, direction and length of an edge."""
     length = float(np.linalg.norm(end - begin))
     a, b, c = begin.tolist()
     u, v, w = ((end - begin) / length).tolist()

@@ -20,10 +20,10 @@ from pfsc_drake.geometry.shapes.revolution import (
     surface_of_revolution,
 )
 from pfsc_drake.geometry.shapes.shape import (
-    MadeSurface,
     PlacedSurface,
     ShapeInputs,
     Smoothness,
+    SurfaceResult,
 )
 from pfsc_drake.geometry.surfaces.point_file import read_profile
 from pfsc_drake.geometry.surfaces.product import extruded_surface
@@ -35,12 +35,12 @@ Profile = tuple[PiecewisePolynomialCurve, tuple[str, ...]]
 
 
 class FromProfile(PlacedSurface):
-    """A surface that a profile leaves, and the region that it bounds.
+    """Surface swept by a profile, and the region that it bounds.
 
     Attributes:
         file: CSV file of the profile.
         closed: Whether the profile closes from the last point to the first.
-        smoothness: Class C^k of the spline through it; 0 chooses what the law needs.
+        smoothness: Class C^k of the spline through it; 0 chooses the class that the law needs.
     """
 
     file: str
@@ -54,7 +54,7 @@ class FromProfile(PlacedSurface):
 
     @abstractmethod
     def points(self, file: Path) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Return the points of the profile, and what of its file was ignored.
+        """Return the points of the profile, and notes on ignored parts of its file.
 
         Raises:
             InputError: If the file cannot be used.
@@ -69,7 +69,7 @@ class FromProfile(PlacedSurface):
         """
 
     def profile(self, inputs: ShapeInputs) -> Profile:
-        """Return the profile, and what of its file was ignored.
+        """Return the profile, and notes on ignored parts of its file.
 
         Args:
             inputs: Folder of its file, and class of the spline.
@@ -103,7 +103,7 @@ class Revolved(FromProfile, OfRevolution):
         file: CSV file with columns ``radius, height`` [m], points of the profile in order,
             which theta_2 runs along; relative to the scenario's folder.
         closed: Whether the profile closes from the last point to the first.
-        smoothness: Class C^k of the spline through it; 0 chooses what the law needs.
+        smoothness: Class C^k of the spline through it; 0 chooses the class that the law needs.
     """
 
     file: str = dc.field(default="", metadata=FILE)
@@ -111,7 +111,7 @@ class Revolved(FromProfile, OfRevolution):
     smoothness: Smoothness = 0
 
     def points(self, file: Path) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Return radius and height of the profile [m], dimension 2, and what was ignored."""
+        """Return radius and height of the profile [m], dimension 2, and notes on ignored parts."""
         points, notes = read_profile(file, ["radius", "height"])
         if not points[:, 0].min() > 0.0:
             raise InputError(
@@ -120,11 +120,11 @@ class Revolved(FromProfile, OfRevolution):
             )
         return points, notes
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
         turned = self.turned
         profile, notes = self.profile(inputs)
-        return MadeSurface(surface_of_revolution(profile, **turned._asdict()), notes=notes)
+        return SurfaceResult(surface_of_revolution(profile, **turned._asdict()), notes=notes)
 
     def bounded_region(self, profile: PiecewisePolynomialCurve, *, inside: bool) -> Region:
         """Return the region that the surface of a profile bounds."""
@@ -143,7 +143,7 @@ class Extruded(FromProfile):
         direction: Direction of the line, in the file's axes, of any length.
         length: Length of the line [m].
         closed: Whether the profile closes from the last point to the first.
-        smoothness: Class C^k of the spline through it; 0 chooses what the law needs.
+        smoothness: Class C^k of the spline through it; 0 chooses the class that the law needs.
     """
 
     file: str = dc.field(default="", metadata=FILE)
@@ -153,17 +153,17 @@ class Extruded(FromProfile):
     smoothness: Smoothness = 0
 
     def points(self, file: Path) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Return the profile in the world [m], dimension 3, and what was ignored."""
+        """Return the profile in the world [m], dimension 3, and notes on ignored parts."""
         rotation = self.rotation
         points, notes = read_profile(file, ["x", "y", "z"])
         return points @ rotation.T + self.origin, notes
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
         rotation = self.rotation
         profile, notes = self.profile(inputs)
         surface = extruded_surface(profile, rotation @ self.direction, self.length)
-        return MadeSurface(surface, notes=notes)
+        return SurfaceResult(surface, notes=notes)
 
     def bounded_region(self, profile: PiecewisePolynomialCurve, *, inside: bool) -> Region:
         """Return the region that the surface of a profile bounds."""
@@ -171,18 +171,18 @@ class Extruded(FromProfile):
 
 
 class ExtrudedRegion(FormulaRegion):
-    """What lies on one side of a profile that is moved along a line without end.
+    """Region on one side of a profile that is extruded infinitely.
 
-    Both ends of an open profile go on straight.
+    Both ends of an open profile are extended straight.
 
     Args:
         profile: Curve in R^3 of class C^2, m.
-        direction: Direction of the line, of any length, [3].
-        inside: Whether what a closed profile encloses is admissible; of an open one the side that
+        direction: Direction of the extrusion, of any length, [3].
+        inside: Whether the inside of a closed profile is admissible; of an open one the side that
             the normal (4.3) of `extruded_surface` points away from.
 
     Raises:
-        InputError: No such profile or direction, or an open profile whose ends, going on, meet it.
+        InputError: No such profile or direction, or an open profile whose extended ends meet it.
     """
 
     symbol = ca.MX
@@ -202,26 +202,26 @@ class ExtrudedRegion(FormulaRegion):
         self._sign = _right_sign(self._curve, profile.closed, inside)
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """Signed distance and normal as expressions."""
+        """Return the signed distance and normal as expressions."""
         h, n = self._curve.signed_distance(self._axes @ point)
         return self._sign * h, self._sign * (self._axes.T @ n)
 
 
 class RevolvedRegion(TurnedRegion):
-    """What lies on one side of a profile that is turned about an axis.
+    """Region on one side of a profile that is revolved about an axis.
 
-    Both ends of an open profile go on straight, to the axis or without end.
+    Both ends of an open profile are extended straight, to the axis or infinitely.
 
     Args:
         profile: (rho, h), a curve in the plane of class C^2, m, that does not meet the axis.
-        origin: On the axis, where h is zero, [3], m.
+        origin: Point on the axis where h is zero, [3], m.
         axis: Axis of growing h, of any length, [3].
-        inside: Whether what a closed profile encloses is admissible; of an open one the side that
-            the normal (4.3) of `surface_of_revolution` points away from: that of the axis, where h
+        inside: Whether the inside of a closed profile is admissible; of an open one the side that
+            the normal (4.3) of `surface_of_revolution` points away from: the axis' side, where h
             grows along the profile.
 
     Raises:
-        InputError: No such profile, point or direction, or an open profile whose ends, going on,
+        InputError: No such profile, point or direction, or an open profile whose extended ends
             meet it.
     """
 
@@ -240,12 +240,12 @@ class RevolvedRegion(TurnedRegion):
         self._sign = _right_sign(self._curve, profile.closed, inside)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """Distance in a half-plane that ends at the axis."""
+        """Return the distance in a half-plane that ends at the axis."""
         h, n = self._curve.signed_distance(ca.vertcat(rho, height))
         return h, n[0], n[1]
 
 
 def _right_sign(curve: PlaneCurve, closed: bool, inside: bool) -> float:
-    """Sign of what is to the right of a curve."""
+    """Return the sign of the region to the right of a curve."""
     right_is_outside = curve.counter_clockwise or not closed
     return 1.0 if right_is_outside != inside else -1.0

@@ -32,14 +32,14 @@ _TURN = 2.0 * math.pi
 
 
 class Turned(NamedTuple):
-    """What all surfaces of revolution have in common.
+    """Common parameters of all surfaces of revolution.
 
     Attributes:
-        origin: On the axis, [3], m.
+        origin: Point on the axis, [3], m.
         rotation: Its third column is the axis, its first the direction theta_1 = 0, [3, 3];
             the identity by default.
         angles: First and last theta_1, rad; a closed turn by default.
-        inward: Whether the normal points inwards; theta_1 then runs the other way.
+        inward: Whether the normal points inwards; theta_1 then runs in the opposite sense.
     """
 
     origin: ArrayLike = (0.0, 0.0, 0.0)
@@ -95,7 +95,7 @@ def surface_of_revolution(
     angles: tuple[float, float] | None = None,
     inward: bool = False,
 ) -> ProductSurface:
-    """Surface that a profile leaves when it is turned about an axis.
+    """Return the surface swept by a profile that is turned about an axis.
 
     sigma = o + rho(theta_2) (e_x cos(theta_1) + e_y sin(theta_1)) + h(theta_2) e_z, with the
     columns e of the rotation. Where h grows with theta_2 the normal (4.3) points away from the
@@ -107,7 +107,7 @@ def surface_of_revolution(
         origin: o, [3], m.
         rotation: [3, 3]; the identity by default.
         angles: First and last theta_1, rad; closed by default.
-        inward: Turn the other way, -e_y instead of e_y, and with it the normal round.
+        inward: Turn in the opposite sense, -e_y instead of e_y, which inverts the normal.
 
     Raises:
         InputError: A profile of another dimension, one that meets the axis or is not
@@ -135,7 +135,7 @@ def surface_of_revolution(
 
 
 def turned_line(start: Pair, slope: Pair, ends: Pair, turned: Turned | None) -> ProductSurface:
-    """Revolution of the line start + theta_2 slope."""
+    """Return the surface of revolution of the line start + theta_2 slope."""
     begin, end = checked_ends("theta_2", ends)
     table = np.array([[np.add(start, np.multiply(slope, begin)), slope]])
     profile = PiecewisePolynomialCurve([begin, end], table)
@@ -157,7 +157,7 @@ def checked_ends(name: str, ends: Sequence[float]) -> Pair:
 
 
 def check_positive(name: str, value: float) -> None:
-    """Refuse what is no length [m]."""
+    """Refuse values that are not positive lengths [m]."""
     if not 0.0 < value < math.inf:
         raise InputError(f"{name}: {value} m; a positive number of metres is required")
 
@@ -166,10 +166,10 @@ Meridian = tuple[Symbol, Symbol, Symbol]
 
 
 class TurnedRegion(FormulaRegion):
-    """What lies inside or outside a surface of revolution.
+    """Region inside or outside a surface of revolution.
 
     Args:
-        origin: On the axis, [3], m.
+        origin: Point on the axis, [3], m.
         axis: Vector along the axis, of any length, [3].
         inside: Whether the side of the axis is admissible, not the other one.
 
@@ -184,11 +184,11 @@ class TurnedRegion(FormulaRegion):
 
     @abstractmethod
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """Distance in a half-plane that ends at the axis.
+        """Return the distance in a half-plane that ends at the axis.
 
         Args:
             rho: Distance from the axis, m.
-            height: Along the axis from the origin, m.
+            height: Height along the axis from the origin, m.
 
         Returns:
             Distance of the meridian curve, positive outside, m, and its derivatives with respect to
@@ -196,7 +196,7 @@ class TurnedRegion(FormulaRegion):
         """
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """Signed distance and normal as expressions."""
+        """Return the signed distance and normal as expressions."""
         local = self._axes @ (point - self._origin)
         rho, outwards = direction(local[:2], (1.0, 0.0))
         h, radial, axial = self.meridian(rho, local[2])

@@ -1,7 +1,7 @@
-"""Shapes of surfaces and regions: what each of them offers, and where it stands.
+"""Shapes of surfaces and regions: their common interface and placement.
 
-A shape is a dataclass that a person writes, as ``!Cylinder {radius: 0.1}``; its file holds the
-surface and the region that it stands for. Lengths in m, angles in degrees.
+A shape is a dataclass that a user writes, as ``!Cylinder {radius: 0.1}``; its file holds the
+surface and the region that it describes. Lengths in m, angles in degrees.
 """
 
 import dataclasses as dc
@@ -33,10 +33,10 @@ class ShapeInputs:
     """Inputs of the geometry of a shape, beside its own numbers.
 
     Attributes:
-        folder: Where relative file names start.
-        smoothness: k of the class C^k of splines, unless the shape says another.
-        needed_by: What needs that class, for messages.
-        progress: Told the fraction done and what is done, where that takes its time.
+        folder: Folder of relative file names.
+        smoothness: k of the class C^k of splines, unless the shape has its own.
+        needed_by: User of that class, for messages.
+        progress: Callback with the fraction done and the name of the step, of long computations.
     """
 
     folder: Path
@@ -56,13 +56,13 @@ class ShapeInputs:
 
 
 @dc.dataclass(frozen=True)
-class MadeSurface:
-    """A surface, and how far points are from it if it was fitted to some.
+class SurfaceResult:
+    """Surface of a shape, with the residuals of a fit.
 
     Attributes:
         surface: The surface.
-        fit: Where the points stand, or None.
-        notes: Sentences on what of a file was ignored.
+        fit: Positions of fitted points relative to the surface, or None.
+        notes: Sentences on ignored parts of a file.
     """
 
     surface: Surface
@@ -72,7 +72,7 @@ class MadeSurface:
 
 @dc.dataclass
 class PlacedShape(Parameters, ABC):
-    """Where a shape stands.
+    """Placement of a shape.
 
     Attributes:
         origin: A point of it, or on its axis [m].
@@ -118,15 +118,15 @@ class PlacedShape(Parameters, ABC):
 
         Args:
             inputs: Folder of files.
-            inside: Whether what is enclosed is admissible, or what is below.
+            inside: Whether the enclosed space is admissible, or the space below.
 
         Raises:
-            InputError: If a file cannot be used, or no region be made of it.
+            InputError: If a file cannot be used, or bounds no region.
         """
 
     @abstractmethod
     def drawn_surfaces(self, inputs: ShapeInputs) -> Sequence[Surface]:
-        """Return what of the region's boundary is drawn.
+        """Return the drawn surfaces of the region's boundary.
 
         Args:
             inputs: Folder of files.
@@ -137,36 +137,36 @@ class PlacedSurface(PlacedShape):
     """A shape that is a parametrized surface."""
 
     @abstractmethod
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class.
 
         Args:
             inputs: Folder of files, and class of splines.
 
         Raises:
-            InputError: If a file cannot be used, or no surface be made.
+            InputError: If a file cannot be used, or defines no surface.
         """
 
-    def smooth_sheet(self, inputs: ShapeInputs) -> MadeSurface:
+    def smooth_sheet(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, as smooth as needed and a single sheet.
 
         Args:
             inputs: As for :meth:`surface`.
 
         Raises:
-            InputError: If it cannot be made, is less smooth, or no single sheet.
+            InputError: If it cannot be created, is less smooth, or no single sheet.
         """
-        made, needed = self.surface(inputs), inputs.smoothness
-        if made.surface.smoothness < needed:
+        result, needed = self.surface(inputs), inputs.smoothness
+        if result.surface.smoothness < needed:
             raise InputError(
-                f"smoothness: class C^{made.surface.smoothness:g}, and {inputs.needed_by} needs "
+                f"smoothness: class C^{result.surface.smoothness:g}, and {inputs.needed_by} needs "
                 f"C^{needed}; write smoothness: 0 for what the law needs"
             )
-        check_single_sheet(made.surface)
-        return made
+        check_single_sheet(result.surface)
+        return result
 
     def drawn_surfaces(self, inputs: ShapeInputs) -> Sequence[Surface]:
-        """Return what of the region's boundary is drawn."""
+        """Return the drawn surfaces of the region's boundary."""
         return [self.surface(inputs).surface]
 
 
@@ -177,7 +177,7 @@ def pair(values: object) -> Pair:
 
 
 def require_ends(key: str, values: list[float]) -> None:
-    """Refuse what are no ends of a length [m]."""
+    """Refuse numbers that are not the ends of a length [m]."""
     require_numbers(key, values, 2)
     good = -FARTHEST <= values[0] < values[1] <= FARTHEST
     require(good, key, values, f"two numbers that increase, of at most {FARTHEST:g} m")

@@ -25,7 +25,7 @@ from pfsc_drake.geometry.shapes.revolution import (
     check_positive,
     surface_of_revolution,
 )
-from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs, pair
+from pfsc_drake.geometry.shapes.shape import Pair, ShapeInputs, SurfaceResult, pair
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.yaml.rules import Length, Numbers
 
@@ -53,9 +53,9 @@ class Sphere(OfRevolution):
         )
         require(good, "latitudes_deg", self.latitudes_deg, allowed)
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
-        return MadeSurface(sphere(self.radius, pair(np.deg2rad(self.latitudes_deg)), self.turned))
+        return SurfaceResult(sphere(self.radius, pair(np.deg2rad(self.latitudes_deg)), self.turned))
 
     def region(self, inputs: ShapeInputs, *, inside: bool) -> Region:
         """Return the region that it bounds."""
@@ -63,7 +63,7 @@ class Sphere(OfRevolution):
 
 
 def sphere(radius: float, latitudes: Pair, turned: Turned | None = None) -> ProductSurface:
-    """Part of a sphere between two latitudes; theta_1 is the longitude, theta_2 the latitude, rad.
+    """Return a sphere between two latitudes; theta_1 is the longitude, theta_2 the latitude, rad.
 
     Args:
         radius: m, positive.
@@ -86,12 +86,12 @@ def sphere(radius: float, latitudes: Pair, turned: Turned | None = None) -> Prod
 
 
 class SphereRegion(FormulaRegion):
-    """What lies inside or outside a sphere.
+    """Region inside or outside a sphere.
 
     Args:
         centre: [3], m.
         radius: m, positive.
-        inside: Whether the ball is admissible, not what surrounds it.
+        inside: Whether the ball is admissible, not the space around it.
 
     Raises:
         InputError: Numbers that are no sphere.
@@ -103,6 +103,6 @@ class SphereRegion(FormulaRegion):
         self._sign = -1.0 if inside else 1.0
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """Signed distance and normal as expressions."""
+        """Return the signed distance and normal as expressions."""
         away, outwards = direction(point - self._centre, (1.0, 0.0, 0.0))
         return self._sign * (away - self._radius), self._sign * outwards

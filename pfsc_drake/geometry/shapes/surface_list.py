@@ -12,7 +12,7 @@ from pfsc_drake.geometry.shapes.profiles import Extruded, Revolved
 from pfsc_drake.geometry.shapes.sphere import Sphere
 from pfsc_drake.geometry.shapes.torus import Torus
 
-# the first is what a shape without a tag means
+# the first is the default of a shape without a tag
 SurfaceShape = Union[  # noqa: UP007 (Drake's YAML needs it)
     Paraboloid, Plane, Cylinder, Cone, Sphere, Torus, Fitted, Revolved, Extruded
 ]

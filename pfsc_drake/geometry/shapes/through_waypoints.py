@@ -49,10 +49,10 @@ class Waypoints(Parameters, PathShape):
         unit: Unit of ``x, y, z``: ``m``, ``cm``, ``mm``, ``inch``.
         closed: Whether the path is closed.
         parametrization: ``chord`` or ``centripetal``, of a spline through all waypoints.
-        smoothness: Class C^k of the spline; 0 chooses what the law needs.
+        smoothness: Class C^k of the spline; 0 chooses the class that the law needs.
         tolerance: For noisy points: the smoothest path that misses none by more than this
             [m]; zero goes through all of them.
-        tolerance_deg: The same of the orientation [deg], where ``tolerance`` is given.
+        tolerance_deg: The same for the orientation [deg], with a ``tolerance``.
         corner_distance: For sparse corners: straight lines from point to point, blended up
             to this distance from each corner [m], 1e-4 or more and at most over half a line;
             zero for none.
@@ -65,7 +65,7 @@ class Waypoints(Parameters, PathShape):
     smoothness: Annotated[int, Range(0, 6)] = 0
     tolerance: Annotated[float, Range(_SHORTEST_TOLERANCE, FARTHEST, "m", besides=0.0)] = 0.0
     tolerance_deg: Annotated[float, Range(0.001, 90.0, "deg")] = 1.0
-    # a blend shorter than any path is no motion, and takes long to be tabulated
+    # blends shorter than any path are useless, and slow to tabulate
     corner_distance: Annotated[float, Range(SHORTEST, FARTHEST, "m", besides=0.0)] = 0.0
 
     def __post_init__(self) -> None:
@@ -101,16 +101,16 @@ class Waypoints(Parameters, PathShape):
             )
         except InputError as error:
             # keys name themselves
-            place = "" if str(error).startswith("path.") else f"{self.file}: "
+            prefix = "" if str(error).startswith("path.") else f"{self.file}: "
             hint = self._hint(table.positions, smoothness)
-            raise InputError("; ".join(filter(None, [f"{place}{error}", hint]))) from None
+            raise InputError("; ".join(filter(None, [f"{prefix}{error}", hint]))) from None
         if not keyframes:
             return path
         along = orientation.along(path.position, inputs.smoothness)
         return Path(path.position, along, waypoints=path.waypoints, notes=path.notes)
 
     def _hint(self, positions: np.ndarray, smoothness: int) -> str | None:
-        """Return what may help where there is no path through waypoints."""
+        """Return a remedy where there is no path through waypoints."""
         hint = far_waypoints(positions)
         if hint is None and len(positions) == 2:
             start, end = (np.round(point, 6).tolist() for point in positions)
@@ -120,7 +120,7 @@ class Waypoints(Parameters, PathShape):
                 f"add waypoints to {self.file}, or write path.shape.corner_distance (m) for "
                 "straight lines with rounded corners"
             )
-        # a path of straight lines says itself where it turns
+        # a path of straight lines reports its turns itself
         if hint is None and not (self.corner_distance or self.tolerance):
             hint = turning_back(positions)
         return hint
@@ -129,7 +129,7 @@ class Waypoints(Parameters, PathShape):
 def _with_tilt(
     table: WaypointTable, orientation: OrientationParameters, file: str
 ) -> WaypointTable:
-    """Return waypoints whose turn alone is given, with the tilt that a keyframe gives."""
+    """Return waypoints that only have a turn, with the tilt of a keyframe."""
     if orientation.task not in ("yaw", "none"):
         raise InputError(
             f"{file}: column yaw alone, with path.orientation.task = {orientation.task}; roll and "

@@ -1,4 +1,4 @@
-"""Orientation of the tool along a path or a surface, as a person writes it. Angles in degrees."""
+"""Orientation of the tool along a path or a surface, in a scenario. Angles in degrees."""
 
 import dataclasses as dc
 from collections.abc import Sequence
@@ -47,18 +47,18 @@ class OrientationParameters(Parameters):
 
     Attributes:
         convention: ``zyx`` (2.7) or ``zyz`` (2.6).
-        keyframes: Orientations to interpolate; one alone is kept everywhere; on a
+        keyframes: Orientations to interpolate; a single one is constant along the path; on a
             closed path the first is repeated at the end.
-        task: What of it the tool follows: ``full``, all that the path has; ``tool_axis``, the
-            direction of an axis of the tool, about which it may turn as it likes; ``yaw``, the
-            turn about an axis in the world, the tool's tilt being as it is (four outputs, as an
-            SCARA has); ``none``.
+        task: Controlled part: ``full``, the whole orientation; ``tool_axis``, the
+            direction of an axis of the tool, about which it may turn freely; ``yaw``, the
+            turn about an axis in the world, with the tool's tilt uncontrolled (four outputs, as of
+            an SCARA); ``none``.
         tool_axis: The axis, in the tool frame, of any length.
         yaw_axis: The axis of ``yaw``, in the world, of any length; by default the vertical.
-        jacobian: How the errors of orientation are told: ``geometric``, by the ZYX angles of the
-            turn from the reference to the tool; or, for comparison, ``analytic`` (2.16), by the
-            Euler angles of the tool in the world less those of the reference, of ``convention``,
-            which are singular where these are. Only for the task ``full``.
+        jacobian: Representation of orientation errors: ``geometric``, the ZYX angles of the
+            turn from the reference to the tool; or, for comparison, ``analytic`` (2.16), the
+            Euler angles of the tool in the world minus the reference's, of ``convention``,
+            which share their singularities. Only for the task ``full``.
     """
 
     convention: Annotated[str, OneOf(_CONVENTIONS)] = "zyx"
@@ -80,7 +80,7 @@ class OrientationParameters(Parameters):
             smoothness: k of the class C^k of the interpolation.
 
         Raises:
-            InputError: If they do not reach from one end to the other.
+            InputError: If they do not extend from one end to the other.
         """
         if not self.keyframes:
             return None
@@ -95,8 +95,9 @@ class OrientationParameters(Parameters):
         span = fractions[-1] - fractions[0]
         if fractions[0] != 0.0 or not np.isclose(span, 1.0):
             raise InputError(
-                f"orientation keyframes: theta runs from {fractions[0]:g} to {fractions[-1]:g}; "
-                "it must run from 0 to 1 (on closed paths the first keyframe stands for 1 too)"
+                f"path.orientation.keyframes: theta runs from {fractions[0]:g} to "
+                f"{fractions[-1]:g}; allowed: from 0 to 1 (on closed paths the first keyframe "
+                "stands for 1 too)"
             )
         return interpolate_orientation(
             quaternions,
@@ -111,7 +112,7 @@ class SurfaceOrientationParameters(Parameters):
     """Orientation of the tool along a surface.
 
     Attributes:
-        kind: ``none``: position only; ``given``: the same everywhere; ``normal``: that of the
+        kind: ``none``: position only; ``given``: the same everywhere; ``normal``: turning with the
             frame of first tangent, second and normal.
         convention: ``zyx`` (2.7) or ``zyz`` (2.6); of an ``analytic`` Jacobian too.
         angles_deg: Euler angles [deg]: of the orientation, or of its turn away from the frame.
@@ -156,11 +157,11 @@ def _quaternions(convention: str, angles_deg: Sequence[Sequence[float]]) -> np.n
 
 
 def _require_jacobian(jacobian: str, key: str, value: str) -> None:
-    """Refuse the analytic Jacobian where not all of an orientation matters.
+    """Refuse the analytic Jacobian for a part of the orientation.
 
     Args:
-        jacobian: What the scenario says.
-        key: What says how much of the orientation matters.
+        jacobian: The scenario's value.
+        key: Key of the controlled part of the orientation.
         value: Its value; ``full`` for all of it.
     """
     good = jacobian == "geometric" or value == "full"

@@ -23,7 +23,7 @@ from pfsc_drake.geometry.shapes.revolution import (
     check_positive,
     surface_of_revolution,
 )
-from pfsc_drake.geometry.shapes.shape import MadeSurface, Pair, ShapeInputs
+from pfsc_drake.geometry.shapes.shape import Pair, ShapeInputs, SurfaceResult
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.yaml.rules import Length
 
@@ -33,7 +33,7 @@ class Torus(OfRevolution):
     """A torus; theta_2 is the angle about its tube.
 
     Attributes:
-        ring_radius: From its axis to the middle of the tube [m].
+        ring_radius: Distance from its axis to the middle of the tube [m].
         tube_radius: [m].
     """
 
@@ -45,9 +45,9 @@ class Torus(OfRevolution):
         allowed = f"more than tube_radius = {self.tube_radius:g} m"
         require(self.ring_radius > self.tube_radius, "ring_radius", self.ring_radius, allowed)
 
-    def surface(self, inputs: ShapeInputs) -> MadeSurface:
+    def surface(self, inputs: ShapeInputs) -> SurfaceResult:
         """Return the surface, whatever its class."""
-        return MadeSurface(torus(self.ring_radius, self.tube_radius, self.turned))
+        return SurfaceResult(torus(self.ring_radius, self.tube_radius, self.turned))
 
     def region(self, inputs: ShapeInputs, *, inside: bool) -> Region:
         """Return the region that it bounds."""
@@ -62,10 +62,10 @@ def torus(
     turned: Turned | None = None,
     part: Pair | None = None,
 ) -> ProductSurface:
-    """Torus; theta_1 goes round the axis, theta_2 round the tube from its outermost line, rad.
+    """Return a torus; theta_1 is the angle about the axis, theta_2 about the tube, rad.
 
     Args:
-        ring_radius: From the axis to the middle of the tube, m.
+        ring_radius: Distance from the axis to the middle of the tube, m.
         tube_radius: m, positive and smaller.
         turned: Placement, angles and side.
         part: First and last theta_2; closed by default.
@@ -84,14 +84,14 @@ def torus(
 
 
 class TorusRegion(TurnedRegion):
-    """What lies inside or outside the tube of a torus.
+    """Region inside or outside the tube of a torus.
 
     Args:
-        ring_radius: From the axis to the middle of the tube, m.
+        ring_radius: Distance from the axis to the middle of the tube, m.
         tube_radius: m, positive and smaller.
         origin: Point on the axis, [3], m.
         axis: Vector along the axis, of any length, [3].
-        inside: Whether the tube's inside is admissible, not what surrounds it.
+        inside: Whether the tube's inside is admissible, not the space around it.
 
     Raises:
         InputError: Numbers that are no torus.
@@ -116,6 +116,6 @@ class TorusRegion(TurnedRegion):
         self._ring = float(ring_radius)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """Distance in a half-plane that ends at the axis."""
+        """Return the distance in a half-plane that ends at the axis."""
         away, n = direction(ca.vertcat(rho - self._ring, height), (1.0, 0.0))
         return away - self._tube, n[0], n[1]

@@ -1,4 +1,4 @@
-"""Functions of one parameter that surfaces are made of, each set closed under derivation."""
+"""Basis functions of one parameter of a surface, each set closed under derivation."""
 
 import math
 from abc import ABC, abstractmethod
@@ -27,7 +27,7 @@ class Basis(ABC):
         breakpoints: Ends of the pieces, [pieces + 1].
         closed: Whether the parameter is periodic.
         derivation: D, [size, size].
-        is_local: Whether they are functions of the way from the piece's begin.
+        is_local: Whether they are functions of the distance from the piece's begin.
     """
 
     is_local: ClassVar[bool]
@@ -53,11 +53,11 @@ class Basis(ABC):
 
     @abstractmethod
     def values(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pieces [...] and functions [..., size] at wrapped parameters [...]."""
+        """Return pieces [...] and functions [..., size] at wrapped parameters [...]."""
 
     @abstractmethod
     def at(self, u: ca.SX) -> ca.SX:
-        """Functions as expressions, [size], of theta, or of its way from the piece's begin."""
+        """Return functions of theta, or of its distance from the piece's begin, [size]."""
 
     def function(self, order: int) -> ca.Function:
         """Return ``u -> derivatives 0..order``, [order + 1, size], with u as `at` has it."""
@@ -68,7 +68,7 @@ class Basis(ABC):
 
     @abstractmethod
     def sampler(self) -> Values:
-        """Fast scalar form of `values`; wraps where closed, goes on analytically where open."""
+        """Return a fast scalar form of `values`; it wraps where closed, extrapolates where open."""
 
 
 class TrigonometricBasis(Basis):
@@ -90,19 +90,19 @@ class TrigonometricBasis(Basis):
         self._harmonics = harmonics
 
     def values(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pieces [...] and functions [..., size] at wrapped parameters [...]."""
+        """Return pieces [...] and functions [..., size] at wrapped parameters [...]."""
         angles = theta[..., None] * np.arange(1, self._harmonics + 1)
         values = np.ones((*theta.shape, self.size))
         values[..., 1::2], values[..., 2::2] = np.cos(angles), np.sin(angles)
         return np.zeros(theta.shape, dtype=int), values
 
     def at(self, u: ca.SX) -> ca.SX:
-        """Functions as expressions, [size], of theta, or of its way from the piece's begin."""
+        """Return functions of theta, or of its distance from the piece's begin, [size]."""
         waves = [(ca.cos(k * u), ca.sin(k * u)) for k in range(1, self._harmonics + 1)]
         return ca.vertcat(1.0, *[value for wave in waves for value in wave])
 
     def sampler(self) -> Values:
-        """Fast scalar form of `values`; wraps where closed, goes on analytically where open."""
+        """Return a fast scalar form of `values`; it wraps where closed, extrapolates where open."""
         cos, sin, harmonics = math.cos, math.sin, range(2, self._harmonics + 1)
 
         def first(theta: float) -> tuple[int, Sequence[float]]:
@@ -133,20 +133,20 @@ class PowerBasis(Basis):
         super().__init__(breakpoints, derivation, closed=closed)
 
     def values(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pieces [...] and functions [..., size] at wrapped parameters [...]."""
+        """Return pieces [...] and functions [..., size] at wrapped parameters [...]."""
         piece = np.searchsorted(self.breakpoints[1:-1], theta, side="right")
         u = theta - self.breakpoints[piece]
         return piece, u[..., None] ** np.arange(self.size)
 
     def at(self, u: ca.SX) -> ca.SX:
-        """Functions as expressions, [size], of theta, or of its way from the piece's begin."""
+        """Return functions of theta, or of its distance from the piece's begin, [size]."""
         powers = [ca.SX(1.0)]
         for _ in range(1, self.size):
             powers.append(powers[-1] * u)
         return ca.vertcat(*powers)
 
     def sampler(self) -> Values:
-        """Fast scalar form of `values`; wraps where closed, goes on analytically where open."""
+        """Return a fast scalar form of `values`; it wraps where closed, extrapolates where open."""
         starts, interior = self.breakpoints[:-1].tolist(), self.breakpoints[1:-1].tolist()
         begin, end = float(self.breakpoints[0]), float(self.breakpoints[-1])
         closed, powers = self.closed, range(2, self.size)

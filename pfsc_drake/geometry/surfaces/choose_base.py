@@ -1,4 +1,4 @@
-"""The plane or cylinder over which scattered points are seen, and what they leave uncovered."""
+"""Plane or cylinder that scattered points are projected onto, and their coverage of it."""
 
 import math
 from collections.abc import Callable
@@ -12,11 +12,11 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.fit_bases import Base, CylinderBase, PlaneBase, axis_of_normals
 from pfsc_drake.geometry.surfaces.parametric_surface import Interval
 
-# Neighbours that a normal is taken from; more while they lie in no plane for noise.
+# Neighbours that define a normal; more while noise hides their plane.
 _FEWEST, _MOST = 16, 256
 # Thickness of a neighbourhood over its width that passes as a plane.
 _FLAT = 0.2
-# The neighbour at whose distance one point stands per square of that size.
+# Number of the neighbour at whose distance a square of that size has one point.
 _FOURTH = 4
 
 
@@ -24,10 +24,9 @@ class Neighbourhoods(NamedTuple):
     """Properties of scattered points near a surface.
 
     Attributes:
-        spacing: Distance at which points stand, half of them at least so near, m.
+        spacing: Median distance between neighbouring points, m.
         normals: Unit normals of unknown sign, [n, 3].
-        thickness: Root mean square distance of points from the plane of their neighbours,
-            half of them at most so far, m.
+        thickness: Median root mean square distance of points from the plane of their neighbours, m.
     """
 
     spacing: float
@@ -36,7 +35,7 @@ class Neighbourhoods(NamedTuple):
 
 
 def neighbourhoods(points: np.ndarray) -> Neighbourhoods:
-    """Look at the neighbours of each of more than 16 different points, [n, 3], m."""
+    """Evaluate the neighbours of each of more than 16 different points, [n, 3], m."""
     tree = cKDTree(points)
     count = _FEWEST
     while True:
@@ -58,11 +57,11 @@ _MOST_CELLS = 400
 
 
 class Coverage(NamedTuple):
-    """How points cover a rectangle.
+    """Coverage of a rectangle by points.
 
     Attributes:
         centres: theta_1 [n_1] and theta_2 [n_2] of cells of the rectangle.
-        distances: From the centre of each cell to the nearest point, [n_1, n_2], m.
+        distances: Distance from the centre of each cell to the nearest point, [n_1, n_2], m.
     """
 
     centres: tuple[np.ndarray, np.ndarray]
@@ -75,15 +74,15 @@ class Coverage(NamedTuple):
         centre = np.array([self.centres[0][row], self.centres[1][column]])
         return centre, float(self.distances[row, column])
 
-    def covered(
+    def covered_rectangle(
         self, reach: float, domain: tuple[Interval, Interval], closed: bool
     ) -> tuple[Interval, Interval] | None:
-        """The largest rectangle of which no place is further than ``reach`` from a point.
+        """Return the largest rectangle that is everywhere within ``reach`` of a point.
 
         Args:
             reach: m.
             domain: The whole rectangle.
-            closed: Whether theta_1 must keep its whole interval.
+            closed: Whether the whole interval of theta_1 is required.
 
         Returns:
             Its sides, or None if there is none.
@@ -104,12 +103,14 @@ class Coverage(NamedTuple):
 def cover(
     theta: np.ndarray, domain: tuple[Interval, Interval], reach: float, *, closed: bool
 ) -> Coverage:
-    """How points cover a rectangle, seen with cells of a sixth of a reach, at most 400 x 400.
+    """Return the coverage of a rectangle by points, on cells of a sixth of a reach.
+
+    There are at most 400 x 400 cells.
 
     Args:
         theta: Parameters of points, lengths in m, [n, 2].
         domain: Sides of the rectangle.
-        reach: Distance that is of interest, m.
+        reach: Distance of interest, m.
         closed: Whether theta_1 is periodic.
     """
     counts = [
@@ -123,7 +124,7 @@ def cover(
     points = theta - begins
     if closed:
         points[:, 0] = np.mod(points[:, 0], domain[0].length)
-    # A box of length zero is none.
+    # A box of length zero means no periodicity.
     tree = cKDTree(points, boxsize=[domain[0].length if closed else 0.0, 0.0])
     cells = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1) - begins
     distances, _ = tree.query(cells)
@@ -131,14 +132,14 @@ def cover(
 
 
 def stand(theta: np.ndarray) -> float:
-    """Distance at which points stand, also those on lines that are further apart than they.
+    """Return the spacing of points, also of points on lines that are further apart.
 
     Args:
         theta: Parameters, lengths in m, [n, 2], not along one line.
 
     Returns:
-        Longest side of the Delaunay triangle that covers a place, median over all places, m;
-        1.8 / sqrt(density) for points thrown at random.
+        Longest side of the Delaunay triangle around a point of the area, median over the area, m;
+        1.8 / sqrt(density) for random points.
     """
     corners = theta[Delaunay(theta).simplices]
     sides = corners - np.roll(corners, 1, axis=1)
@@ -150,12 +151,12 @@ def stand(theta: np.ndarray) -> float:
 
 
 def _largest_rectangle(mask: np.ndarray) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Rows and columns, each from and to, of the largest rectangle that is all true."""
+    """Return rows and columns, each from and to, of the largest rectangle that is all true."""
     best, found = 0, ((0, 0), (0, 0))
     heights = np.zeros(mask.shape[1], dtype=int)
     for row, line in enumerate(mask):
         heights = np.where(line, heights + 1, 0)
-        # Columns that wait for a lower one, with where their height begins to hold.
+        # Columns that wait for a lower one, with the first column of their height.
         waiting: list[tuple[int, int]] = []
         for column, height in enumerate([*heights.tolist(), 0]):
             begin = column
@@ -172,7 +173,7 @@ class Axis(NamedTuple):
     """Axis of a cylinder.
 
     Attributes:
-        point: On it, [3], m.
+        point: Point on it, [3], m.
         direction: Direction vector of any length, [3].
     """
 
@@ -183,13 +184,13 @@ class Axis(NamedTuple):
 BaseChoice = Literal["auto", "plane", "cylinder"] | Axis
 
 # Cosine of the angle between normals of points and of their base, one of fifty being steeper:
-# a plane that is so good is taken, and none is that is worse.
-_GOOD, _BEARABLE = 0.7, 0.25
+# a plane above the first is taken immediately, a base below the second is rejected.
+_GOOD, _ACCEPTABLE = 0.7, 0.25
 _STEEPEST = 0.02
 # Component of a normal from which on it points up or down.
 _UPRIGHT = 0.1
-# A fold is where points whose feet are neighbours are further apart along their normal than
-# this many spacings and times the roughness; so many of all points make one.
+# Points with neighbouring projections form a fold if they are further apart along their normal than
+# this many spacings and times the roughness; least share of such points.
 _NEIGHBOURS = 6
 _SPACINGS, _ROUGHNESSES = 1.5, 8.0
 _FOLDED = 0.02
@@ -198,7 +199,7 @@ _AROUND, _FLYING, _MOST_FLYING = 16, 4.0, 0.1
 
 
 def _refuse_flying(points: np.ndarray, near: Neighbourhoods) -> None:
-    """Refuse single points off all others, which look like folds."""
+    """Refuse single points off all others, which would count as folds."""
     count = min(_AROUND, len(points))
     indices = cKDTree(points).query(points, count)[1]
     # points off the others are rare, so the median of those around one is not
@@ -223,15 +224,14 @@ def choose_base(
     seen_from: ArrayLike | None,
     along: ArrayLike | None,
 ) -> Base:
-    """Plane or cylinder over which points are a function of two parameters.
+    """Return the plane or cylinder over which points are a function of two parameters.
 
     Args:
         points: [n, 3], m.
         near: Their neighbourhoods.
-        choice: "auto" takes the plane that the normals are nearest to, or where they lean away
-            from it by more than 45 degrees the better of it and the cylinder whose axis they
-            meet; or "plane",
-            "cylinder", or a cylinder of the axis given.
+        choice: "auto" takes the plane that fits the normals best, or, where they lean away
+            from it by more than 45 degrees, the better of it and the cylinder whose axis they
+            meet; or "plane", "cylinder", or the axis of a cylinder.
         seen_from: A point on the side that the normal points to, [3], m. By default it points
             upwards on a plane, and outward on a cylinder.
         along: Direction that theta_1 leans to, on a plane.
@@ -248,19 +248,19 @@ def choose_base(
         axis = choice if isinstance(choice, Axis) else Axis(*axis_of_normals(points, near.normals))
         return _cylinder(points, near, view, axis)
 
-    made: dict[str, list[Callable[[], Base]]] = {
+    candidates: dict[str, list[Callable[[], Base]]] = {
         "auto": [on_plane, on_cylinder],
         "plane": [on_plane],
         "cylinder": [on_cylinder],
     }
     kind = "cylinder" if isinstance(choice, Axis) else choice
-    if kind not in made:
+    if kind not in candidates:
         raise InputError(
             f"surface base: '{choice}'; 'auto', 'plane', 'cylinder' or the axis of a cylinder is"
             " allowed"
         )
     best, failures = None, []
-    for make in made[kind]:
+    for make in candidates[kind]:
         base = make()
         steepest = _steepest(base, points, near)
         fold = _fold(base, points, near)
@@ -268,7 +268,7 @@ def choose_base(
             failures.append(
                 f"on {base.name} two sheets lie over each other near {_numbers(fold)} m"
             )
-        elif steepest < _BEARABLE:
+        elif steepest < _ACCEPTABLE:
             lean = math.degrees(math.acos(steepest))
             failures.append(f"on {base.name} it leans over by {lean:.0f} deg")
         elif steepest >= _GOOD:
@@ -313,13 +313,13 @@ def _cylinder(
 
 
 def _steepest(base: Base, points: np.ndarray, near: Neighbourhoods) -> float:
-    """Cosine of the angle between normals of points and the base, one of fifty being smaller."""
+    """Return the cosine of the angle between normals of points and base, its 2 % quantile."""
     cosines = np.abs(np.sum(base.normals(points) * near.normals, axis=1))
     return float(np.quantile(cosines, _STEEPEST))
 
 
 def _fold(base: Base, points: np.ndarray, near: Neighbourhoods) -> np.ndarray | None:
-    """A point [3] where sheets lie over each other, if there are such."""
+    """Return a point [3] where sheets lie over each other, or None."""
     theta = base.parameters(points)
     distances, indices = cKDTree(theta).query(theta, _NEIGHBOURS + 1)
     offsets = np.abs(np.einsum("nki,ni->nk", points[indices] - points[:, None], near.normals))

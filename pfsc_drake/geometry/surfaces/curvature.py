@@ -10,7 +10,7 @@ from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
 @dataclass(frozen=True)
 class FundamentalForms:
-    """First and second fundamental form at places of a surface, shapes [...].
+    """First and second fundamental form at points of a surface, shapes [...].
 
     Attributes:
         normal: e_perp, (4.3) with the square root of E G - F^2, [..., 3].
@@ -32,7 +32,7 @@ class FundamentalForms:
 
     @property
     def weingarten(self) -> np.ndarray:
-        """Matrix alpha of (4.6), (4.7), [..., 2, 2]: row i holds the derivative of e_perp."""
+        """Matrix alpha of (4.6), (4.7), [..., 2, 2]: row i is the derivative of e_perp."""
         E, F, G, L, M, N = self.E, self.F, self.G, self.L, self.M, self.N
         rows = np.array([[M * F - L * G, L * F - M * E], [N * F - M * G, M * F - N * E]])
         return np.asarray(np.moveaxis(rows, (0, 1), (-2, -1)) / self.determinant[..., None, None])
@@ -67,7 +67,7 @@ def fundamental_forms(surface: Surface, theta: ArrayLike) -> FundamentalForms:
 def mean_and_spread(
     E: np.ndarray, F: np.ndarray, G: np.ndarray, L: np.ndarray, M: np.ndarray, N: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and half of the difference of the eigenvalues of a form L, M, N relative to E, F, G.
+    """Return mean and half difference of the eigenvalues of a form L, M, N relative to E, F, G.
 
     Written in an orthonormal basis of the tangent plane, so that the difference is exact at
     umbilics, too.

@@ -1,4 +1,4 @@
-"""A surface that goes on beyond the ends of its open directions, so that a tool may leave it."""
+"""Extension of a surface beyond the ends of its open directions, so that a tool may leave it."""
 
 import math
 from collections.abc import Callable
@@ -18,11 +18,11 @@ from pfsc_drake.geometry.surfaces.parametric_surface import (
 )
 from pfsc_drake.geometry.surfaces.product import ProductSurface, checked_product
 
-# Of the domain: how far the surface goes on, and the longest way on which it gets straight.
+# Of the domain: length of the extension, and the longest transition to a straight line.
 _REACH, _LONGEST = 0.25, 0.2
-# Of what is open of a turn.
+# Of the open part of a turn.
 _OPEN_SHARE = 0.4
-# Of the area per parameters at the border, what is left of it everywhere beyond.
+# Smallest area per parameters beyond the border, relative to the border's.
 _AREA = 0.3
 # Samples along a border, and from there outwards.
 _SAMPLES, _STEPS = 9, 24
@@ -33,12 +33,12 @@ Beyond = Callable[[ca.SX, int], ca.SX]
 
 
 class ExtendedSurface(Surface):
-    """A surface of class C^k on a larger domain.
+    """Surface of class C^k on a larger domain.
 
     It reaches a quarter of the domain's length beyond each end; less where it would meet itself or
-    get narrow, as before a pole or an apex. What is a circle goes on as a circle. Other directions
-    go over to straight lines: each function of that parameter as :class:`RunOut`, so that the
-    surface stays a sum of products.
+    get narrow, as before a pole or an apex. Circles are continued as circles. Other directions
+    change to straight lines: each function of that parameter is continued by :class:`RunOut`, so
+    that the surface remains a sum of products.
 
     Args:
         surface: The surface.
@@ -63,16 +63,16 @@ class ExtendedSurface(Surface):
         )
 
     def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """All partial derivatives up to a total order, for set-up and figures."""
-        values = self.checked(theta)
+        """Return all partial derivatives up to a total order, for set-up and figures."""
+        values = self.to_domain(theta)
         sample = self.flat_sampler(order)
         flat = [sample(*pair) for pair in values.reshape(-1, 2).tolist()]
         return np.array(flat).reshape(*values.shape[:-1], -1, 3)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `partials`, result flattened.
+        """Return a fast scalar form of `partials` with a flattened result.
 
-        Within the surface's own domain it is the surface's own.
+        Within the surface's own domain it is the surface's sampler.
         """
         inside = self.inner.flat_sampler(check_partial_order(order))
         rows = np.array(partial_orders(order))
@@ -91,20 +91,20 @@ class ExtendedSurface(Surface):
 
     @property
     def beyond(self) -> tuple[Beyond | None, Beyond | None]:
-        """Functions of either parameter beyond its ends; None where they go on as they are."""
+        """Functions of either parameter beyond its ends; None where they are continued as such."""
         first, second = (d.beyond if d.run_outs else None for d in self._directions)
         return first, second
 
     def _regular_up_to(self, axis: int, limit: float) -> float:
-        """How far the surface keeps its area beyond a border, where it should reach a limit."""
+        """Return the last parameter towards a limit up to which the surface has enough area."""
         border = self.inner.domain[axis][limit > self.inner.domain[axis].begin]
         areas = self.flat_sampler(1)
         first, last = self._directions[1 - axis].limits
         across = np.linspace(first, last, _SAMPLES).tolist()
         least, reached = None, border
         for theta in np.linspace(border, limit, _STEPS + 1).tolist():
-            places = [(theta, t) if axis == 0 else (t, theta) for t in across]
-            tangents = np.array([areas(*place)[3:] for place in places]).reshape(-1, 2, 3)
+            points = [(theta, t) if axis == 0 else (t, theta) for t in across]
+            tangents = np.array([areas(*point)[3:] for point in points]).reshape(-1, 2, 3)
             area = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=-1)
             least = _AREA * area if least is None else least
             if np.any(area < least):
@@ -118,8 +118,8 @@ class _Direction:
 
     Attributes:
         limits: First and last parameter of the larger domain.
-        run_outs: How the functions go on before the begin and after the end; empty if they go on as
-            they are.
+        run_outs: Continuations of the functions before the begin and after the end; empty if they
+            are continued as such.
     """
 
     def __init__(self, surface: ProductSurface, axis: int, basis: Basis, smoothness: int) -> None:
@@ -146,7 +146,7 @@ class _Direction:
         return [*[first] * (first < inner[0]), *inner, *[last] * (last > inner[-1])]
 
     def holds(self, theta: float) -> bool:
-        """Whether a parameter is in the surface's own domain."""
+        """Return whether a parameter is in the surface's own domain."""
         return self._basis.closed or self._begin <= theta <= self._end
 
     def derivatives(self, theta: float, order: int) -> tuple[int, np.ndarray]:
@@ -166,7 +166,7 @@ class _Direction:
         return piece, functions
 
     def beyond(self, theta: ca.SX, order: int) -> ca.SX:
-        """The same as `derivatives` for a parameter beyond an end, as an expression."""
+        """Return `derivatives` for a parameter beyond an end, as an expression."""
         first, last = (_gone_out(run_out, theta, order) for run_out in self.run_outs)
         return ca.if_else(theta > self._end, last, first)
 
@@ -176,7 +176,7 @@ class _Direction:
 
 
 def _gone_out(run_out: RunOut, theta: ca.SX, order: int) -> ca.SX:
-    """Derivatives 0..order along a run-out and, straight, beyond its end, [order + 1, size]."""
+    """Return derivatives 0..order along a run-out and its straight end, [order + 1, size]."""
     inside = ca.fmin(ca.fmax(theta, run_out.domain[0]), run_out.domain[1])
     rows = run_out.expression(inside, order)
     straight = [rows[0, :] + (theta - inside) * rows[1, :], rows[1, :]]
@@ -187,23 +187,23 @@ def _gone_out(run_out: RunOut, theta: ca.SX, order: int) -> ca.SX:
 def _straightening(
     surface: ProductSurface, axis: int, theta: float, order: int, longest: float
 ) -> float:
-    """Length in which no line across a border gets far from straight."""
+    """Return a length in which no line across a border gets far from straight."""
     other = surface.domain[1 - axis]
     orders = partial_orders(order)
     rows = [orders.index((n, 0) if axis == 0 else (0, n)) for n in range(order + 1)]
     lengths = []
     for value in np.linspace(*other, _SAMPLES):
-        place = (theta, value) if axis == 0 else (value, theta)
-        lengths.append(straightening_length(surface.partials(place, order)[rows], longest))
+        point = (theta, value) if axis == 0 else (value, theta)
+        lengths.append(straightening_length(surface.partials(point, order)[rows], longest))
     return min(lengths)
 
 
 class SurfaceTable:
-    """Looks up the cell of a sum of products, and multiplies its coefficients with the functions.
+    """Sum of products as an expression: its cell is looked up, coefficients multiply functions.
 
     Args:
-        surface: A `ProductSurface`, or one that is extended; parameters beyond the ends of open
-            directions go on as it does.
+        surface: A `ProductSurface`, or an extended one, which decides over parameters beyond the
+            ends of open directions.
 
     Raises:
         InputError: Another kind of surface.
@@ -243,7 +243,7 @@ class _TableDirection:
 
     Args:
         basis: The functions.
-        beyond: What they are beyond the ends, or None if they go on as they are.
+        beyond: The functions beyond the ends, or None if they are continued as such.
     """
 
     def __init__(self, basis: Basis, beyond: Beyond | None) -> None:
@@ -266,7 +266,7 @@ class _TableDirection:
         return piece, self._functions[order](outside, u, theta)
 
     def _function(self, order: int) -> ca.Function:
-        """``(outside, u, theta) -> derivatives 0..order``."""
+        """Return ``(outside, u, theta) -> derivatives 0..order``."""
         outside, u, theta = (ca.SX.sym(name) for name in ("outside", "u", "theta"))
         own = self._basis.function(order)
         if self._beyond is None:

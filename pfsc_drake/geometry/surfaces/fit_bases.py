@@ -13,7 +13,7 @@ from pfsc_drake.geometry.surfaces.parametric_surface import rotation_from_axes
 
 # Sites per knot interval at which a circle is fitted by a spline.
 _SITES = 3
-# Angle without points, in spacings, from which on a patch does not go all the way round.
+# Angle without points, in spacings, above which a patch is not closed.
 _OPEN_GAP = 4.0
 
 
@@ -21,9 +21,9 @@ class Base(Protocol):
     """Parameters and heights of points over a simple surface.
 
     Attributes:
-        name: For people.
-        closed: Which directions are periodic.
-        period: Period of theta_1 if it is, m.
+        name: Name for messages.
+        closed: Whether each direction is periodic.
+        period: Period of theta_1 if it is periodic, m.
     """
 
     name: str
@@ -31,18 +31,18 @@ class Base(Protocol):
     period: float
 
     def parameters(self, points: np.ndarray) -> np.ndarray:
-        """Parameters of the feet of points [n, 3] on the base, lengths in m, [n, 2]."""
+        """Return parameters of points [n, 3] projected onto the base, lengths in m, [n, 2]."""
 
     def heights(self, points: np.ndarray) -> np.ndarray:
-        """Distances of points [n, 3] from the base along its normals, m, [n]."""
+        """Return distances of points [n, 3] from the base along its normals, m, [n]."""
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Unit normals of the base at the feet of points [n, 3], to the side wanted, [n, 3]."""
+        """Return unit normals of the base at projected points, on the desired side, [n, 3]."""
 
     def coefficients(
         self, first: UniformKnots, second: UniformKnots, heights: np.ndarray
     ) -> np.ndarray:
-        """Spline coefficients of a surface in space from those of its heights.
+        """Return spline coefficients of a surface in space from the coefficients of its heights.
 
         Args:
             first: Knots of theta_1.
@@ -59,7 +59,7 @@ class PlaneBase:
 
     Args:
         points: [n, 3], m, not along one line.
-        normal: Normal of the plane, on the side wanted, of any length, [3].
+        normal: Normal of the plane, on the desired side, of any length, [3].
         along: Direction that theta_1 leans to; by default the longer side.
 
     Raises:
@@ -79,21 +79,21 @@ class PlaneBase:
         self._axes = rotation_from_axes(normal, along)
 
     def parameters(self, points: np.ndarray) -> np.ndarray:
-        """Parameters of the feet of points [n, 3] on the base, lengths in m, [n, 2]."""
+        """Return parameters of points [n, 3] projected onto the base, lengths in m, [n, 2]."""
         return np.asarray((points - self._origin) @ self._axes[:, :2])
 
     def heights(self, points: np.ndarray) -> np.ndarray:
-        """Distances of points [n, 3] from the base along its normals, m, [n]."""
+        """Return distances of points [n, 3] from the base along its normals, m, [n]."""
         return np.asarray((points - self._origin) @ self._axes[:, 2])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Unit normals of the base at the feet of points [n, 3], to the side wanted, [n, 3]."""
+        """Return unit normals of the base at projected points, on the desired side, [n, 3]."""
         return np.broadcast_to(self._axes[:, 2], points.shape)
 
     def coefficients(
         self, first: UniformKnots, second: UniformKnots, heights: np.ndarray
     ) -> np.ndarray:
-        """Spline coefficients of a surface in space from those of its heights."""
+        """Return spline coefficients of a surface in space from the coefficients of its heights."""
         e_1, e_2, normal = self._axes.T
         along = first.linear[:, None, None] * e_1 + second.linear[None, :, None] * e_2
         return np.asarray(self._origin + along + heights[:, :, None] * normal)
@@ -106,7 +106,7 @@ class CylinderBase:
         points: [n, 3], m; the radius is the mean of their distances from the axis.
         origin: A point on the axis, [3], m.
         axis: Its direction, of any length, [3].
-        spacing: Spacing of the points, m: the patch is closed if no wider gap is left round the
+        spacing: Spacing of the points, m: the patch is closed if there is no wider gap around the
             axis.
         outward: Whether normals point away from the axis.
 
@@ -127,7 +127,7 @@ class CylinderBase:
     ) -> None:
         self._origin = np.asarray(origin, dtype=float)
         guess = np.eye(3)[int(np.argmin(np.abs(axis)))]
-        # x and y of mirrored axes turn the other way, and with them the normal
+        # mirrored axes invert the sense of x and y, and the normal
         self._side = 1.0 if outward else -1.0
         self._axes = rotation_from_axes(axis, guess) * [1.0, self._side, 1.0]
         x, y, _ = ((points - self._origin) @ self._axes).T
@@ -145,18 +145,18 @@ class CylinderBase:
         self.period = 2.0 * math.pi * self.radius
 
     def parameters(self, points: np.ndarray) -> np.ndarray:
-        """Parameters of the feet of points [n, 3] on the base, lengths in m, [n, 2]."""
+        """Return parameters of points [n, 3] projected onto the base, lengths in m, [n, 2]."""
         x, y, z = self._local(points)
         turn = np.mod(np.arctan2(y, x) - self._start, 2.0 * math.pi)
         return np.stack([self.radius * turn, z], axis=1)
 
     def heights(self, points: np.ndarray) -> np.ndarray:
-        """Distances of points [n, 3] from the base along its normals, m, [n]."""
+        """Return distances of points [n, 3] from the base along its normals, m, [n]."""
         x, y, _ = self._local(points)
         return np.asarray(self._side * (np.hypot(x, y) - self.radius))
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Unit normals of the base at the feet of points [n, 3], to the side wanted, [n, 3]."""
+        """Return unit normals of the base at projected points, on the desired side, [n, 3]."""
         x, y, _ = self._local(points)
         radial = np.stack([x, y], axis=1) / np.hypot(x, y)[:, None]
         return np.asarray(self._side * radial @ self._axes[:, :2].T)
@@ -164,9 +164,9 @@ class CylinderBase:
     def coefficients(
         self, first: UniformKnots, second: UniformKnots, heights: np.ndarray
     ) -> np.ndarray:
-        """Spline coefficients of a surface in space from those of its heights.
+        """Return the spline coefficients of a surface in space from those of its heights.
 
-        A circle is none of polynomials, and missed by about step^7.
+        A circle is no polynomial, and approximated with an error of about step^7.
         """
         sites = first.begin + first.step / _SITES * (np.arange(_SITES * first.intervals) + 0.5)
         basis = first.basis(sites).toarray()
@@ -177,12 +177,12 @@ class CylinderBase:
         return np.asarray(self._origin + np.stack([*flat, axial], axis=-1) @ self._axes.T)
 
     def _local(self, points: np.ndarray) -> np.ndarray:
-        """Coordinates along the axes, [3, n], m."""
+        """Return coordinates along the axes, [3, n], m."""
         return np.asarray(((points - self._origin) @ self._axes).T)
 
 
 def axis_of_normals(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Line that normals come nearest to meeting: a point on it and its direction, [3] each.
+    """Return the line nearest to all normals: a point on it and its direction, [3] each.
 
     Args:
         points: [n, 3], m.
@@ -196,7 +196,7 @@ def axis_of_normals(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray
 
 
 def _longer_side(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Direction of the longer side of the narrowest rectangle around points, [3]."""
+    """Return the direction of the longer side of the narrowest rectangle around points, [3]."""
     guess = np.eye(3)[int(np.argmin(np.abs(normal)))]
     axes = rotation_from_axes(normal, guess)[:, :2]
     flat = points @ axes

@@ -24,16 +24,16 @@ _COINCIDENT = 1e-9
 def surface_through_grid(
     points: ArrayLike, *, smoothness: int, closed: tuple[bool, bool] = (False, False)
 ) -> ProductSurface:
-    """Spline surface of degree smoothness + 1 through all points of a grid.
+    """Return a spline surface of degree smoothness + 1 through all points of a grid.
 
-    Its parameters are lengths: from one row to the next theta_1 grows by the mean distance of
-    their points, and theta_2 by that of columns, so that both tangents have a length near one.
+    Its parameters are lengths: theta_1 grows by the mean distance between points of neighbouring
+    rows, and theta_2 likewise between columns, so that both tangents have a length near one.
 
     Args:
         points: [n_1, n_2, 3], m, by theta_1 and theta_2; the last row or column of a closed
             direction may repeat the first.
         smoothness: k of the class C^k, 2..6.
-        closed: Which directions are periodic.
+        closed: Whether each direction is periodic.
 
     Returns:
         The surface, on [0, length] in both directions.
@@ -54,17 +54,17 @@ def grid_for(points: ArrayLike, smoothness: int, closed: tuple[bool, bool]) -> n
 
     Args:
         points: [n_1, n_2, 3], m.
-        smoothness: k of the class C^k that is asked for.
-        closed: Which directions are periodic.
+        smoothness: k of the requested class C^k.
+        closed: Whether each direction is periodic.
 
     Raises:
         InputError: As `surface_through_grid`.
     """
     check_smoothness(smoothness)
-    grid = _checked(points)
+    grid = _check_points(points)
     for axis in (0, 1):
         if closed[axis]:
-            grid = _closing(grid, axis)
+            grid = _append_first(grid, axis)
         needed = _FEWEST_CLOSED + 1 if closed[axis] else smoothness + 2
         if grid.shape[axis] < needed:
             raise InputError(
@@ -75,7 +75,7 @@ def grid_for(points: ArrayLike, smoothness: int, closed: tuple[bool, bool]) -> n
     return grid
 
 
-def _checked(points: ArrayLike) -> np.ndarray:
+def _check_points(points: ArrayLike) -> np.ndarray:
     """Return a grid of points as an array [n_1, n_2, 3], m.
 
     Raises:
@@ -98,11 +98,11 @@ def _checked(points: ArrayLike) -> np.ndarray:
 
 
 def grid_parameters(grid: np.ndarray, closed: tuple[bool, bool]) -> tuple[np.ndarray, np.ndarray]:
-    """Parameters of a grid's rows and columns, from 0, by their mean distances.
+    """Return parameters of a grid's rows and columns, from 0, by their mean distances.
 
     Args:
         grid: [n_1, n_2, 3], m, as `grid_for` returns it.
-        closed: Which directions are periodic.
+        closed: Whether each direction is periodic.
 
     Returns:
         theta_1 [n_1] and theta_2 [n_2], m, strictly increasing.
@@ -110,13 +110,13 @@ def grid_parameters(grid: np.ndarray, closed: tuple[bool, bool]) -> tuple[np.nda
     Raises:
         InputError: Neighbours coincide, or all lie within 0.1 mm.
     """
-    # What is there twice, at both ends of a closed direction, counts once.
+    # Points repeated at both ends of a closed direction count once.
     once = grid[: len(grid) - closed[0]], grid[:, : grid.shape[1] - closed[1]]
     return _lengths(once[1], 0), _lengths(once[0], 1)
 
 
 def _lengths(grid: np.ndarray, axis: int) -> np.ndarray:
-    """Accumulated mean distances along an axis, [n_axis], m."""
+    """Return the accumulated mean distances along an axis, [n_axis], m."""
     chords = np.linalg.norm(np.diff(grid, axis=axis), axis=2)
     total = float(chords.mean(axis=1 - axis).sum())
     if not total >= SHORTEST:
@@ -134,9 +134,9 @@ def _lengths(grid: np.ndarray, axis: int) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(chords.mean(axis=1 - axis))])
 
 
-def _closing(grid: np.ndarray, axis: int) -> np.ndarray:
-    """The grid with its first row or column once more at the end, if it is not there."""
-    first, last = (np.take(grid, [place], axis=axis) for place in (0, -1))
+def _append_first(grid: np.ndarray, axis: int) -> np.ndarray:
+    """Return the grid with its first row or column again at the end, if it is not there."""
+    first, last = (np.take(grid, [index], axis=axis) for index in (0, -1))
     if np.linalg.norm(last - first, axis=2).max() <= _COINCIDENT * np.ptp(grid):
         return np.concatenate([np.delete(grid, -1, axis=axis), first], axis=axis)
     return np.concatenate([grid, first], axis=axis)
@@ -153,17 +153,17 @@ def smooth_surface_near_grid(
     tolerance: float | None,
     closed: tuple[bool, bool] = (False, False),
 ) -> tuple[ProductSurface, Residuals]:
-    """The smoothest spline surface near a grid of points.
+    """Return the smoothest spline surface near a grid of points.
 
     Its parameters are those of `surface_through_grid`. Unlike surfaces fitted to scattered points
-    it may bend over as it likes, and close in both directions.
+    it may bend over arbitrarily, and close in both directions.
 
     Args:
         points: As for `surface_through_grid`, 100,000 at most.
         smoothness: k of the class C^k, 2..6.
         tolerance: Largest distance of a point from the surface along its normal, m, see
             `smoothest_within`; None for the surface that predicts points best.
-        closed: Which directions are periodic.
+        closed: Whether each direction is periodic.
 
     Returns:
         The surface, and the residuals of the points row by row.

@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 
-# Longest panel of the integral, relative to the lengths of the domain, and how many a long way has.
+# Longest panel of the integral, relative to the lengths of the domain, and panels of a long line.
 _PANEL, _PANELS = 1.0 / 64.0, 64
 
 
 class TangentialLength:
-    """Integrates eta' = Sigma theta' (4.15) along straight lines of the parameters.
+    """Integral of eta' = Sigma theta' (4.15) along straight lines of the parameters.
 
-    Each panel takes Sigma and its derivative at both ends, which is exact for cubics. How eta
-    depends on theta depends on the way, as the surface is curved. A way of a tick is one panel;
-    a longer one has always the same number, so that they are short over one length of the domain.
+    Each panel uses Sigma and its derivative at both ends, which is exact for cubics. On a curved
+    surface eta depends on the path of theta. The motion of a tick is one panel; longer lines have a
+    fixed number of panels, which are short over one length of the domain.
 
     Args:
         terms: theta -> partial derivatives up to order 2 as columns, shapes (2,) and (3, 6).
@@ -34,8 +34,8 @@ class TangentialLength:
         between = [terms(first), terms(last)]
         one = ca.Function("panel", [first, last], [panel(*between, last - first)])
         shares = ca.DM([k / _PANELS for k in range(_PANELS + 1)]).T
-        places = first + (last - first) @ shares
-        many = ca.sum2(one.map(_PANELS)(places[:, :-1], places[:, 1:]))
+        points = first + (last - first) @ shares
+        many = ca.sum2(one.map(_PANELS)(points[:, :-1], points[:, 1:]))
         terms_1, terms_2 = ca.MX.sym("terms_1", 3, 6), ca.MX.sym("terms_2", 3, 6)
         arguments = [first, last, terms_1, terms_2]
         self._advance = ca.Function.if_else(
@@ -47,7 +47,7 @@ class TangentialLength:
     def __call__(
         self, begin: ca.MX, end: ca.MX, terms_at_begin: ca.MX, terms_at_end: ca.MX
     ) -> ca.MX:
-        """Return how far tangential coordinates change along a straight line [m], shape (2,).
+        """Return the change of the tangential coordinates along a straight line [m], shape (2,).
 
         Args:
             begin: Unwrapped parameters, in the domain in open directions, shape (2,).
@@ -61,21 +61,21 @@ class TangentialLength:
 
 @cache
 def panel_function() -> ca.Function:
-    """``(terms at begin, terms at end, d theta) -> integral of Sigma d theta`` [m].
+    """Return ``(terms at begin, terms at end, d theta) -> integral of Sigma d theta`` [m].
 
     The line is straight; shapes (3, 6), (3, 6), (2,) and (2,).
     """
     begin, end = ca.SX.sym("begin", 3, 6), ca.SX.sym("end", 3, 6)
-    way = ca.SX.sym("way", 2)
-    (a, a_rate), (b, b_rate) = _rates(begin, way), _rates(end, way)
+    step = ca.SX.sym("way", 2)
+    (a, a_rate), (b, b_rate) = _rates(begin, step), _rates(end, step)
     length = 0.5 * (a + b) + (a_rate - b_rate) / 12.0
-    return ca.Function("panel_length", [begin, end, way], [length], {"cse": True})
+    return ca.Function("panel_length", [begin, end, step], [length], {"cse": True})
 
 
-def _rates(terms: ca.SX, way: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Sigma d (4.15), m, and its derivative by the share of the step, m, each (2,)."""
+def _rates(terms: ca.SX, step: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return Sigma d (4.15), m, and its derivative by the share of the step, m, each (2,)."""
     _, u, v, a, b, c = ca.horzsplit(terms)
-    d1, d2 = ca.vertsplit(way)
+    d1, d2 = ca.vertsplit(step)
     # Derivatives of the tangents along d.
     p, q = a * d1 + b * d2, b * d1 + c * d2
     E, F, G = ca.dot(u, u), ca.dot(u, v), ca.dot(v, v)
@@ -94,13 +94,13 @@ def _rates(terms: ca.SX, way: ca.SX) -> tuple[ca.SX, ca.SX]:
     )
 
 
-def way_on_surface(
+def parameters_along_motion(
     surface: Surface, motion: PiecewisePolynomialCurve, start: np.ndarray, times: np.ndarray
 ) -> Iterator[np.ndarray]:
-    """Yield the parameters theta that belong to tangential coordinates over time, each [2].
+    """Iterate over the parameters theta of tangential coordinates over time, each [2].
 
     ``theta' = Sigma(theta)^-1 eta'`` (4.15), integrated by Runge and Kutta's method of fourth order
-    from time to time. Beyond the ends of open directions Sigma is that of the border.
+    from time to time. Beyond the ends of open directions Sigma is evaluated at the border.
 
     Args:
         surface: The surface.
@@ -126,7 +126,7 @@ def way_on_surface(
 
 
 def _sigma(surface: Surface, theta: np.ndarray) -> np.ndarray:
-    """Sigma of (4.15), shape (2, 2)."""
+    """Return Sigma of (4.15), shape (2, 2)."""
     inside = [
         value if closed else min(max(value, ends.begin), ends.end)
         for value, ends, closed in zip(theta, surface.domain, surface.closed, strict=True)

@@ -1,4 +1,4 @@
-"""Parametrized surfaces: what every surface offers, and where it stands in the world."""
+"""Parametrized surfaces: their common interface, and their placement in the world."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -86,7 +86,7 @@ class Surface(ABC):
 
     @abstractmethod
     def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """All partial derivatives up to a total order, for set-up and figures.
+        """Return all partial derivatives up to a total order, for set-up and figures.
 
         Args:
             theta: Parameters, shape [..., 2]. Closed directions wrap.
@@ -102,7 +102,7 @@ class Surface(ABC):
 
     @abstractmethod
     def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `partials`, result flattened.
+        """Return a fast scalar form of `partials` with a flattened result.
 
         Args:
             order: Highest total order, 0 to 6.
@@ -114,7 +114,7 @@ class Surface(ABC):
         """
 
     def wrap(self, theta: ArrayLike) -> np.ndarray:
-        """Parameters moved into the domain by whole periods in closed directions.
+        """Return parameters moved into the domain by whole periods in closed directions.
 
         Args:
             theta: Parameters, shape [..., 2].
@@ -130,8 +130,8 @@ class Surface(ABC):
                 values[..., k] = np.where((own >= begin) & (own <= end), own, wrapped)
         return values
 
-    def checked(self, theta: ArrayLike) -> np.ndarray:
-        """Wrapped parameters, shape [..., 2].
+    def to_domain(self, theta: ArrayLike) -> np.ndarray:
+        """Return wrapped parameters, shape [..., 2].
 
         Raises:
             InputError: theta is not a pair, or lies outside the domain in an open direction.
@@ -141,7 +141,7 @@ class Surface(ABC):
             raise InputError(f"theta: shape {values.shape}; [..., 2] is required")
         values = self.wrap(values)
         for k, (begin, end) in enumerate(self.domain):
-            # Parameters come out of sums and projections, so the ends carry rounding errors.
+            # Parameters result from sums and projections, so the ends have rounding errors.
             slack = 1e-9 * (end - begin)
             own = values[..., k]
             outside = ~((own >= begin - slack) & (own <= end + slack))
@@ -153,7 +153,7 @@ class Surface(ABC):
         return values
 
     def grid(self, cells: int, fewest: int) -> tuple[np.ndarray, np.ndarray]:
-        """Parameters of samples in both directions, between any two breakpoints alike.
+        """Return parameters of samples in both directions, between any two breakpoints alike.
 
         Args:
             cells: Number of samples in each cell.
@@ -171,7 +171,7 @@ class Surface(ABC):
 
 
 def check_partial_order(order: int) -> int:
-    """The total order of derivatives, if it is an integer from 0 to 6.
+    """Return the total order of derivatives, if it is an integer from 0 to 6.
 
     Raises:
         InputError: it is not.
@@ -227,18 +227,18 @@ def checked_placement(
 
 
 def rotation_from_axes(axis: ArrayLike, start: ArrayLike | None = None) -> np.ndarray:
-    """Rotation whose z-axis is a given one, and its x-axis as near as can be to another.
+    """Return the rotation with a prescribed z-axis, and its x-axis as near as possible to another.
 
     Args:
         axis: Direction of the z-axis, of any length, [3].
-        start: Direction that the x-axis leans to, [3]; by default that of the world's x-axis, or of
-            its y-axis where z is along x.
+        start: Direction that the x-axis leans to, [3]; by default the world's x-axis, or its y-axis
+            where z is along x.
 
     Returns:
         Rotation matrix [3, 3].
 
     Raises:
-        InputError: A direction that is none, or both along one line.
+        InputError: An invalid direction, or both along one line.
     """
     z = _direction("axis", axis)
     if start is None:
@@ -258,5 +258,5 @@ def _direction(name: str, vector: ArrayLike) -> np.ndarray:
     v = np.asarray(vector, dtype=float)
     if v.shape != (3,) or not np.all(np.isfinite(v)) or not np.any(v):
         raise InputError(f"{name}: {v.tolist()}; 3 finite numbers, not all zero, are required")
-    v = v / np.abs(v).max()  # squares of huge or tiny numbers are none
+    v = v / np.abs(v).max()  # squares of huge or tiny numbers overflow or vanish
     return np.asarray(v / np.linalg.norm(v))

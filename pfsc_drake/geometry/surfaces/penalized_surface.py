@@ -1,4 +1,4 @@
-"""How near penalized splines come to points as surfaces."""
+"""Distances of points from surfaces fitted by penalized splines, and fits within a tolerance."""
 
 import math
 from collections.abc import Callable
@@ -23,10 +23,10 @@ _TWO_SHEETS = 0.93
 
 @dataclass(frozen=True)
 class Residuals:
-    """Where points stand relative to a surface.
+    """Positions of points relative to a surface.
 
     Attributes:
-        theta: Parameters of the nearest points of the surface, [n, 2].
+        theta: Parameters of the closest points of the surface, [n, 2].
         distances: Distances along the normal (4.3), positive on its side, m, [n].
     """
 
@@ -45,7 +45,7 @@ class Residuals:
 
 
 def residuals(surface: Surface, points: np.ndarray, theta: np.ndarray) -> Residuals:
-    """Distances of points from a surface.
+    """Return the distances of points from a surface.
 
     Args:
         surface: The surface.
@@ -53,25 +53,25 @@ def residuals(surface: Surface, points: np.ndarray, theta: np.ndarray) -> Residu
         theta: Guesses of their parameters, [n, 2].
 
     Returns:
-        The residuals; of points beyond an end their distances along the normal there.
+        The residuals; for points beyond an end the distances along the normal there.
     """
-    place = np.array(theta, dtype=float)
+    current = np.array(theta, dtype=float)
     lengths = np.array([side.length for side in surface.domain])
     for _ in range(_STEPS):
-        error, first, second, gradient, hessian = _foot(surface, points, place)
+        error, first, second, gradient, hessian = _newton_terms(surface, points, current)
         step = np.linalg.solve(hessian, gradient[..., None])[..., 0]
-        new = place + step
+        new = current + step
         for k, side in enumerate(surface.domain):
             if not surface.closed[k]:
                 new[:, k] = np.clip(new[:, k], side.begin, side.end)
-        moved = np.abs(new - place).max(axis=0)
-        place = new
+        moved = np.abs(new - current).max(axis=0)
+        current = new
         if np.all(moved <= _CONVERGED * lengths):
             break
-    error, first, second, _, _ = _foot(surface, points, place)
+    error, first, second, _, _ = _newton_terms(surface, points, current)
     normals = np.cross(first, second)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Residuals(surface.wrap(place), np.sum(error * normals, axis=1))
+    return Residuals(surface.wrap(current), np.sum(error * normals, axis=1))
 
 
 def check_scatter(
@@ -82,8 +82,8 @@ def check_scatter(
     Args:
         left: Residuals of the points.
         points: [n, 3], m.
-        spacing: Distance at which they stand, m.
-        tolerance: Whether the user has said how far points may be away.
+        spacing: Spacing of the points, m.
+        tolerance: The user's tolerance [m], or None.
     """
     distances = np.abs(left.distances)
     if left.rms > _STRAY_SPACINGS * spacing and distances.mean() > _TWO_SHEETS * left.rms:
@@ -103,10 +103,10 @@ def check_scatter(
         )
 
 
-def _foot(
+def _newton_terms(
     surface: Surface, points: np.ndarray, theta: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Error y - sigma, both tangents, half the slope of its square and the Hessian's main part."""
+    """Return y - sigma, both tangents, half the slope of its square and the Gauss-Newton matrix."""
     rows = surface.partials(theta, 1)
     error = points - rows[:, 0]
     tangents = rows[:, [partial_index(1, 0), partial_index(0, 1)]]
@@ -117,7 +117,7 @@ def _foot(
 
 # Part of the tolerance up to which points are inside.
 _INSIDE = 0.995
-# Part of all points that may be pulled: more are not stray, but the noise.
+# Largest share of points that may be pulled: more are noise, not stray points.
 _FEW = 0.05
 
 
@@ -127,14 +127,14 @@ def smoothest_within(
     tolerance: float,
     distances: Callable[[np.ndarray], np.ndarray],
 ) -> np.ndarray:
-    """The smoothest penalized spline that misses no point by more than a tolerance.
+    """Return the smoothest penalized spline that misses no point by more than a tolerance.
 
     The penalty is the strongest that leaves all distances within it, but not weaker than the one
-    that suits the noise: fitting more closely would follow that. Points that are still outside
-    then get larger weights, if they are few.
+    that suits the noise: a closer fit would follow the noise. Points that are still outside then
+    get larger weights, if they are few.
 
     Args:
-        spline: What is fitted; its weights may be changed.
+        spline: The spline to fit; its weights may be changed.
         exponent: Decimal logarithm of the roughness that suits the noise, see
             `PenalizedSpline.best_predicting`.
         tolerance: Largest distance allowed, m.
@@ -155,7 +155,7 @@ def smoothest_within(
     if near(coefficients):
         return spline.fit(spline.strongest(near, exponent))
     if np.mean(distances(coefficients) > tolerance) <= _FEW:
-        coefficients, is_near = spline.pulled_in(exponent, tolerance, _INSIDE, distances)
+        coefficients, is_near = spline.pull_in(exponent, tolerance, _INSIDE, distances)
         if is_near:
             return coefficients
     missed = distances(coefficients)

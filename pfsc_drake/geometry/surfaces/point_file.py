@@ -25,7 +25,7 @@ class SurfacePoints(NamedTuple):
 
     Attributes:
         points: [n, 3], m.
-        notes: Sentences on what of the file was ignored.
+        notes: Sentences on ignored parts of the file.
     """
 
     points: np.ndarray
@@ -42,7 +42,7 @@ def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
 
 
 def read_surface_file(file: str | FilePath, unit: Unit = "m") -> SurfacePoints:
-    """Read points scanned on a surface, and say what was ignored.
+    """Read points scanned on a surface, and report ignored data.
 
     Args:
         file: A CSV file with columns x, y, z in any order, others being ignored, or an STL, OBJ
@@ -58,12 +58,12 @@ def read_surface_file(file: str | FilePath, unit: Unit = "m") -> SurfacePoints:
     path = FilePath(file)
     kind = path.suffix.lower()
     if kind == ".csv":
-        points, places, notes = _read_csv(str(file))
+        points, locations, notes = _read_csv(str(file))
     elif kind in _MESHES:
-        # the order of the file is kept
+        # in the order of the file
         vertices = _MESHES[kind](path)
         points = vertices[np.sort(np.unique(vertices, axis=0, return_index=True)[1])]
-        places = [f"vertex {number}" for number in range(1, len(points) + 1)]
+        locations = [f"vertex {number}" for number in range(1, len(points) + 1)]
     else:
         raise InputError(
             f"{file}: points are read from files of the kinds .csv, {', '.join(_MESHES)}"
@@ -73,7 +73,7 @@ def read_surface_file(file: str | FilePath, unit: Unit = "m") -> SurfacePoints:
     if bad.size:
         row, axis = bad[0]
         raise InputError(
-            f"{file}, {places[row]}, {'xyz'[axis]}: {points[row, axis]:g} m; a number of at most"
+            f"{file}, {locations[row]}, {'xyz'[axis]}: {points[row, axis]:g} m; a number of at most"
             f" {FARTHEST:g} is required"
         )
     size = float(np.ptp(points, axis=0).max())
@@ -85,29 +85,29 @@ def read_surface_file(file: str | FilePath, unit: Unit = "m") -> SurfacePoints:
     return SurfacePoints(points, notes)
 
 
-def _check_header(place: str, header: list[str]) -> None:
-    check_columns(place, header, _AXES, _AXES, others=True)
+def _check_header(location: str, header: list[str]) -> None:
+    check_columns(location, header, _AXES, _AXES, others=True)
 
 
 def _read_csv(name: str) -> tuple[np.ndarray, list[str], tuple[str, ...]]:
-    """Points [n, 3] in the file's unit, where they stand, and what was ignored."""
+    """Return points [n, 3] in the file's unit, their locations, and notes on ignored data."""
     table = read_numbers(name, "points", _check_header, known=_AXES)
     points = table.rows[:, [table.header.index(axis) for axis in _AXES]]
-    kept = np.sort(np.unique(points, axis=0, return_index=True)[1])
+    unique = np.sort(np.unique(points, axis=0, return_index=True)[1])
     notes = table.notes(name)
-    if again := len(points) - len(kept):
-        line = table.lines[int(np.setdiff1d(np.arange(len(points)), kept)[0])]
+    if again := len(points) - len(unique):
+        line = table.lines[int(np.setdiff1d(np.arange(len(points)), unique)[0])]
         there = f"of which the first is in line {line}" if again > 1 else f"in line {line}"
         notes += (f"{name}: points that are there already left out: {again}, {there}",)
-    return points[kept], [f"line {table.lines[row]}" for row in kept], notes
+    return points[unique], [f"line {table.lines[row]}" for row in unique], notes
 
 
 def read_profile(file: str | FilePath, columns: list[str]) -> SurfacePoints:
-    """Read the points of a profile, and say what was ignored.
+    """Read the points of a profile, and report ignored data.
 
     Args:
         file: CSV file.
-        columns: That it must have, in any order, others being ignored.
+        columns: Required columns, in any order, others being ignored.
 
     Returns:
         Points in the order of the file, [n, columns], m.
@@ -118,8 +118,8 @@ def read_profile(file: str | FilePath, columns: list[str]) -> SurfacePoints:
     """
     name = str(file)
 
-    def check_header(place: str, header: list[str]) -> None:
-        check_columns(place, header, columns, columns, others=True)
+    def check_header(location: str, header: list[str]) -> None:
+        check_columns(location, header, columns, columns, others=True)
 
     table = read_numbers(name, "points", check_header, known=columns)
     points = table.rows[:, [table.header.index(label) for label in columns]]

@@ -18,7 +18,7 @@ from pfsc_drake.geometry.surfaces.parametric_surface import (
 )
 from pfsc_drake.geometry.surfaces.regularity import check_regular
 
-# Samples that are evaluated at once.
+# Samples that are evaluated together.
 _CHUNK = 20_000
 # Up to so many products of functions it is faster to multiply all of them first.
 _FEW_PRODUCTS = 24
@@ -28,8 +28,8 @@ class ProductSurface(Surface):
     """sigma_t(theta) = sum_kl c_kl a_k(theta_1) b_l(theta_2), with other c_kl in each cell.
 
     Planes, surfaces of revolution, translated curves and tensor-product splines are of this
-    kind. All partial derivatives at one place are one product of a matrix, which each cell
-    has, with the products of the functions.
+    kind. All partial derivatives at one point are one product of the cell's matrix with the
+    products of the functions.
 
     Attributes:
         coefficients: The c_kl of all cells, as given.
@@ -64,9 +64,9 @@ class ProductSurface(Surface):
         self.bases = (first, second)
 
     def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """All partial derivatives up to a total order, for set-up and figures."""
+        """Return all partial derivatives up to a total order, for set-up and figures."""
         rows = np.array(partial_orders(check_partial_order(order)))
-        values = self.checked(theta)
+        values = self.to_domain(theta)
         flat = values.reshape(-1, 2)
         out = np.empty((len(flat), len(rows), 3))
         for begin in range(0, len(flat), _CHUNK):
@@ -75,7 +75,7 @@ class ProductSurface(Surface):
         return out.reshape(*values.shape[:-1], len(rows), 3)
 
     def _partials(self, theta: np.ndarray, order: int) -> np.ndarray:
-        """Derivatives up to an order in each direction, [n, order + 1, order + 1, 3]."""
+        """Return derivatives up to an order in each direction, [n, order + 1, order + 1, 3]."""
         pieces, functions = [], []
         for k, basis in enumerate(self.bases):
             piece, values = basis.values(theta[:, k])
@@ -91,7 +91,7 @@ class ProductSurface(Surface):
         return both.reshape(n, order + 1, order + 1, 3).transpose(0, 2, 1, 3)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """Fast scalar form of `partials`, result flattened.
+        """Return a fast scalar form of `partials` with a flattened result.
 
         The matrix of a cell is made when it is first entered.
         """
@@ -143,7 +143,7 @@ def checked_product(surface: Surface) -> ProductSurface:
 def uniform_spline_surface(
     first: UniformKnots, second: UniformKnots, coefficients: np.ndarray
 ) -> ProductSurface:
-    """Spline surface of given B-spline coefficients.
+    """Return the spline surface of B-spline coefficients.
 
     Args:
         first: Knots of theta_1.
@@ -165,14 +165,14 @@ def interpolated_surface(
     degree: int,
     closed: tuple[bool, bool],
 ) -> ProductSurface:
-    """Spline surface through a grid of points at given parameters.
+    """Return a spline surface through a grid of points at prescribed parameters.
 
     Args:
         parameters: theta_1 [n_1] and theta_2 [n_2] of rows and columns, strictly increasing; of
             a closed direction with the end of the period last.
         points: [n_1, n_2, 3], m; the last row or column of a closed direction is the first.
         degree: Degree of the polynomials; an open direction needs more points than that.
-        closed: Which directions are periodic.
+        closed: Whether each direction is periodic.
 
     Returns:
         Surface of class C^(degree - 1).
@@ -185,7 +185,7 @@ def interpolated_surface(
 
 
 def _second_first(curve: PiecewisePolynomialCurve, count: int, dimension: int) -> np.ndarray:
-    """Polynomials of theta_1 as vectors that a spline of theta_2 takes on, [count, ...]."""
+    """Return polynomials of theta_1 as values of a spline of theta_2, [count, ...]."""
     pieces, terms, _ = curve.coefficients.shape
     table = curve.coefficients.reshape(pieces, terms, count, dimension)
     return np.moveaxis(table, 2, 0).reshape(count, -1)
@@ -194,7 +194,7 @@ def _second_first(curve: PiecewisePolynomialCurve, count: int, dimension: int) -
 def _assemble(
     first: PiecewisePolynomialCurve, second: PiecewisePolynomialCurve, dimension: int
 ) -> ProductSurface:
-    """Surface from polynomials of theta_1, and of theta_2 with the former as values."""
+    """Return the surface of polynomials of theta_1, and of theta_2 with the former as values."""
     degree = first.degree
     table = second.coefficients.reshape(
         *second.coefficients.shape[:2], *first.coefficients.shape[:2], dimension
@@ -206,7 +206,7 @@ def _assemble(
 
 
 def translated_surface(profile: Curve, rail: Curve) -> ProductSurface:
-    """Surface that a profile leaves when it is moved along a rail without turning.
+    """Return the surface swept by a profile along a rail without turning.
 
     sigma = profile(theta_1) + rail(theta_2).
 
@@ -232,7 +232,7 @@ def translated_surface(profile: Curve, rail: Curve) -> ProductSurface:
 
 
 def extruded_surface(profile: Curve, direction: ArrayLike, length: float) -> ProductSurface:
-    """Surface that a profile leaves when it is moved along a line; theta_2 is the way, m.
+    """Return the surface swept by a profile along a line; theta_2 is the distance, m.
 
     Args:
         profile: Curve in R^3, m.

@@ -14,7 +14,7 @@ _SAMPLES_PER_CELL = 4
 _FEWEST_SAMPLES, _MOST_SAMPLES = 32, 256
 # rad, which the normal may turn by from one sample to the next before more are taken, ...
 _FINE = 0.25
-# ... and from which on it is looked at whether it flips: on ever shorter ways it then ...
+# ... and above which it is checked for a flip: over ever shorter distances it then ...
 _FLIP = math.pi / 2.0
 # ... does not turn less than this.
 _STILL_TURNS = math.pi / 4.0
@@ -49,11 +49,11 @@ class SampleGrid:
         return np.stack(np.meshgrid(self.theta_1, self.theta_2, indexing="ij"), axis=-1)
 
     def spacing(self, axis: int) -> np.ndarray:
-        """Distances from samples to the next ones along a direction, m."""
+        """Return distances from samples to the next ones along a direction, m."""
         return np.asarray(np.linalg.norm(_differences(self.position, axis, self.closed), axis=-1))
 
     def turning(self, axis: int) -> np.ndarray:
-        """Angles between normals of samples and of the next ones along a direction, rad."""
+        """Return angles between normals of samples and of the next ones along a direction, rad."""
         chord = np.linalg.norm(_differences(self.normal, axis, self.closed), axis=-1)
         return np.asarray(2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord)))
 
@@ -70,12 +70,12 @@ def sample_grid(surface: Surface) -> SampleGrid:
 
     Raises:
         InputError: The surface is not regular (4.4), its normal flips, it does not close where it
-            should, or its size is not that of a surface for robots; says where.
+            should, or its size is unsuitable for robots; says where.
     """
     _refuse_open_seams(surface)
     counts = [_FEWEST_SAMPLES, _FEWEST_SAMPLES]
     while True:
-        grid = _sampled(surface, counts)
+        grid = _sample(surface, counts)
         turning = [float(grid.turning(axis).max()) for axis in (0, 1)]
         finer = [
             min(_MOST_SAMPLES, math.ceil(count * min(4.0, 1.2 * turn / _FINE)))
@@ -99,7 +99,7 @@ def check_regular(surface: Surface) -> None:
     sample_grid(surface)
 
 
-def _sampled(surface: Surface, counts: list[int]) -> SampleGrid:
+def _sample(surface: Surface, counts: list[int]) -> SampleGrid:
     theta_1, theta_2 = (
         surface.grid(_SAMPLES_PER_CELL, count)[axis] for axis, count in enumerate(counts)
     )
@@ -119,7 +119,7 @@ def _sampled(surface: Surface, counts: list[int]) -> SampleGrid:
 
 
 def _refuse_open_seams(surface: Surface) -> None:
-    """Position and tangents must be the same at both ends of a closed direction."""
+    """Refuse a closed direction with different position or tangents at its ends."""
     for axis in (0, 1):
         if not surface.closed[axis]:
             continue
@@ -151,7 +151,7 @@ def _refuse_sizes(grid: SampleGrid) -> None:
 
 
 def _refuse_flips(surface: Surface, grid: SampleGrid) -> None:
-    """Halve the ways on which the normal turns most, until it is clear that it flips there."""
+    """Refuse flips of the normal, found by halving the intervals in which it turns most."""
     for axis in (0, 1):
         turning = grid.turning(axis)
         suspects = np.argwhere(turning > _FLIP)[:_MOST_SUSPECTS]
@@ -177,7 +177,7 @@ def _refuse_flips(surface: Surface, grid: SampleGrid) -> None:
 
 
 def _steps(axis: int, width: np.ndarray) -> np.ndarray:
-    """No, one and two steps along a direction, [n, 3, 2]."""
+    """Return zero, one and two steps along a direction, [n, 3, 2]."""
     steps = np.zeros((len(width), 3, 2))
     steps[..., axis] = width[:, None] * np.arange(3)
     return steps
@@ -186,7 +186,7 @@ def _steps(axis: int, width: np.ndarray) -> np.ndarray:
 def _normals(surface: Surface, theta: np.ndarray) -> np.ndarray:
     _, first, second = np.moveaxis(surface.partials(theta, 1), -2, 0)
     cross = np.cross(first, second)
-    # Where the surface is not regular by chance a normal is missing, which is no flip.
+    # At an irregular point the normal is undefined, which is no flip.
     length = np.linalg.norm(cross, axis=-1, keepdims=True)
     return np.asarray(cross / np.where(length > 0.0, length, 1.0))
 
@@ -216,7 +216,7 @@ class SurfaceReport:
     Attributes:
         area: m^2.
         lengths: Longest of the lines along theta_1, and along theta_2, m.
-        lower_corner: Lower corner of the box along the world's axes that holds the samples, [3], m.
+        lower_corner: Lower corner of the samples' box along the world's axes, [3], m.
         upper_corner: Upper corner of that box, [3], m.
         radius_outside: Smallest radius of curvature on the side that e_perp points to, m: how
             far the feasible neighbourhood (4.13) reaches there; infinite where the surface does
@@ -271,7 +271,7 @@ def surface_report(surface: Surface) -> SurfaceReport:
 
 
 def _curvature(surface: Surface, theta: np.ndarray, side: float) -> np.ndarray:
-    """Largest curvature towards a side, 1 or -1, 1/m."""
+    """Return the largest curvature towards a side, 1 or -1, 1/m."""
     largest, smallest = fundamental_forms(surface, theta).principal_curvatures
     return np.asarray(largest if side > 0.0 else -smallest)
 
@@ -296,20 +296,20 @@ def _smallest_radius(surface: Surface, grid: SampleGrid, side: float) -> tuple[f
     # Rounding errors bend even a plane.
     if largest * extent < 1e-9:
         return np.inf, None
-    place = surface.wrap(best)
-    return 1.0 / largest, (float(place[0]), float(place[1]))
+    wrapped = surface.wrap(best)
+    return 1.0 / largest, (float(wrapped[0]), float(wrapped[1]))
 
 
 def _sizes(surface: Surface, grid: SampleGrid) -> tuple[float, tuple[float, float]]:
-    """Integral of sqrt(E G - F^2), and the largest ones of sqrt(E) and sqrt(G) along lines."""
+    """Return integrals of sqrt(E G - F^2), and the largest of sqrt(E) and sqrt(G) along lines."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    places, shares = [], []
+    sites, shares = [], []
     for k, values in enumerate((grid.theta_1, grid.theta_2)):
         ends = np.append(values, surface.domain[k].end) if surface.closed[k] else values
         half = 0.5 * np.diff(ends)
-        places.append((ends[:-1, None] + half[:, None] * (1.0 + nodes)).ravel())
+        sites.append((ends[:-1, None] + half[:, None] * (1.0 + nodes)).ravel())
         shares.append((half[:, None] * weights).ravel())
-    theta = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1)
+    theta = np.stack(np.meshgrid(*sites, indexing="ij"), axis=-1)
     _, first, second = np.moveaxis(surface.partials(theta, 1), -2, 0)
     density = np.linalg.norm(np.cross(first, second), axis=-1)
     along_1 = shares[0] @ np.linalg.norm(first, axis=-1)

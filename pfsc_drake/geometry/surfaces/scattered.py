@@ -1,4 +1,4 @@
-"""Surfaces fitted to scattered points, as people scan workpieces."""
+"""Surfaces fitted to scattered points, such as scans of workpieces."""
 
 import math
 from collections.abc import Callable
@@ -31,36 +31,36 @@ from pfsc_drake.geometry.surfaces.product import ProductSurface, uniform_spline_
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
 
 FEWEST_POINTS, MOST_POINTS = 50, 100_000
-# How far a place may be from the nearest point, over the distance at which points stand.
+# Largest distance to the nearest point, relative to the spacing of points.
 _REACH = 2.0
 # Spacings per knot interval, and the most coefficients.
 _SPACINGS, _MOST_COEFFICIENTS = 2.0, 2500.0
 _FEWEST_INTERVALS = 8
-# Least part of the rectangle around all points that is left of it.
+# Smallest remaining part of the rectangle around all points.
 _LEAST_PART = 0.25
 # Cosine of the largest angle between normals of the surface and of its base.
 _UPRIGHT = 0.15
 _ERROR_SAMPLES = 24
-# Standard error that is borne: so many times the noise, or spacings.
+# Largest tolerated standard error: multiples of the noise, or of the spacing.
 _NOISES, _ERROR_SPACINGS = 3.0, 0.02
 
 
 @dataclass(frozen=True)
 class ScatteredFitOptions:
-    """How a surface is fitted to scattered points.
+    """Options of a surface fit to scattered points.
 
     Attributes:
         smoothness: k of the class C^k, 2..6.
-        tolerance: Largest distance of a point from the surface, m: the smoothest surface is taken
-            that misses none by more, and it follows the noise no closer than it must. None: the
-            surface that predicts points best that it has not seen, judged by cross-validation.
-        base: Over which surface the points are seen, see `choose_base`.
+        tolerance: Largest distance of a point from the surface, m: the smoothest surface within it
+            is taken, which follows the noise no closer than necessary. None: the surface that
+            predicts left-out points best, by cross-validation.
+        base: Surface that the points are projected onto, see `choose_base`.
         seen_from: A point on the side that the normal points to, [3], m; by default upwards on
             a plane, and outward on a cylinder.
         along: Direction that theta_1 leans to, on a plane; by default the longer side.
-        largest_hole: Largest distance of a place on the surface from the nearest point, m; by
-            default twice the distance at which points stand, see `stand`.
-        trim: Keep the largest rectangle of the parameters that has no larger hole, instead of
+        largest_hole: Largest distance on the surface to the nearest point, m; by default twice the
+            spacing of points, see `stand`.
+        trim: Use the largest rectangle of the parameters that has no larger hole, instead of
             refusing.
     """
 
@@ -75,20 +75,20 @@ class ScatteredFitOptions:
 
 @dataclass(frozen=True)
 class SurfaceFit:
-    """A surface fitted to points, and how well.
+    """Surface fitted to points, and the quality of the fit.
 
     Attributes:
         surface: The surface, its parameters being lengths on the base, m.
-        points: The points it is fitted to, those of the rectangle kept, [n, 3], m.
-        residuals: Where they stand relative to the surface.
-        base: What the points were projected on, for people.
-        spacing: Distance at which points stand, m.
-        hole: Largest distance of a place on the surface from the nearest point, m.
-        hole_at: That place, [3], m.
-        noise: Standard deviation of the points' noise along the normal as estimated from the
-            residuals and the number of parameters that the fit has used up, m.
-        uncertainty: Largest standard error of the surface along the base's normal that such
-            noise and holes explain, m; a tolerance may cost more.
+        points: The fitted points, within the selected rectangle, [n, 3], m.
+        residuals: Their positions relative to the surface.
+        base: Name of the base that the points were projected onto.
+        spacing: Spacing of the points, m.
+        hole: Largest distance on the surface to the nearest point, m.
+        hole_at: Centre of that hole, [3], m.
+        noise: Standard deviation of the points' noise along the normal, estimated from the
+            residuals and the effective number of parameters of the fit, m.
+        uncertainty: Largest standard error of the surface along the base's normal due to noise and
+            holes, m; a tolerance may increase it.
     """
 
     surface: ProductSurface
@@ -107,18 +107,18 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
 
     The points are projected on a plane, or on a cylinder where they bend over; their heights over
     it are smoothed by a `PenalizedSpline`, with weights that make residuals distances along the
-    normal of the surface instead of that of the base.
+    normal of the surface instead of the base's.
 
     Args:
         points: [n, 3], m, 50 to 100,000 different ones, in any order.
-        options: How it is smoothed, and what is allowed.
+        options: Smoothing and limits.
 
     Returns:
         The surface and its residuals.
 
     Raises:
         InputError: Points that cannot be used, that fold over in every base, leave holes,
-            stand off from the others or scatter by more than the tolerance.
+            lie off the others or scatter by more than the tolerance.
     """
     options = options or ScatteredFitOptions()
     check_smoothness(options.smoothness)
@@ -127,8 +127,8 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     _check_length("largest_hole", options.largest_hole)
     near = neighbourhoods(cloud)
     base = choose_base(cloud, near, options.base, options.seen_from, options.along)
-    kept, domain, (centre, hole) = _covered(cloud, base, options)
-    cloud = cloud[kept]
+    selected, domain, (centre, hole) = _select(cloud, base, options)
+    cloud = cloud[selected]
     theta = base.parameters(cloud)
     knots = _knots(domain, near.spacing, options.smoothness + 1, base.closed)
     spline = PenalizedSpline(theta, base.heights(cloud), *knots)
@@ -201,10 +201,10 @@ def check_cloud(points: ArrayLike) -> np.ndarray:
     return cloud
 
 
-def _covered(
+def _select(
     points: np.ndarray, base: Base, options: ScatteredFitOptions
 ) -> tuple[np.ndarray, tuple[Interval, Interval], tuple[np.ndarray, float]]:
-    """Which points are kept, the rectangle of parameters, and its largest hole, see `Coverage`."""
+    """Return the selected points, the rectangle of parameters, and its hole, see `Coverage`."""
     theta = base.parameters(points)
     low, high = theta.min(axis=0), theta.max(axis=0)
     domain = (Interval(*_floats(low[0], high[0])), Interval(*_floats(low[1], high[1])))
@@ -225,27 +225,27 @@ def _covered(
             f" {domain[1].length:.3g} m; at most {reach:.3g} m are allowed (largest_hole): scan"
             " the place, or trim the patch"
         )
-    part = coverage.covered(reach, domain, base.closed[0])
+    part = coverage.covered_rectangle(reach, domain, base.closed[0])
     if part is None or part[0].length * part[1].length < _LEAST_PART * area:
         raise InputError(
             f"surface points: holes of up to {radius:.3g} m leave no rectangle of a quarter of"
             f" the patch; at most {reach:.3g} m are allowed (largest_hole)"
         )
     inside = [(theta[:, k] >= part[k].begin) & (theta[:, k] <= part[k].end) for k in (0, 1)]
-    kept = inside[0] & inside[1]
-    if np.count_nonzero(kept) < FEWEST_POINTS:
+    selected = inside[0] & inside[1]
+    if np.count_nonzero(selected) < FEWEST_POINTS:
         raise InputError(
-            f"surface points: {np.count_nonzero(kept)} are left in the covered rectangle;"
+            f"surface points: {np.count_nonzero(selected)} are left in the covered rectangle;"
             f" at least {FEWEST_POINTS} are required"
         )
     hole = cover(theta, part, reach, closed=base.closed[0]).hole
-    return kept, part, hole
+    return selected, part, hole
 
 
 def _knots(
     domain: tuple[Interval, Interval], spacing: float, degree: int, closed: tuple[bool, bool]
 ) -> tuple[UniformKnots, UniformKnots]:
-    """Knots so near to each other that the penalty alone says how smooth the surface is."""
+    """Return knots so dense that the penalty alone determines the smoothness."""
     sides = [side.length for side in domain]
     step = max(_SPACINGS * spacing, math.sqrt(sides[0] * sides[1] / _MOST_COEFFICIENTS))
     first, second = (
@@ -256,7 +256,7 @@ def _knots(
 
 
 def _slopes(surface: ProductSurface, theta: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Cosines of angles between the surface's normals and directions [n, 3], [n]."""
+    """Return cosines of angles between the surface's normals and directions [n, 3], [n]."""
     first, second = np.moveaxis(surface.partials(theta, 1)[:, 1:], 1, 0)
     normals = np.cross(first, second)
     return np.abs(np.sum(normals * directions, axis=1)) / np.linalg.norm(normals, axis=1)
@@ -270,7 +270,7 @@ def _uncertainty(
     tolerance: float | None,
     estimate: Callable[[], ProductSurface],
 ) -> float:
-    """Largest standard error of heights; refuses what the points leave open."""
+    """Return the largest standard error of heights; refuse undetermined surfaces."""
     sides = [np.linspace(knots.begin, knots.end, _ERROR_SAMPLES) for knots in spline.knots]
     theta = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
     errors = noise * spline.standard_errors(theta, exponent)
@@ -291,7 +291,7 @@ def _uncertainty(
 
 
 def _check_upright(surface: ProductSurface, base: Base) -> None:
-    """Refuse a surface that is not regular, or nearly falls over its base."""
+    """Refuse a surface that is not regular, or nearly perpendicular to its base."""
     grid = sample_grid(surface)
     normals = base.normals(grid.position.reshape(-1, 3))
     cosines = np.sum(grid.normal.reshape(-1, 3) * normals, axis=1)

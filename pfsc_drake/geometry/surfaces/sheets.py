@@ -1,4 +1,4 @@
-"""Whether a surface meets itself."""
+"""Check of a surface for self-intersections."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -8,14 +8,14 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
 
-# Samples of one direction that are looked at, and steps between two that are neighbours.
+# Samples in one direction, and largest number of steps between neighbours.
 _MOST_SAMPLES = 96
 _NEIGHBOURS = 3
 _MOST_PAIRS = 2_000
 _ITERATIONS = 12
-# Of the surface's extent: places at this distance are the same.
+# Of the surface's extent: points at this distance are the same.
 _SAME = 1e-9
-# Of the steps between two samples: places that came nearer to each other are no crossing.
+# Of the steps between two samples: points closer to each other than that are no crossing.
 _APART = 1.5
 
 
@@ -23,7 +23,7 @@ def check_single_sheet(surface: Surface) -> None:
     """Check that a surface does not meet itself: no crossings, and nothing covered twice.
 
     Samples that are near to each other, but far in the parameters, are moved until they meet
-    (Newton's method). What is smaller than the samples, see `sample_grid`, may be overlooked.
+    (Newton's method). Details below the spacing of samples, see `sample_grid`, may be overlooked.
 
     Args:
         surface: Surface of class C^1.
@@ -54,15 +54,15 @@ def _meeting(surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
     for _ in range(_ITERATIONS):
         here, there = surface.partials(one, 1), surface.partials(other, 1)
         slopes = np.concatenate([here[:, 1:], -there[:, 1:]], axis=1).transpose(0, 2, 1)
-        # In shares of the domain, so that the least change means something.
+        # In shares of the domain, so that the least change is well defined.
         slopes = slopes * np.tile(lengths, 2)
         gap = here[:, 0] - there[:, 0]
         move = -(np.linalg.pinv(slopes, rcond=1e-9) @ gap[..., None])[..., 0]
         move /= np.maximum(1.0, np.abs(move).max(axis=1, keepdims=True) / 0.1)
         one, other = one + move[:, :2] * lengths, other + move[:, 2:] * lengths
         one, other = (
-            np.where(closed, place, np.clip(place, begin, begin + lengths))
-            for place in (one, other)
+            np.where(closed, theta, np.clip(theta, begin, begin + lengths))
+            for theta in (one, other)
         )
     gap = np.linalg.norm(surface.partials(one, 0) - surface.partials(other, 0), axis=-1)[:, 0]
     apart = np.abs(one - other) / lengths
@@ -72,7 +72,7 @@ def _meeting(surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _suspects(grid: SampleGrid, strides: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Parameters of near samples that are no neighbours, each [n, 2], and steps of samples [2]."""
+    """Return parameters of near samples that are no neighbours, each [n, 2], and steps [2]."""
     part = (slice(None, None, strides[0]), slice(None, None, strides[1]))
     position, theta = grid.position[part], grid.theta[part]
     shape = np.array(position.shape[:2])
@@ -89,33 +89,33 @@ def _suspects(grid: SampleGrid, strides: list[int]) -> tuple[np.ndarray, np.ndar
     )
     far = (apart.max(axis=0) > _NEIGHBOURS) & (one < other)
     one, other = one[far], other[far]
-    # Neighbours are as far apart on the surface as in space, and would crowd out what meets.
-    way = _ways(position, grid.closed, one, other)
-    ratio = np.linalg.norm(points[one] - points[other], axis=1) / way
+    # Neighbours are as far apart on the surface as in space, and would crowd out crossings.
+    distance = _path_lengths(position, grid.closed, one, other)
+    ratio = np.linalg.norm(points[one] - points[other], axis=1) / distance
     nearest = np.argsort(ratio, kind="stable")[:_MOST_PAIRS]
     flat = theta.reshape(-1, 2)
     return flat[one[nearest]], flat[other[nearest]], 1.0 / shape
 
 
-def _ways(
+def _path_lengths(
     position: np.ndarray, closed: tuple[bool, bool], one: np.ndarray, other: np.ndarray
 ) -> np.ndarray:
-    """Lengths of ways on the surface between samples, first along theta_1, [n]."""
+    """Return lengths of paths on the surface between samples, first along theta_1, [n]."""
     shape = position.shape[:2]
     begin, end = np.unravel_index(one, shape), np.unravel_index(other, shape)
     corner = (end[0], begin[1])
     total = np.zeros(len(one))
     for axis, (here, there) in enumerate(((begin, corner), (corner, end))):
         steps = np.linalg.norm(np.roll(position, -1, axis=axis) - position, axis=-1)
-        lap = steps.sum(axis=axis)[here[1 - axis]]
+        revolution = steps.sum(axis=axis)[here[1 - axis]]
         sums = np.cumsum(steps, axis=axis) - steps
         length = np.abs(sums[here] - sums[there])
-        total += np.minimum(length, lap - length) if closed[axis] else length
+        total += np.minimum(length, revolution - length) if closed[axis] else length
     return total
 
 
 def _cell_sizes(position: np.ndarray, closed: tuple[bool, bool]) -> np.ndarray:
-    """Longest way from each sample to one of its four neighbours, [n_1, n_2]."""
+    """Return the longest distance from each sample to its four neighbours, [n_1, n_2]."""
     size = np.zeros(position.shape[:2])
     for axis in (0, 1):
         step = np.linalg.norm(np.roll(position, -1, axis=axis) - position, axis=-1)

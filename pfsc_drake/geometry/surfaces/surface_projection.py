@@ -1,4 +1,4 @@
-"""Orthogonal projection onto a surface (4.9), and where its iteration starts."""
+"""Orthogonal projection onto a surface (4.9), and its initial guess."""
 
 import math
 from collections.abc import Sequence
@@ -11,13 +11,13 @@ from scipy.ndimage import minimum_filter
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.foot import FootFinder
+from pfsc_drake.geometry.closest_point import ClosestPointFinder
 from pfsc_drake.geometry.surfaces.extended import SurfaceTable
 from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
 
 _MAX_STARTS = 8
-# Of the domain: feet that are nearer to each other are one.
+# Of the domain: closest points that are nearer to each other are one.
 _SAME = 1e-4
 # Another sheet at less than this times the distance makes the start ambiguous.
 _NEARLY_AS_NEAR = 1.1
@@ -28,7 +28,7 @@ class SurfaceProjection(NamedTuple):
 
     Attributes:
         theta: Parameters of the closest point, unwrapped in closed directions.
-        distance: Distance of the point from there, m.
+        distance: Distance of the point from the surface, m.
         alpha: Distance over the smallest radius of curvature towards the point; it lies in the
             feasible neighbourhood if alpha < 1, which is (4.13).
         at_border: True if the point lies beyond an end of an open direction; theta is then the
@@ -58,8 +58,8 @@ class GlobalProjector:
         self._project = SurfaceProjector(surface).project
         self._surface = surface
 
-    def feet(self, point: ArrayLike) -> list[SurfaceProjection]:
-        """Local minima of the distance, the nearest first, those that did not converge last.
+    def closest_points(self, point: ArrayLike) -> list[SurfaceProjection]:
+        """Return local minima of the distance, the nearest first, without convergence last.
 
         Args:
             point: y_t, finite, [3], m.
@@ -81,10 +81,12 @@ class GlobalProjector:
             result = result._replace(theta=(float(wrapped[0]), float(wrapped[1])))
             if not any(self._same(result, other) for other in found):
                 found.append(result)
-        return sorted(found, key=lambda foot: (not foot.converged, foot.distance))
+        return sorted(
+            found, key=lambda closest_point: (not closest_point.converged, closest_point.distance)
+        )
 
     def project(self, point: ArrayLike) -> SurfaceProjection:
-        """The closest point, refused where it is not clear which.
+        """Return the closest point, if it is unambiguous.
 
         Args:
             point: y_t, [3], m.
@@ -93,14 +95,14 @@ class GlobalProjector:
             The projection, theta in the domain.
 
         Raises:
-            InputError: The point is not three finite numbers, is equally far from many places, as
+            InputError: The point is not three finite numbers, is equally far from many points, as
                 the axis of a cylinder is, or nearly as near to another sheet.
         """
         y = np.asarray(point, dtype=float)
         if y.shape != (3,) or not np.all(np.isfinite(y)):
             raise InputError(f"point: {y.tolist()}; 3 finite numbers, in m, are required")
         where = f"point [{', '.join(f'{value:.6g}' for value in y)}] m"
-        best, *others = self.feet(y)
+        best, *others = self.closest_points(y)
         if not (best.converged and (best.alpha < 1.0 or best.at_border)):
             raise InputError(
                 f"{where}: no closest point on the surface, it is {best.distance:.6g} m away, which"
@@ -132,7 +134,7 @@ LONGEST_STEP = 1.0 / 16.0
 
 
 class SurfaceProjector:
-    """Closest point of a surface near a guess, see `FootFinder`, for numbers.
+    """Closest point of a surface near a guess, see `ClosestPointFinder`, for numbers.
 
     Args:
         surface: Surface of class C^2, see `SurfaceTable` for the kinds.
@@ -140,23 +142,29 @@ class SurfaceProjector:
 
     def __init__(self, surface: Surface) -> None:
         table = SurfaceTable(surface)
-        finder = FootFinder(
+        finder = ClosestPointFinder(
             lambda theta: table(theta, 2), surface.domain, surface.closed, LONGEST_STEP
         )
         y, guess = ca.MX.sym("y", 3), ca.MX.sym("guess", 2)
-        foot = finder.find(y, guess)
-        values = ca.vertcat(foot.theta, foot.distance, foot.alpha, foot.beyond_end, foot.converged)
+        closest_point = finder.find(y, guess)
+        values = ca.vertcat(
+            closest_point.theta,
+            closest_point.distance,
+            closest_point.alpha,
+            closest_point.beyond_end,
+            closest_point.converged,
+        )
         function = ca.Function("project", [y, guess], [values], ["y", "guess"], ["foot"])
         self._function = BoundFunction(function)
 
     def project(
         self, point: Sequence[float], theta_guess: tuple[float, float]
     ) -> SurfaceProjection:
-        """Closest point near the guess.
+        """Return the closest point near the guess.
 
         Args:
             point: y_t, [3], m.
-            theta_guess: Unwrapped parameters to start from, as a rule the last result.
+            theta_guess: Initial unwrapped parameters, usually the last result.
 
         Returns:
             The projection; `converged` is False, alpha NaN and nothing raised if the point or the

@@ -86,10 +86,10 @@ class DeltaMasses(Parameters):
     """Masses of the moving parts.
 
     Attributes:
-        slide: m_s,i of each slide with what moves along with it [kg].
+        slide: m_s,i of each slide with all parts that move with it [kg].
         rod_pair: m_p of the two rods of an arm [kg].
         plate: m_e of the end-effector plate [kg].
-        load: m_l of what the plate carries [kg].
+        load: m_l of the load on the plate [kg].
     """
 
     slide: Positive = field(default=1.0, metadata=REQUIRED)
@@ -146,7 +146,7 @@ class DeltaDrives(Parameters):
 
 @dataclass
 class DeltaWorkspace(Parameters):
-    """How far the robot keeps from singular configurations.
+    """Distance of the workspace from singular configurations.
 
     Attributes:
         min_rod_independence: smallest allowed singular value of the matrix of the three unit rod
@@ -195,7 +195,7 @@ class DeltaParameters(Parameters):
 
 
 def load_delta_parameters(robot: str | Path = "festo_expt_45") -> DeltaParameters:
-    """Returns the parameters of a DELTA robot.
+    """Return the parameters of a DELTA robot.
 
     Args:
         robot: the name of a shipped robot (``"festo_expt_45"``) or the path of a YAML file.

@@ -1,4 +1,4 @@
-"""The DELTA robot with linear drives, as the control laws see it, and as it is believed."""
+"""The DELTA robot with linear drives as a model for control laws, and its nominal model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from pfsc_drake.robot.robot_model import RobotModel, bias_torque
 class DeltaRobot(RobotModel):
     """Kinematics and dynamics (2.72) of the DELTA robot, rigid and without friction.
 
-    A :class:`~pfsc_drake.robot.robot_model.RobotModel`, so that the laws serve it.
+    A :class:`~pfsc_drake.robot.robot_model.RobotModel`, so that all laws apply.
 
     Coordinates are the slide positions q [m], from the base plate towards P. The
     end-effector only translates. All vectors are in axes of the inertial frame, whose z_0
@@ -91,7 +91,7 @@ class DeltaRobot(RobotModel):
     def inverse_dynamics(self, q: Sequence[Jet]) -> list[Jet]:
         """Return ``D(q) q'' + C(q, q') q' + g(q)`` of (2.72), without friction.
 
-        Newton's law for each mass, with the end-effector's force carried over by the rods::
+        Newton's law for each mass, with the end-effector's force transmitted by the rods::
 
             tau = D_q q'' + g_q + J_D^T m_y (y_t'' - gravity),   g_q,i = m_q gravity . c_i
 
@@ -103,10 +103,12 @@ class DeltaRobot(RobotModel):
         """
         masses, motion = self.parameters.masses, self._motion(q)
         acceleration = motion.y_t.differentiate().differentiate()
-        carried = motion.slide_forces((acceleration - self.gravity) * masses.effective_plate)
+        load_forces = motion.slide_forces((acceleration - self.gravity) * masses.effective_plate)
         weight = masses.effective_slide * (self.parameters.geometry.rails @ self.gravity)
         return [
-            q_i.differentiate().differentiate() * masses.effective_slide + weight[i] + carried[i]
+            q_i.differentiate().differentiate() * masses.effective_slide
+            + weight[i]
+            + load_forces[i]
             for i, q_i in enumerate(q)
         ]
 
@@ -160,7 +162,7 @@ class DeltaRobot(RobotModel):
 
         Args:
             y_t: End-effector position [m], shape (3,).
-            name: What the point is, for the message.
+            name: Name of the point in the message.
 
         Raises:
             InputError: If the point is outside the workspace; the message names the limit.
@@ -177,18 +179,18 @@ class DeltaRobot(RobotModel):
         return ca.Function("delta", [q], [motion.y_t.coefficients[0], motion.jacobian()])
 
 
-def believed_delta(robot: DeltaRobot, error: ModelError) -> DeltaRobot:
-    """Return what is believed of a DELTA robot.
+def nominal_delta(robot: DeltaRobot, error: ModelError) -> DeltaRobot:
+    """Return the nominal model of a DELTA robot.
 
-    Its three kinds of links are slides, rods and end-effector with load; the lengths that belong
-    to them are ``l_A``, ``l_BC`` and ``l_EC``.
+    Its three kinds of links are slides, rods and end-effector with load; their lengths are
+    ``l_A``, ``l_BC`` and ``l_EC``.
 
     Args:
-        robot: The true one.
-        error: By how much it is off, N = 3.
+        robot: The actual robot.
+        error: Errors of the model, N = 3.
 
     Raises:
-        InputError: If the robot cannot be like that, or has nothing that could be.
+        InputError: If an error does not apply to the robot, or its value is impossible.
     """
     if np.any(error.joint_offset):
         raise InputError(

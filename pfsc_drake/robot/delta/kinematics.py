@@ -80,11 +80,11 @@ class RodMotion:
     def slide_forces(self, force: Jet) -> list[Jet]:
         """Return ``J_D^T force``, the end-effector's force as slide forces.
 
-        The rods carry it: ``W^T lambda = force`` is solved order by order, always with
+        The rods transmit it: ``W^T lambda = force`` is solved order by order, always with
         the inverse of order 0, and ``J_D^T force = -P lambda``.
 
         Args:
-            force: At the end-effector [N], vector jet of some order up to r.
+            force: Force at the end-effector [N], vector jet of some order up to r.
 
         Returns:
             Three scalar jets of the same order [N].
@@ -96,8 +96,8 @@ class RodMotion:
                     remaining = remaining - w.coefficients[j] * solution[k - j][i]
             solution.append(self.W_inverse.T @ remaining)
         rails = self.geometry.rails
-        carried = [Jet([s[i] for s in solution]) for i in range(NUM_ARMS)]
-        return [-jets.dot(w, rails[i]) * carried[i] for i, w in enumerate(self.rods)]
+        rod_forces = [Jet([s[i] for s in solution]) for i in range(NUM_ARMS)]
+        return [-jets.dot(w, rails[i]) * rod_forces[i] for i, w in enumerate(self.rods)]
 
 
 def rod_motion(geometry: DeltaGeometry, q: Sequence[Jet]) -> RodMotion:
@@ -178,7 +178,7 @@ def joint_coordinates(
     Args:
         parameters: The robot.
         y_t: End-effector position [m], shape (3,), axes of the inertial frame (z_0 down).
-        name: What the point is, for the message.
+        name: Name of the point in the message.
 
     Returns:
         Shape (3,) [m], inside the travel of the slides.
@@ -190,7 +190,7 @@ def joint_coordinates(
     if y_t.shape != (3,) or not np.all(np.isfinite(y_t)):
         raise InputError(f"{name}: {y_t.tolist()}; must be 3 finite numbers [m]")
     geometry, drives = parameters.geometry, parameters.drives
-    # from 0 + offset, the slide's place at q = 0, to the end-effector
+    # from 0 + offset, the slide's position at q = 0, to the end-effector
     reach = y_t - geometry.offsets
     half_c1 = np.sum(reach * geometry.rails, axis=1)
     c_0 = np.sum(reach**2, axis=1) - geometry.l_BC**2

@@ -20,7 +20,7 @@ from pfsc_drake.robot.delta.delta_parameters import DeltaParameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.shapes import BASE, PLATE, robot_parts, slide_origins
 
-# radius of the ball whose inertia stands for each body's; nothing turns, so that it has no effect
+# radius of the ball whose inertia replaces each body's; no body turns, so that it has no effect
 _BODY_RADIUS = 0.05
 
 

@@ -1,6 +1,6 @@
-"""What a DELTA robot with linear drives looks like; dimensions have no meaning beyond being seen.
+"""Visual shapes of a DELTA robot with linear drives; their dimensions are for display only.
 
-Every part stands in axes of the inertial frame (z_0 down) and moves with one of the carriers:
+Every part is given in axes of the inertial frame (z_0 down) and moves with one of the carriers:
 the base, a slide's joint point B_i, or the end-effector's centre E.
 """
 

@@ -38,7 +38,7 @@ def add_actuators(
         effort_limits: Effort limits [Nm or N] of joints by name, in place of the model's.
 
     Returns:
-        The actuators that were added, base first; those that were there stay as they are.
+        The actuators that were added, base first; existing ones are unchanged.
 
     Raises:
         InputError: If the plant is finalized, the model cannot be read, a named joint cannot be
@@ -50,11 +50,11 @@ def add_actuators(
     models = read_with_inclusions(file, packages_for(file, read_model_xml(file).content, {}))
     facts, drivable = inspect_model(models), drivable_joints(plant)
     if joints is None:
-        wanted = _joint_names(models) - facts.mimics.keys()
+        names = _joint_names(models) - facts.mimics.keys()
     else:
-        wanted = set(joints)
-        _require_known("joints", wanted, drivable)
-    chosen = [joint for joint in drivable if joint.name() in wanted]
+        names = set(joints)
+        _require_known("joints", names, drivable)
+    chosen = [joint for joint in drivable if joint.name() in names]
     limits = effort_limits or {}
     _require_known("effort_limits", limits, (j for j in chosen if actuator_of(plant, j) is None))
     for name, limit in limits.items():
@@ -63,7 +63,7 @@ def add_actuators(
 
 
 def _require_known(key: str, names: Iterable[str], joints: Iterable[Joint]) -> None:
-    """Refuse names that are not among those of joints."""
+    """Refuse names that are not names of joints."""
     known = [joint.name() for joint in joints]
     for name in names:
         hint = suggestion(name, known)

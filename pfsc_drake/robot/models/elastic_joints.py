@@ -17,8 +17,8 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import (
     actuator_of,
     moving_joints,
+    remove_joint,
     sprung_joints,
-    take_joint,
 )
 from pfsc_drake.robot.models.model_parts import LARGEST
 from pfsc_drake.yaml.fields import spread
@@ -33,11 +33,11 @@ def _nothing() -> np.ndarray:
 
 @dataclass(frozen=True)
 class ElasticJoints:
-    """What the joints of a model become; one value for all, or one for each, base first.
+    """Elasticity of a model's joints; one value for all, or one for each, base first.
 
     Attributes:
-        stiffness: Diagonal of ``K_s`` [Nm/rad or N/m]; infinite where a joint stays rigid;
-            empty if all do.
+        stiffness: Diagonal of ``K_s`` [Nm/rad or N/m]; infinite for a rigid joint; empty if all
+            are.
         damping: Diagonal of ``K_d`` [Nm s/rad or N s/m]; empty for none.
         rotor_inertia: Rotor inertia of the drives, at the motor side [kg m^2; kg for slides];
             empty for the model's.
@@ -70,7 +70,7 @@ class ElasticJoints:
 
     @property
     def is_given(self) -> bool:
-        """Whether anything is to change."""
+        """Whether any parameter is set."""
         return any(np.size(getattr(self, f.name)) for f in fields(self))
 
 
@@ -78,12 +78,12 @@ def make_elastic(plant: MultibodyPlant, parameters: ElasticJoints) -> None:
     """Replace joints by motor joint, massless rotor body and coaxial sprung joint.
 
     The motor joint keeps name, limits, damping and drive; the sprung joint and the rotor body are
-    named ``<joint>_flex`` and ``<joint>_rotor``. The position of the motor joint is ``q_M``, that
-    of the sprung joint ``q_J - q_M``.
+    named ``<joint>_flex`` and ``<joint>_rotor``. The position of the motor joint is ``q_M``, the
+    position of the sprung joint ``q_J - q_M``.
 
     Args:
         plant: A plant that is not finalized, all of whose moving joints are driven.
-        parameters: What they become.
+        parameters: Elasticity of the joints.
 
     Raises:
         InputError: If the model is elastic already, or the numbers do not fit it.
@@ -117,17 +117,17 @@ def make_elastic(plant: MultibodyPlant, parameters: ElasticJoints) -> None:
                 f"elastic.rotor_inertia: joint '{names[i]}' has none; "
                 "allowed: positive numbers for elastic joints"
             )
-        taken = take_joint(plant, joint)
+        record = remove_joint(plant, joint)
         rotor = plant.AddRigidBody(
-            f"{names[i]}_rotor", taken.frame_on_child.model_instance(), SpatialInertia.Zero()
+            f"{names[i]}_rotor", record.frame_on_child.model_instance(), SpatialInertia.Zero()
         )
-        taken.put(plant, taken.frame_on_parent, rotor.body_frame())
+        record.add_to(plant, record.frame_on_parent, rotor.body_frame())
         flex = plant.AddJoint(
-            taken.kind(
+            record.kind(
                 f"{names[i]}_flex",
                 rotor.body_frame(),
-                taken.frame_on_child,
-                taken.axis,
+                record.frame_on_child,
+                record.axis,
                 damping=damping[i],
             )
         )
@@ -136,7 +136,7 @@ def make_elastic(plant: MultibodyPlant, parameters: ElasticJoints) -> None:
 
 
 def add_springs(plant: MultibodyPlant, springs: Iterable[tuple[Joint, float]]) -> None:
-    """Add springs, which rest at zero; joints cannot be taken out of the plant any more.
+    """Add springs, which rest at zero; joints cannot be removed from the plant afterwards.
 
     Args:
         plant: A plant that is not finalized.
@@ -148,7 +148,7 @@ def add_springs(plant: MultibodyPlant, springs: Iterable[tuple[Joint, float]]) -
 
 
 def set_joint_damping(plant: MultibodyPlant, damping: list[float]) -> None:
-    """Give the sprung joints another damping than the model's.
+    """Set the damping of the sprung joints.
 
     Args:
         plant: A plant that is not finalized.
@@ -171,14 +171,14 @@ def set_joint_damping(plant: MultibodyPlant, damping: list[float]) -> None:
 
 def _for_each(values: np.ndarray, key: str, names: list[str], default: float) -> np.ndarray:
     """Return one value for each joint."""
-    given = np.atleast_1d(values)
-    if given.size == 0:
+    entries = np.atleast_1d(values)
+    if entries.size == 0:
         return np.full(len(names), default)
-    if given.size == 1:
-        return np.full(len(names), given[0])
-    if given.size != len(names):
+    if entries.size == 1:
+        return np.full(len(names), entries[0])
+    if entries.size != len(names):
         raise InputError(
-            f"elastic.{key}: {given.size} values; allowed: one, or one for each of "
+            f"elastic.{key}: {entries.size} values; allowed: one, or one for each of "
             f"{', '.join(names)}"
         )
-    return given
+    return entries

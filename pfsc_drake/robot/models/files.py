@@ -1,4 +1,4 @@
-"""Files of robot models: shipped ones, what a file includes, packages that it names."""
+"""Files of robot models: shipped ones, included files, and packages that they refer to."""
 
 import os
 import re
@@ -16,13 +16,13 @@ _PACKAGE_URI = f"package://{PACKAGE_NAME}/"
 
 
 def models_directory() -> Path:
-    """Returns the directory of the shipped models, which holds the Drake package ``pfsc_models``.
+    """Return the directory of the shipped models, which contains the package ``pfsc_models``.
 
-    A wheel carries the models inside the package; a clone, and so an editable installation, has
+    A wheel has the models inside the package; a clone, and so an editable installation, has
     them next to it.
 
     Raises:
-        InputError: if the models are in neither place.
+        InputError: if the models are in neither directory.
     """
     package = Path(__file__).resolve().parents[2]
     for directory in (package / "models", package.parent / "models"):
@@ -32,17 +32,17 @@ def models_directory() -> Path:
 
 
 def add_models_to(package_map: PackageMap) -> None:
-    """Makes ``package://pfsc_models/...`` known to a parser; does nothing if it is already.
+    """Register ``package://pfsc_models/...`` with a parser, unless it is registered already.
 
     Args:
-        package_map: of the ``Parser`` that is to read the models (``parser.package_map()``).
+        package_map: map of the ``Parser`` that reads the models (``parser.package_map()``).
     """
     if not package_map.Contains(PACKAGE_NAME):
         package_map.Add(PACKAGE_NAME, models_directory())
 
 
 def resolve_model(name_or_path: str | Path) -> Path:
-    """Returns the file of a robot model.
+    """Return the file of a robot model.
 
     Args:
         name_or_path: the name of a shipped model (``"comau_racer_1_4_elastic"``), an address
@@ -65,7 +65,7 @@ def resolve_model(name_or_path: str | Path) -> Path:
         path = shipped[text]
     try:
         exists = path.exists()
-    except OSError:  # a name that no file system takes
+    except OSError:  # an invalid file name
         exists = False
     if not exists:
         raise InputError(f"robot model {text!r}: no such file{nearest_file(path)}")
@@ -76,13 +76,13 @@ MOST_INCLUSIONS = 1000
 
 
 def read_with_inclusions(file: Path, packages: PackageMap) -> list[ModelXml]:
-    """Read a model and all that it includes (``<include>`` of SDF and MJCF).
+    """Read a model and all included files (``<include>`` of SDF and MJCF).
 
-    What cannot be found is left to the parser.
+    Missing files are left to the parser.
 
     Args:
         file: The model.
-        packages: Where ``package://`` and ``model://`` lead.
+        packages: Folders of ``package://`` and ``model://``.
 
     Returns:
         The files, each once, the model itself first.
@@ -106,7 +106,7 @@ def read_with_inclusions(file: Path, packages: PackageMap) -> list[ModelXml]:
             inclusions += 1
             if target in (*above, path):
                 raise InputError(
-                    f"{model.place(element)}: includes {target}, which includes itself; "
+                    f"{model.location(element)}: includes {target}, which includes itself; "
                     "allowed: inclusions that end"
                 )
             if inclusions > MOST_INCLUSIONS:
@@ -127,8 +127,8 @@ def _target(element: Element, including: Path, packages: PackageMap) -> Path | N
     address = element.attributes.get("file", "") if uri is None else uri.text.strip()
     target = _local(address, including.parent, packages)
     if target is not None and target.is_dir():
-        target = _described(target)
-    # what is there but is no regular file is refused when it is read
+        target = _described_model(target)
+    # an existing target that is no regular file is refused when it is read
     return target.resolve() if target is not None and target.exists() else None
 
 
@@ -144,7 +144,7 @@ def _local(address: str, folder: Path, packages: PackageMap) -> Path | None:
     return None
 
 
-def _described(folder: Path) -> Path | None:
+def _described_model(folder: Path) -> Path | None:
     """Return the model file that a folder's ``model.config`` names last, its newest version."""
     config = folder / "model.config"
     if not config.is_file():
@@ -156,33 +156,33 @@ def _described(folder: Path) -> Path | None:
 _ADDRESS = re.compile(rb"(?:package|model)://([^/\s\"'<>]+)")
 
 
-def packages_for(file: Path, content: bytes, given: Mapping[str, Path]) -> PackageMap:
+def packages_for(file: Path, content: bytes, folders: Mapping[str, Path]) -> PackageMap:
     """Return the packages that a model may refer to.
 
-    In this order: those given; the shipped models; folders above the model that hold a
+    In this order: ``folders``; the shipped models; folders above the model with a
     ``package.xml``, and their neighbours of the names that the model refers to;
     ``ROS_PACKAGE_PATH``.
 
     Args:
         file: The model.
-        content: What it holds.
-        given: Folders by package name.
+        content: Its bytes.
+        folders: Folders by package name.
 
     Raises:
-        InputError: If a given folder is none.
+        InputError: If one of the folders does not exist.
     """
     packages = PackageMap()
-    for name, folder in given.items():
+    for name, folder in folders.items():
         if not folder.is_dir():
             raise InputError(f"packages: {name}: {folder}: no such folder; allowed: a folder")
         if packages.Contains(name):
             packages.Remove(name)
         packages.Add(name, str(folder))
     add_models_to(packages)
-    wanted = {name.decode("utf-8", "replace") for name in _ADDRESS.findall(content)}
+    references = {name.decode("utf-8", "replace") for name in _ADDRESS.findall(content)}
     for folder in file.resolve().parents:
         _add_if_new(packages, folder)
-        for name in wanted - set(packages.GetPackageNames()):
+        for name in references - set(packages.GetPackageNames()):
             if name not in (".", "..") and (folder / name).is_dir():
                 packages.Add(name, str(folder / name))
     others = PackageMap.MakeEmpty()
@@ -194,7 +194,7 @@ def packages_for(file: Path, content: bytes, given: Mapping[str, Path]) -> Packa
 
 
 def _add_if_new(packages: PackageMap, folder: Path) -> None:
-    """Add a folder under the name that its ``package.xml`` says, unless that is taken."""
+    """Add a folder under the name in its ``package.xml``, unless that is taken."""
     description = folder / "package.xml"
     if not description.is_file():
         return

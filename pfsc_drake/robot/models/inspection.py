@@ -1,7 +1,7 @@
-"""What is wrong with the numbers of a robot model, found before Drake reads it.
+"""Checks of the numbers of a robot model before Drake reads it.
 
-Drake takes a stand-in for an inertia that it does not like, ends the program at other numbers,
-and lets the rest through. Here each is refused in one line that names file, line, part and value.
+Drake replaces an unphysical inertia, ends the program at other invalid numbers, and accepts the
+rest. Here each is refused in one line that names file, line, part and value.
 """
 
 from collections.abc import Mapping
@@ -25,10 +25,10 @@ from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
 @dataclass
 class ModelFacts:
-    """What a model file says that Drake's plant does not.
+    """Data of a model file that Drake's plant does not provide.
 
     Attributes:
-        without_inertia: Where each link without ``<inertial>`` stands, by its name.
+        without_inertia: Location of each link without ``<inertial>``, by its name.
         assumed_inertia: Links for whose moments of inertia SDF takes 1 kg m^2.
         effort_limits: Effort limits of joints of URDF and MJCF, by name [Nm or N].
         drives: Drives of MJCF joints, by name.
@@ -48,11 +48,11 @@ class ModelFacts:
     still: set[str] = field(default_factory=set)
 
     def with_followers(self, fixed: Mapping[str, float]) -> dict[str, float]:
-        """Return the positions of fixed joints, and of what follows them.
+        """Return the positions of fixed joints and their followers.
 
         Args:
-            fixed: Positions of joints that are fixed, by name [rad or m]; those of followers, too,
-                are taken as they are given.
+            fixed: Positions of joints that are fixed, by name [rad or m]; positions of followers
+                are used unchanged.
 
         Raises:
             InputError: If a joint follows one that moves, or itself.
@@ -68,7 +68,7 @@ class ModelFacts:
             if mimic is None or name in waiting:
                 follower = self.mimics[waiting[0]]
                 raise InputError(
-                    f"{follower.place}: joint '{waiting[0]}': mimic = {follower.leader}, which "
+                    f"{follower.location}: joint '{waiting[0]}': mimic = {follower.leader}, which "
                     "moves; allowed: joints on their own: fix the one that it follows, and it is "
                     f"fixed too: fixed_joints: {{{name}: VALUE}}"
                 )
@@ -84,10 +84,10 @@ def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -
 
     Args:
         models: The model and what it includes.
-        fixed: Joints that will not move, whatever the model says.
+        fixed: Joints that will not move, even if they do in the model.
 
     Raises:
-        InputError: If a number is none or out of range, an inertia is not physical, or joints
+        InputError: If a number is invalid or out of range, an inertia is not physical, or joints
             close a loop; one line.
     """
     facts = ModelFacts()
@@ -116,7 +116,7 @@ def _inspect_urdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
         link = ModelPart(model, element, "link")
         inertial = element.first("inertial")
         if inertial is None:
-            facts.without_inertia[link.name] = model.place(element)
+            facts.without_inertia[link.name] = model.location(element)
             continue
         _check_origin(link, inertial)
         mass, inertia = inertial.first("mass"), inertial.first("inertia")
@@ -154,7 +154,7 @@ def _take_joint(
     facts: ModelFacts,
     fixed: frozenset[str],
 ) -> None:
-    """Check a joint of a URDF or SDF model, and keep what Drake's plant will not say of it."""
+    """Check a joint of a URDF or SDF model, and store data that Drake's plant does not provide."""
     numbers = check_joint(joint, values, fixed)
     if "effort" in numbers and joint.model.root.name == "robot":
         facts.effort_limits[joint.name] = numbers["effort"]
@@ -179,7 +179,7 @@ def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> N
             link = ModelPart(model, element, "link")
             inertial = element.first("inertial")
             if inertial is None:
-                facts.without_inertia[link.name] = model.place(element)
+                facts.without_inertia[link.name] = model.location(element)
                 continue
             if inertial.attributes.get("auto", "").strip() in ("true", "1"):
                 link.refuse("inertial auto", "true", "mass and inertia in numbers", inertial)
@@ -231,9 +231,13 @@ def _inspect_mjcf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
             named = dict(zip((*MOMENTS, *PRODUCTS), moments.split(), strict=False))
             check_inertia(body, attributes.get("mass"), named, inertial)
         for element_of_joint in element.all("joint"):
-            given = element_of_joint.attributes
-            limits = dict(zip(("lower", "upper"), given.get("range", "").split(), strict=False))
-            values = limits | {k: given[k] for k in ("damping", "armature") if k in given}
+            joint_attributes = element_of_joint.attributes
+            limits = dict(
+                zip(("lower", "upper"), joint_attributes.get("range", "").split(), strict=False)
+            )
+            values = limits | {
+                k: joint_attributes[k] for k in ("damping", "armature") if k in joint_attributes
+            }
             placed = {key: (text, element_of_joint) for key, text in values.items()}
             check_joint(ModelPart(model, element_of_joint, "joint"), placed, fixed)
     for equality in model.root.all("equality"):

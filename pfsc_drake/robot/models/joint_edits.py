@@ -1,4 +1,4 @@
-"""Joints of a parsed plant: their order, which can be driven, how to take them out."""
+"""Joints of a parsed plant: their order, drives, and removal."""
 
 from dataclasses import dataclass
 
@@ -58,14 +58,14 @@ def all_joints(plant: MultibodyPlant) -> list[Joint]:
 
 
 def force_elements(plant: MultibodyPlant) -> list[ForceElement]:
-    """Return gravity, springs and whatever else acts on the bodies of a plant."""
+    """Return gravity, springs and all other force elements of a plant."""
     return [
         plant.get_force_element(ForceElementIndex(i)) for i in range(plant.num_force_elements())
     ]
 
 
 def joints_of(plant: MultibodyPlant) -> list[Joint]:
-    """Return the joints of a plant, base first and by their index where that leaves a choice."""
+    """Return the joints of a plant, base first, then by their index."""
     joints = all_joints(plant)
     inboard = inboard_joints(plant)
 
@@ -122,9 +122,9 @@ def actuator_of(plant: MultibodyPlant, joint: Joint) -> JointActuator | None:
 
 
 def idealize_drives(plant: MultibodyPlant) -> None:
-    """Make integrators of the joints of an arm without masses: unit inertia, nothing damps.
+    """Make the joints of an arm without masses integrators: unit inertia, no damping.
 
-    Servos are designed for the inertia that drives see, so that its value changes no motion.
+    Servos are designed for the inertia at the drives, so that its value changes no motion.
 
     Args:
         plant: The plant, not finalized, with an actuator at every joint that moves.
@@ -150,8 +150,8 @@ def pose_at(joint: Joint, value: float) -> RigidTransform:
 
 
 @dataclass(frozen=True)
-class TakenJoint:
-    """A revolute or prismatic joint that was taken out of a plant, and its drive.
+class JointRecord:
+    """Parameters of a revolute or prismatic joint removed from a plant, and of its drive.
 
     Attributes:
         kind: Its class.
@@ -173,7 +173,7 @@ class TakenJoint:
     limits: tuple[tuple[np.ndarray, np.ndarray], ...]
     drive: tuple[str, float, float, float] | None
 
-    def put(
+    def add_to(
         self, plant: MultibodyPlant, frame_on_parent: Frame, frame_on_child: Frame
     ) -> tuple[Joint, JointActuator | None]:
         """Add the joint, with its drive, between other frames."""
@@ -193,11 +193,11 @@ class TakenJoint:
         return joint, actuator
 
 
-def take_joint(plant: MultibodyPlant, joint: Joint) -> TakenJoint:
-    """Take a revolute or prismatic joint without spring out of a plant, with its drive."""
+def remove_joint(plant: MultibodyPlant, joint: Joint) -> JointRecord:
+    """Remove a revolute or prismatic joint without spring from a plant, with its drive."""
     actuator = actuator_of(plant, joint)
     revolute = isinstance(joint, RevoluteJoint)
-    taken = TakenJoint(
+    record = JointRecord(
         RevoluteJoint if revolute else PrismaticJoint,
         joint.name(),
         np.array(joint.revolute_axis() if revolute else joint.translation_axis()),
@@ -221,4 +221,4 @@ def take_joint(plant: MultibodyPlant, joint: Joint) -> TakenJoint:
     if actuator is not None:
         plant.RemoveJointActuator(actuator)
     plant.RemoveJoint(joint)
-    return taken
+    return record

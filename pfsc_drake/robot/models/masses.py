@@ -1,4 +1,4 @@
-"""Checks that what moves in a plant has mass and inertia."""
+"""Checks that moving bodies of a plant have mass and inertia."""
 
 from pathlib import Path
 
@@ -16,21 +16,21 @@ _SMALLEST_EIGENVALUE = 1e-12
 
 
 def require_inertia(plant: MultibodyPlant, model: ModelXml, facts: ModelFacts) -> None:
-    """Refuse what moves without mass, or with a mass that nobody wrote.
+    """Refuse bodies that move without mass, or with a default mass.
 
     Args:
         plant: The plant, not finalized.
         model: The model that it was read from.
-        facts: What the model says beside.
+        facts: Further data of the model.
 
     Raises:
-        InputError: If a link moves so; the line names the first one.
+        InputError: If there is such a link; the line names the first one.
     """
     carriers = {joint.parent_body().index() for joint in moving_joints(plant)}
     for group in _moving_groups(plant):
         mass = sum(body.default_mass() for body in group)
         unsaid = [body.name() for body in group if body.name() in facts.without_inertia]
-        # a body between two joints may be without mass if the model says so
+        # a body between two joints may be massless if the model declares it
         between = not unsaid and any(body.index() in carriers for body in group)
         if mass > 0.0 or between:
             if not (unsaid and model.root.name == "sdf"):
@@ -39,28 +39,29 @@ def require_inertia(plant: MultibodyPlant, model: ModelXml, facts: ModelFacts) -
         else:
             hint = ""
         name = (unsaid or [group[0].name()])[0]
-        place = facts.without_inertia.get(name, str(model.file))
+        location = facts.without_inertia.get(name, str(model.file))
         raise InputError(
-            f"{place}: link '{name}': moves and has no {'<inertial>' if unsaid else 'mass'}{hint}; "
+            f"{location}: link '{name}': moves and has no"
+            f" {'<inertial>' if unsaid else 'mass'}{hint}; "
             "allowed: <inertial> with a positive mass, or a link fixed to one that has it"
         )
 
 
 def _moving_groups(plant: MultibodyPlant) -> list[list[RigidBody]]:
-    """Return what is welded together, for all that is not welded to the world, base first."""
+    """Return groups of welded bodies, except those welded to the world, base first."""
     world = plant.world_body()
     group = {world.index(): [world]}
     for joint in joints_of(plant):
-        carried = joint.child_body()
+        child = joint.child_body()
         welded = isinstance(joint, WeldJoint)
-        group[carried.index()] = group[joint.parent_body().index()] if welded else []
-        group[carried.index()].append(carried)
+        group[child.index()] = group[joint.parent_body().index()] if welded else []
+        group[child.index()].append(child)
     groups = {id(bodies): bodies for bodies in group.values() if bodies[0] is not world}
     return list(groups.values())
 
 
 def require_regular_mass_matrix(plant: MultibodyPlant, file: Path) -> None:
-    """Refuse joints that move nothing that has inertia about them.
+    """Refuse joints that move no inertia.
 
     Args:
         plant: The plant, finalized.

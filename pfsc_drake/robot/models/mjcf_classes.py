@@ -1,4 +1,4 @@
-"""Default classes of an MJCF model, and what its elements inherit from them."""
+"""Default classes of an MJCF model, and the attributes inherited from them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -39,7 +39,9 @@ class DefaultClasses:
         """Add a class and those in it."""
         name = default.attributes.get("class", MAIN)
         inherited = {} if above is None else self.known[above]
-        own = self.known.setdefault(name, {kind: dict(given) for kind, given in inherited.items()})
+        own = self.known.setdefault(
+            name, {kind: dict(attributes) for kind, attributes in inherited.items()}
+        )
         for element in default.children:
             if element.name != "default":
                 kind = "actuator" if element.name in ACTUATORS else element.name
@@ -47,7 +49,7 @@ class DefaultClasses:
         for element in default.all("default"):
             self.read(element, name)
 
-    def resolved(self, element: Element, kind: str, inherited: str = MAIN) -> Attributes:
+    def resolve(self, element: Element, kind: str, inherited: str = MAIN) -> Attributes:
         """Return the attributes of an element with those of its class."""
         name = element.attributes.get("class", inherited)
         return self.known.get(name, {}).get(kind, {}) | element.attributes
@@ -55,25 +57,25 @@ class DefaultClasses:
     def below(
         self, body: Element, kind: str, inherited: str = MAIN
     ) -> Iterator[tuple[Element, Element, Attributes]]:
-        """Yield the elements of a kind in a body and in those below it.
+        """Iterate over the elements of a kind in a body and the bodies below it.
 
         Args:
             body: The body, or the world's.
             kind: Tag of the elements.
-            inherited: Class of elements that name none, unless the body tells another one.
+            inherited: Class of elements without one, unless the body has another one.
 
         Yields:
             Their body, the element, and its attributes with those of its class.
         """
         inherited = body.attributes.get("childclass", inherited)
         for element in body.all(kind):
-            yield body, element, self.resolved(element, kind, inherited)
+            yield body, element, self.resolve(element, kind, inherited)
         for child in body.all("body"):
             yield from self.below(child, kind, inherited)
 
 
 def servo_attributes(element: Element) -> Attributes:
-    """Return what a shortcut says of gain and bias, in the words of a general actuator."""
+    """Return gain and bias of a shortcut as attributes of a general actuator."""
     if element.name == "motor":
         return {"biastype": "none", "gainprm": "1"}
     if element.name in ACTUATORS - {"general"}:

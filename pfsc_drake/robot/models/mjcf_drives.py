@@ -1,4 +1,4 @@
-"""Drives of an MJCF model, as MuJoCo takes their limits from actuators, joints and classes.
+"""Drives of an MJCF model, with limits from actuators, joints and classes as in MuJoCo.
 
 The force of an actuator on its joint is ``gear * clamp(gain * ctrl + bias, forcerange)``, the sum
 of a joint's actuators is limited by its ``actuatorfrcrange``, and ``armature`` is inertia on the
@@ -24,17 +24,17 @@ class _Numbers:
 
     model: ModelXml
     element: Element
-    given: Attributes
+    attributes: Attributes
     limits_by_range: bool
 
     def all(self, key: str) -> list[float]:
-        text = self.given.get(key, "")
+        text = self.attributes.get(key, "")
         try:
             return [float(word) for word in text.split()]
         except ValueError:
             raise InputError(
-                f"{self.model.place(self.element)}: {self.element.name} "
-                f"'{self.given.get('name', '')}': {key} = '{text}'; allowed: numbers"
+                f"{self.model.location(self.element)}: {self.element.name} "
+                f"'{self.attributes.get('name', '')}': {key} = '{text}'; allowed: numbers"
             ) from None
 
     def of(self, key: str, otherwise: float) -> float:
@@ -42,31 +42,31 @@ class _Numbers:
 
     @property
     def stiffness(self) -> float:
-        """Stiffness of a joint's spring; one that is bent at zero is refused."""
+        """Stiffness of a joint's spring; a spring with a torque at zero is refused."""
         stiffness = self.of("stiffness", 0.0)
         bent = self.of("springref", 0.0) - self.of("ref", 0.0)
         if stiffness > 0.0 and bent != 0.0:
             raise InputError(
-                f"{self.model.place(self.element)}: joint '{self.given.get('name', '')}': "
-                f"springref = {self.given.get('springref', '0')}; allowed: that of ref, so that "
-                "the spring rests at zero"
+                f"{self.model.location(self.element)}: joint '{self.attributes.get('name', '')}': "
+                f"springref = {self.attributes.get('springref', '0')}; allowed: equal to ref, so "
+                "that the spring rests at zero"
             )
         return stiffness
 
     def limit(self, kind: str) -> float:
-        """Return the smaller side of a range that limits, else infinity."""
+        """Return the smaller side of an active range, else infinity."""
         values = self.all(f"{kind}range")
-        limited = self.given.get(f"{kind}limited", "auto")
+        limited = self.attributes.get(f"{kind}limited", "auto")
         if limited == "auto":
             limited = "true" if self.limits_by_range and values else "false"
         return min(map(abs, values), default=math.inf) if limited == "true" else math.inf
 
 
 def _limit_of_actuator(numbers: _Numbers) -> tuple[float, str]:
-    """Return the largest force of an actuator on its joint, and the attributes it is from."""
+    """Return the largest force of an actuator on its joint, and the attributes that define it."""
     gear = abs(numbers.of("gear", 1.0))
     force, source = numbers.limit("force"), "forcerange"
-    if numbers.given.get("biastype", "none") == "none":
+    if numbers.attributes.get("biastype", "none") == "none":
         by_control = abs(numbers.of("gainprm", 1.0)) * numbers.limit("ctrl")
         if by_control < force:
             force, source = by_control, "ctrlrange"
@@ -87,9 +87,9 @@ class MjcfDrive:
         friction: Dry friction, ``frictionloss`` [Nm or N].
         stiffness: Stiffness of a spring at the joint [Nm/rad or N/m].
         is_actuated: Whether an actuator of the model drives the joint.
-        effort_limit: Largest magnitude of the force on the joint, infinite if nothing limits it
-            [Nm or N]; of an uneven range its smaller side.
-        source: Attributes that the limit is from.
+        effort_limit: Largest magnitude of the force on the joint, infinite if unlimited
+            [Nm or N]; for an uneven range its smaller side.
+        source: Attributes that define the limit.
 
     Raises:
         InputError: If an attribute is not made of numbers, or the spring does not rest at zero.
@@ -121,24 +121,24 @@ def mjcf_drives(models: list[ModelXml]) -> dict[str, MjcfDrive]:
     for root in roots:
         for compiler in root.all("compiler"):
             limits_by_range = compiler.attributes.get("autolimits", "true") != "false"
-    places = {id(e): model for model in models for e in model.root.within()}
+    model_of = {id(e): model for model in models for e in model.root.within()}
     joints: dict[str, _Numbers] = {}
     for world in (world for root in roots for world in root.all("worldbody")):
-        for _, element, given in classes.below(world, "joint"):
-            numbers = _Numbers(places[id(element)], element, given, limits_by_range)
-            if "name" in given:
-                joints[given["name"]] = numbers
+        for _, element, attributes in classes.below(world, "joint"):
+            numbers = _Numbers(model_of[id(element)], element, attributes, limits_by_range)
+            if "name" in attributes:
+                joints[attributes["name"]] = numbers
             elif numbers.stiffness > 0.0:
                 raise InputError(
-                    f"{numbers.model.place(element)}: joint without a name: stiffness = "
-                    f"{given['stiffness']}; allowed: 0, or a joint with a name"
+                    f"{numbers.model.location(element)}: joint without a name: stiffness = "
+                    f"{attributes['stiffness']}; allowed: 0, or a joint with a name"
                 )
     driven: dict[str, list[_Numbers]] = {name: [] for name in joints}
     for root in roots:
         for element in (e for group in root.all("actuator") for e in group.children):
-            given = classes.resolved(element, "actuator") | servo_attributes(element)
-            joint = given.get("joint", given.get("jointinparent", ""))
+            attributes = classes.resolve(element, "actuator") | servo_attributes(element)
+            joint = attributes.get("joint", attributes.get("jointinparent", ""))
             if joint in joints:
-                numbers = _Numbers(places[id(element)], element, given, limits_by_range)
+                numbers = _Numbers(model_of[id(element)], element, attributes, limits_by_range)
                 driven[joint].append(numbers)
     return {name: MjcfDrive(numbers, driven[name]) for name, numbers in joints.items()}

@@ -1,4 +1,4 @@
-"""Mesh files of MJCF models as Drake takes them: OBJ files, by absolute names."""
+"""Mesh files of MJCF models in Drake's format: OBJ files, by absolute names."""
 
 import atexit
 import hashlib
@@ -13,10 +13,10 @@ from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
 
 def mesh_files(model: ModelXml, *, always: bool = False) -> Iterator[tuple[Element, Path | None]]:
-    """Yield meshes of an MJCF model with their files, OBJ in place of STL; None if it is missing.
+    """Iterate over meshes of an MJCF model and their OBJ files; None for a missing one.
 
-    STL files outside the folder above the model's count as missing. Nothing is yielded if Drake can
-    use all files as they are, unless ``always``.
+    STL files are converted; outside the folder above the model's they count as missing. Nothing is
+    generated if Drake can use all files unchanged, unless ``always``.
 
     Args:
         model: The model.
@@ -41,26 +41,26 @@ def mesh_files(model: ModelXml, *, always: bool = False) -> Iterator[tuple[Eleme
         elif file.suffix.lower() != ".stl":
             yield mesh, file.resolve()
         else:
-            # nothing from elsewhere becomes part of a drawing
+            # files from elsewhere must not become part of a drawing
             above = model.file.resolve().parent.parent
             yield mesh, as_obj(file) if above in file.resolve().parents else None
 
 
 def mesh_name(mesh: Element) -> str:
-    """Return the name of a mesh: by default that of its file, without suffix."""
+    """Return the name of a mesh: by default its file's name without suffix."""
     return mesh.attributes.get("name", Path(mesh.attributes.get("file", "")).stem)
 
 
 def _mesh_folder(model: ModelXml) -> Path:
     folder = model.file.resolve().parent
     for compiler in model.root.all("compiler"):
-        given = compiler.attributes
-        folder = folder / given.get("meshdir", given.get("assetdir", ""))
+        attributes = compiler.attributes
+        folder = folder / attributes.get("meshdir", attributes.get("assetdir", ""))
     return folder
 
 
 def as_obj(file: Path) -> Path:
-    """Return an OBJ file with the triangles of an STL file, kept while the process runs.
+    """Return an OBJ file with the triangles of an STL file, stored until the process ends.
 
     Args:
         file: The STL file.
@@ -72,7 +72,7 @@ def as_obj(file: Path) -> Path:
         digest = hashlib.sha256(file.read_bytes()).hexdigest()
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}") from None
-    target = _converted() / f"{digest}.obj"
+    target = _mesh_cache() / f"{digest}.obj"
     if not target.exists():
         vertices, triangles = read_stl(file)
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
@@ -82,12 +82,12 @@ def as_obj(file: Path) -> Path:
 
 
 def is_converted(file: Path) -> bool:
-    """Return whether a file was made by :func:`as_obj`."""
-    return file.parent == _converted()
+    """Return whether a file was created by :func:`as_obj`."""
+    return file.parent == _mesh_cache()
 
 
 @cache
-def _converted() -> Path:
+def _mesh_cache() -> Path:
     folder = tempfile.TemporaryDirectory(prefix="pfsc_drake_meshes_")
     atexit.register(folder.cleanup)
     return Path(folder.name)

@@ -1,4 +1,4 @@
-"""Sites of MJCF models as frames: where MuJoCo has them on their bodies."""
+"""Sites of MJCF models as frames of their bodies, as in MuJoCo."""
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -10,14 +10,14 @@ from pfsc_drake.robot.models.mjcf_classes import Attributes, DefaultClasses
 from pfsc_drake.robot.models.model_parts import ANY, ModelPart
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
-# ways to say an orientation, and how many numbers they have
+# representations of an orientation, and their numbers of values
 _OF_AXES = {"axisangle": 4, "euler": 3, "xyaxes": 6, "zaxis": 3}
 
 
 def add_sites(plant: MultibodyPlant, models: list[ModelXml]) -> None:
     """Add the sites of an MJCF model that have a name to a plant, as frames of their bodies.
 
-    Sites called as a body or a frame is are left out.
+    Sites with the name of a body or a frame are omitted.
 
     Args:
         plant: The plant with the model, not finalized.
@@ -30,16 +30,16 @@ def add_sites(plant: MultibodyPlant, models: list[ModelXml]) -> None:
     for model in (model for model in models if model.root.name.startswith("mujoco")):
         angles = _Angles(model)
         for world in model.root.all("worldbody"):
-            for body, element, given in classes.below(world, "site"):
+            for body, element, attributes in classes.below(world, "site"):
                 name = "world" if body is world else body.attributes.get("name", "")
-                site = given.get("name", "")
+                site = attributes.get("name", "")
                 if site and not plant.HasFrameNamed(site) and plant.HasBodyNamed(name):
                     frame = plant.GetBodyByName(name).body_frame()
-                    plant.AddFrame(FixedOffsetFrame(site, frame, angles.pose(element, given)))
+                    plant.AddFrame(FixedOffsetFrame(site, frame, angles.pose(element, attributes)))
 
 
 class _Angles:
-    """Poses as an MJCF model's compiler options say.
+    """Poses with the conventions of an MJCF model's compiler options.
 
     Args:
         model: The model.
@@ -50,32 +50,32 @@ class _Angles:
         for compiler in model.root.all("compiler"):
             if compiler.attributes.get("angle") == "radian":
                 self._unit = 1.0
-            # small letters turn about axes that have turned: capitals in scipy
+            # lower case means intrinsic rotations: upper case in scipy
             self._order = compiler.attributes.get("eulerseq", self._order.swapcase()).swapcase()
 
-    def pose(self, element: Element, given: Attributes) -> RigidTransform:
+    def pose(self, element: Element, attributes: Attributes) -> RigidTransform:
         """Return the pose of an element in its body.
 
         Args:
             element: The element.
-            given: Its attributes with those of its class.
+            attributes: Its attributes with those of its class.
 
         Raises:
-            InputError: If it is not made of as many numbers as it should.
+            InputError: If it has a wrong count of numbers.
         """
         part = ModelPart(self._model, element, element.name)
 
         def numbers(key: str, count: int) -> np.ndarray | None:
-            if key not in given:
+            if key not in attributes:
                 return None
-            words = given[key].split()
+            words = attributes[key].split()
             if len(words) != count:
-                part.refuse(key, given[key], f"{count} numbers")
+                part.refuse(key, attributes[key], f"{count} numbers")
             return np.array([part.number(key, word, ANY) for word in words])
 
         own = [key for key in _OF_AXES if key in element.attributes]
-        inherited = [key for key in _OF_AXES if key in given]
-        # a quaternion counts where nothing else is said, even by a class
+        inherited = [key for key in _OF_AXES if key in attributes]
+        # a quaternion counts where nothing else is set, even by a class
         kind = next(iter([*own, *inherited, "quat"]))
         position, values = numbers("pos", 3), numbers(kind, _OF_AXES.get(kind, 4))
         rotation = np.eye(3) if values is None else self._rotation(kind, values)

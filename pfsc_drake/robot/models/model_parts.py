@@ -1,4 +1,4 @@
-"""Links and joints in a model file, and what their numbers may be."""
+"""Links and joints in a model file, and checks of their numbers."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -47,8 +47,8 @@ class ModelPart:
 
     Attributes:
         model: The file.
-        element: Where it stands there.
-        kind: What it is, for people.
+        element: Its XML element.
+        kind: Its kind, for messages.
     """
 
     model: ModelXml
@@ -64,10 +64,10 @@ class ModelPart:
         """Return a number.
 
         Args:
-            key: What it is the number of.
-            text: The number as written; None if it is not there.
-            allowed: Which numbers are allowed, one of the four constants of this module.
-            at: Element that holds it, by default the part itself.
+            key: Name of the number.
+            text: The number's text; None if it is missing.
+            allowed: Allowed numbers, one of the four constants of this module.
+            at: Element that contains it, by default the part itself.
 
         Raises:
             InputError: If the text is no such number.
@@ -88,7 +88,7 @@ class ModelPart:
         return value
 
     def check_numbers(self, key: str, text: str | None, at: Element) -> None:
-        """Refuse a vector if one of its words is no number; how many there are is not checked."""
+        """Refuse a vector with a word that is not numeric; their count is not checked."""
         for word in (text or "").split():
             self.number(key, word, ANY, at)
 
@@ -96,7 +96,7 @@ class ModelPart:
         """Raise the InputError of a value; for the arguments see :meth:`number`."""
         shown = str(value) if len(str(value)) < 60 else f"{str(value)[:57]}..."
         raise InputError(
-            f"{self.model.place(at or self.element)}: {self.kind} '{self.name}': "
+            f"{self.model.location(at or self.element)}: {self.kind} '{self.name}': "
             f"{key} = {shown}; allowed: {allowed}"
         )
 
@@ -104,19 +104,19 @@ class ModelPart:
 def check_inertia(
     link: ModelPart, mass_text: str | None, inertia: dict[str, str], at: Element
 ) -> bool:
-    """Refuse a mass and an inertia about the centre of mass that no body has.
+    """Refuse an unphysical mass and inertia about the centre of mass.
 
     Args:
         link: The link.
-        mass_text: Its mass as written, None if it is not.
-        inertia: What is written of ``MOMENTS`` and ``PRODUCTS``, by key.
-        at: The element with all this.
+        mass_text: Text of its mass, None if it is missing.
+        inertia: Texts of ``MOMENTS`` and ``PRODUCTS``, by key.
+        at: The element that contains them.
 
     Returns:
-        Whether moments of inertia are missing for which SDF takes 1 kg m^2.
+        Whether moments of inertia are missing, for which SDF takes 1 kg m^2.
 
     Raises:
-        InputError: If a number is none, a moment is missing or no body has them.
+        InputError: If a number is invalid, a moment is missing or they are unphysical.
     """
     mass = link.number("mass", mass_text, _NOT_NEGATIVE, at)
     is_sdf = link.model.root.name == "sdf"
@@ -130,7 +130,7 @@ def check_inertia(
         if any(values):
             link.refuse("inertia", values, "zeros without mass; or a positive mass", at)
         return False
-    # Drake's own test, which has its tolerance; what fails there is replaced in silence
+    # Drake's own test and tolerance; Drake silently replaces inertias that fail it
     I_C = np.array(values)[[[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
     principal = np.linalg.eigvalsh(I_C)
     physical = bool(principal[0] >= -1e-12 * principal[2])
@@ -159,11 +159,11 @@ def check_joint(
 
     Args:
         joint: The joint.
-        values: What is written, and where, by key.
+        values: Texts and their elements, by key.
         fixed: Joints that will not move.
 
     Raises:
-        InputError: If a number is none or out of range, or the lower limit is not below the
+        InputError: If a number is invalid or out of range, or the lower limit is not below the
             upper one.
     """
     numbers = {}
@@ -189,11 +189,11 @@ def check_joint(
 def refuse_loops(
     edges: Sequence[tuple[ModelPart, str | None, str | None]], frames: dict[str, str]
 ) -> None:
-    """Refuse joints that lead back to where others already lead.
+    """Refuse joints that close a loop.
 
     Args:
         edges: Joints with the names of parent and child.
-        frames: What each frame that is no link is attached to.
+        frames: Link or frame that each frame is attached to.
     """
     group: dict[str, str] = {}
 
@@ -227,18 +227,18 @@ class Mimic:
     Attributes:
         leader: Name of the joint that it follows.
         multiplier: Factor of the leader's position.
-        offset: Where it stands when the leader is at zero [rad or m].
-        place: Where the model says so, for messages.
+        offset: Its position when the leader is at zero [rad or m].
+        location: File and line of the definition, for messages.
     """
 
     leader: str
     multiplier: float
     offset: float
-    place: str
+    location: str
 
 
 def mimic_elements(model: ModelXml) -> Iterator[tuple[Element, Element]]:
-    """Yield the joints of a URDF or SDF model that follow others, and the elements that say so."""
+    """Iterate over joints of a URDF or SDF model that follow others, with their mimic elements."""
     path = {"robot": ("mimic",), "sdf": ("axis", "mimic")}.get(model.root.name)
     if path is None:
         return
@@ -255,30 +255,32 @@ def mimics_of(model: ModelXml) -> dict[str, Mimic]:
             the constant and the linear part count.
 
     Raises:
-        InputError: If a number is none.
+        InputError: If a number is invalid.
     """
     found = {}
     for element, mimic in mimic_elements(model):
         joint = ModelPart(model, element, "joint")
-        said = mimic.attributes | {child.name: child.text for child in mimic.children}
+        entries = mimic.attributes | {child.name: child.text for child in mimic.children}
         number = {
-            key: joint.number(f"mimic {key}", said.get(key, usual), ANY, mimic)
+            key: joint.number(f"mimic {key}", entries.get(key, usual), ANY, mimic)
             for key, usual in {"multiplier": "1", "offset": "0", "reference": "0"}.items()
         }
         found[joint.name] = Mimic(
-            said.get("joint", ""),
+            entries.get("joint", ""),
             number["multiplier"],
             number["offset"] - number["multiplier"] * number["reference"],
-            model.place(element),
+            model.location(element),
         )
     for element in model.root.all("equality", "joint"):
-        given = element.attributes
-        if "joint1" not in given or "joint2" not in given:
+        attributes = element.attributes
+        if "joint1" not in attributes or "joint2" not in attributes:
             continue
         part = ModelPart(model, element, "equality")
-        words = given.get("polycoef", "0 1").split()
+        words = attributes.get("polycoef", "0 1").split()
         offset, slope = (
             part.number("polycoef", word, ANY) for word in (words + ["0", "1"][len(words) :])[:2]
         )
-        found[given["joint1"]] = Mimic(given["joint2"], slope, offset, model.place(element))
+        found[attributes["joint1"]] = Mimic(
+            attributes["joint2"], slope, offset, model.location(element)
+        )
     return found

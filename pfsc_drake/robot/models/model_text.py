@@ -1,4 +1,4 @@
-"""The text of a model as Drake can use it, where the file itself will not do."""
+"""Text of a model that Drake can use, where it cannot use the file itself."""
 
 import logging
 import re
@@ -20,20 +20,19 @@ Edit = tuple[Element, str]
 def usable_text(
     model: ModelXml, *, without_springs: bool = False, without_masses: bool = False
 ) -> str | None:
-    """Return a model in another text, or None if Drake can use the file as it is.
+    """Return an edited text of a model, or None if Drake can use the file unchanged.
 
-    ROS tools repeat a material wherever it is used, and let the colour differ; Drake refuses
-    that, so such materials are named apart; textures go, for it refuses missing ones. STL meshes of
-    MJCF models become OBJ meshes, missing ones go, and a model without a name gets one. That joints
-    follow others is left out: they are fixed
-    where these stand. Springs can be left out, since Drake gives up no joint of a plant with
-    springs. Lines stay where they are. Relative file names become absolute,
-    since a text has no folder.
+    ROS tools repeat a material wherever it is used, with colours that may differ; Drake refuses
+    that, so such materials get different names. Textures are removed, because it refuses missing
+    ones. STL meshes of MJCF models become OBJ meshes, missing ones are removed, and a model without
+    a name gets one. Mimic elements are removed: followers are fixed at their leader's position.
+    Springs can be removed, since Drake cannot remove joints from a plant with springs. Line numbers
+    are unchanged. Relative file names become absolute, since a text has no folder.
 
     Args:
         model: The model.
         without_springs: Whether to set the stiffness of its joints to zero.
-        without_masses: Whether to leave out inertia of links and transmissions of a URDF model.
+        without_masses: Whether to remove inertia of links and transmissions of a URDF model.
     """
     edits = list(distinct_materials(model))
     edits += [(mimic, "") for _, mimic in mimic_elements(model)]
@@ -53,7 +52,7 @@ def usable_text(
 
 
 def _named_mjcf(model: ModelXml) -> Iterator[Edit]:
-    """Yield the first tag of an MJCF model without a name, which Drake requires, with one."""
+    """Iterate over the edit that gives an MJCF model a name, which Drake requires."""
     root = model.root
     if root.name == "mujoco" and not root.attributes.get("model") and root.children:
         # its first tag alone
@@ -61,7 +60,7 @@ def _named_mjcf(model: ModelXml) -> Iterator[Edit]:
 
 
 def _usable_meshes(model: ModelXml, *, always: bool) -> Iterator[Edit]:
-    """Yield meshes of an MJCF model with files that Drake can read; those without go."""
+    """Iterate over edits of an MJCF model's meshes: readable files, and no missing ones."""
     missing = set()
     for mesh, file in mesh_files(model, always=always):
         if file is not None:
@@ -75,11 +74,11 @@ def _usable_meshes(model: ModelXml, *, always: bool) -> Iterator[Edit]:
 
 
 def edited_text(model: ModelXml, edits: Iterable[Edit]) -> str:
-    """Return the text of a model with other text for some elements; lines stay where they are.
+    """Return the text of a model with other text for some elements; line numbers are unchanged.
 
     Args:
         model: The model.
-        edits: Elements and what they become. Those within another one go with it.
+        edits: Elements and their new texts. Elements within another one are replaced with it.
     """
     parts, begin = [], 0
     for element, text in sorted(edits, key=lambda edit: (edit[0].start, -edit[0].end)):
@@ -92,7 +91,7 @@ def edited_text(model: ModelXml, edits: Iterable[Edit]) -> str:
 
 
 def distinct_materials(model: ModelXml) -> Iterator[Edit]:
-    """Yield materials of a URDF model that are told again, to be named apart or left out.
+    """Iterate over edits of a URDF model's repeated materials, which are renamed or removed.
 
     Args:
         model: The model.
@@ -116,7 +115,7 @@ def distinct_materials(model: ModelXml) -> Iterator[Edit]:
 
 
 def without_textures(model: ModelXml) -> Iterator[Edit]:
-    """Yield textures of a URDF model, to be left out, or to become a grey of materials without.
+    """Iterate over edits of a URDF model's textures, which are removed or become grey.
 
     Args:
         model: The model.
@@ -131,7 +130,7 @@ def without_textures(model: ModelXml) -> Iterator[Edit]:
 
 
 def _look(material: Element) -> tuple[tuple[str, ...], ...]:
-    """Return what a material looks like: numbers of its colour, and its texture."""
+    """Return the look of a material: numbers of its colour, and its texture."""
     return tuple(
         (child.name, *(word for value in child.attributes.values() for word in value.split()))
         for child in material.children
@@ -139,7 +138,7 @@ def _look(material: Element) -> tuple[tuple[str, ...], ...]:
 
 
 def absolute_names(model: ModelXml) -> Iterator[Edit]:
-    """Yield elements with relative file names, and what they are with absolute ones.
+    """Iterate over edits of elements with relative file names, which become absolute.
 
     Args:
         model: The model.
@@ -167,16 +166,16 @@ def with_attributes(element: Element, **changed: str) -> Edit:
     return element, f"<{element.name}{attributes}/>"
 
 
-# where in Drake's own sources a condition failed; of no use to who wrote the input
+# location of a failed condition in Drake's own sources, which does not help a user
 _IN_DRAKE = re.compile(r"Failure at \S+ in (\w+)\(\): ")
 
 
 class DrakeMessages(logging.Handler):
-    """Messages of Drake's, one line each, each once.
+    """Distinct messages of Drake, one line each.
 
     Attributes:
         warnings: Its warnings.
-        errors: What it could not do, though it went on.
+        errors: Its errors that raised no exception.
     """
 
     def __init__(self) -> None:
@@ -185,11 +184,11 @@ class DrakeMessages(logging.Handler):
         self.errors: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a message."""
-        kept = self.errors if record.levelno >= logging.ERROR else self.warnings
+        """Store a message."""
+        lines = self.errors if record.levelno >= logging.ERROR else self.warnings
         message = one_line(record.getMessage())
-        if message not in kept:
-            kept.append(message)
+        if message not in lines:
+            lines.append(message)
 
 
 @contextmanager
@@ -214,5 +213,5 @@ def collected_messages() -> Iterator[DrakeMessages]:
 
 
 def one_line(text: object) -> str:
-    """Return a message of Drake's in one line, without places in Drake's sources."""
+    """Return a message of Drake in one line, without locations in Drake's sources."""
     return _IN_DRAKE.sub(r"\1(): ", " ".join(str(text).split()))

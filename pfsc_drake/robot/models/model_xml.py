@@ -1,6 +1,6 @@
-"""Reads the XML of a robot model before anything else does, and refuses what no reader should get.
+"""Safe reading of a robot model's XML before Drake does.
 
-The XML libraries below Drake follow every include and say little about what they meet. Names keep
+The XML libraries used by Drake follow every include and report little about errors. Names keep
 their prefixes (``drake:gear_ratio``), whether or not the file declares them: URDF files seldom do.
 """
 
@@ -15,7 +15,7 @@ from pfsc_drake.errors import InputError
 LARGEST_FILE = 20_000_000  # bytes; geometry belongs into files of its own
 _DEEPEST = 200  # elements within elements
 _MOST_ATTRIBUTES = 1000  # of one element; parsers compare each with all others
-# what a simulator other than Drake or a driver reads, in a language of its own
+# elements for other simulators or drivers, in their own languages
 _FOREIGN = frozenset({"gazebo", "plugin", "ros2_control"})
 
 
@@ -25,12 +25,12 @@ class Element:
 
     Attributes:
         name: Its tag, with prefix.
-        attributes: By name, with prefix.
+        attributes: Attributes by name, with prefix.
         line: Line of the file, from 1.
         start: Offset of its first byte.
         end: Offset behind its last byte.
         children: The elements in it.
-        text: The text in it, without that of its children.
+        text: The text in it, without its children's text.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Element:
     text: str = ""
 
     def all(self, *names: str) -> Iterator["Element"]:
-        """Yield the elements at a path below this one, ``all("inertial", "mass")``."""
+        """Iterate over the elements at a path below this one, ``all("inertial", "mass")``."""
         for child in self.children:
             if child.name == names[0]:
                 if len(names) == 1:
@@ -55,7 +55,7 @@ class Element:
         return next(self.all(*names), None)
 
     def within(self) -> Iterator["Element"]:
-        """Yield this element and everything below it."""
+        """Iterate over this element and everything below it."""
         waiting = [self]
         while waiting:
             element = waiting.pop()
@@ -69,7 +69,7 @@ class ModelXml:
 
     Attributes:
         file: The file.
-        content: What it holds.
+        content: Its bytes.
         root: The outermost element.
     """
 
@@ -77,7 +77,7 @@ class ModelXml:
     content: bytes
     root: Element
 
-    def place(self, element: Element) -> str:
+    def location(self, element: Element) -> str:
         """Return ``file:line`` of an element."""
         return f"{self.file}:{element.line}"
 
@@ -89,7 +89,7 @@ def read_model_xml(file: Path) -> ModelXml:
         file: A regular file of at most ``LARGEST_FILE`` bytes.
 
     Raises:
-        InputError: If it is none, is not XML in UTF-8, declares entities, or still needs xacro.
+        InputError: If it is no such file, is not XML in UTF-8, declares entities, or needs xacro.
     """
     content = _read(file)
     model = ModelXml(file, content, _parse(file, content))
@@ -174,7 +174,7 @@ def _refuse_xacro(model: ModelXml) -> None:
         values = [element.text, *element.attributes.values()]
         if element.name.startswith("xacro:") or any("$(" in v or "${" in v for v in values):
             raise InputError(
-                f"{model.place(element)}: <{element.name}> holds xacro that is not expanded: "
+                f"{model.location(element)}: <{element.name}> holds xacro that is not expanded: "
                 "expand it first (xacro robot.urdf.xacro > robot.urdf)"
             )
         waiting += [child for child in element.children if child.name not in _FOREIGN]

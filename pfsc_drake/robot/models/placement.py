@@ -1,4 +1,4 @@
-"""Where a parsed model stands, and which of its joints do not move."""
+"""Placement of a parsed model in the world, and fixing of its joints."""
 
 from collections.abc import Mapping
 
@@ -21,15 +21,15 @@ from pfsc_drake.robot.models.joint_edits import (
     joints_of,
     moving_joints,
     pose_at,
-    take_joint,
+    remove_joint,
 )
 
-# of a model that are worth naming
+# of a model in messages
 _MOST_NAMES = 6
 
 
 def fix_joints(plant: MultibodyPlant, values: Mapping[str, float]) -> None:
-    """Weld joints where they stand.
+    """Weld joints at fixed positions.
 
     Args:
         plant: A plant that is not finalized, without springs.
@@ -56,12 +56,12 @@ def fix_joints(plant: MultibodyPlant, values: Mapping[str, float]) -> None:
                 f"fixed_joints: {name} = {value:g} {unit}; allowed: {lower:g} to {upper:g} {unit}"
             )
         X_FM = pose_at(joint, value)
-        taken = take_joint(plant, joint)
-        plant.AddJoint(WeldJoint(name, taken.frame_on_parent, taken.frame_on_child, X_FM))
+        record = remove_joint(plant, joint)
+        plant.AddJoint(WeldJoint(name, record.frame_on_parent, record.frame_on_child, X_FM))
 
 
-def place_base(plant: MultibodyPlant, base: str, X_WB: RigidTransform) -> None:
-    """Weld a model to the world where its base is to stand.
+def weld_base(plant: MultibodyPlant, base: str, X_WB: RigidTransform) -> None:
+    """Weld a model's base to the world.
 
     Args:
         plant: A plant that is not finalized, without springs.
@@ -96,8 +96,8 @@ def place_base(plant: MultibodyPlant, base: str, X_WB: RigidTransform) -> None:
                 plant.RemoveJoint(joint)
                 plant.AddJoint(WeldJoint(arguments[0], moved, *arguments[1:]))
             else:
-                taken = take_joint(plant, joint)
-                taken.put(plant, moved, taken.frame_on_child)
+                record = remove_joint(plant, joint)
+                record.add_to(plant, moved, record.frame_on_child)
 
 
 def _base_frame(plant: MultibodyPlant, base: str, default: RigidBody) -> Frame:
@@ -116,7 +116,7 @@ def _base_frame(plant: MultibodyPlant, base: str, default: RigidBody) -> Frame:
 
 
 def _root_of(plant: MultibodyPlant, frame: Frame) -> tuple[RigidBody, RigidTransform]:
-    """Return the body at the root of what a frame is welded to, and the frame's pose in it."""
+    """Return the root body that a frame is welded to, and the frame's pose in it."""
     inboard = inboard_joints(plant)
     body, X_BF = frame.body(), frame.GetFixedPoseInBodyFrame()
     while body.index() in inboard:

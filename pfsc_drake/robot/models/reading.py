@@ -1,4 +1,4 @@
-"""From a robot's model file to a finalized plant, with what there is to say about the model."""
+"""Reading of a robot's model file into a finalized plant, with warnings about the model."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -44,32 +44,32 @@ from pfsc_drake.robot.models.model_text import (
     usable_text,
 )
 from pfsc_drake.robot.models.model_xml import ModelXml, read_model_xml
-from pfsc_drake.robot.models.placement import fix_joints, place_base
+from pfsc_drake.robot.models.placement import fix_joints, weld_base
 
 _ROOTS = {".urdf": "robot", ".sdf": "sdf", ".xml": "mujoco"}
 # in an MJCF model
 _OF_NO_ACCOUNT = ("site", "light", "camera", "keyframe", "sensor", "visual", "statistic")
-# Drake says so when it takes another inertia than the model's
+# Drake's messages when it replaces an inertia of the model
 _REPLACED = ("While re-expressing as central inertia", "While parsing inertia", "invalid inertia")
 
 
 @dataclass(frozen=True)
 class ModelOptions:
-    """What is to be made of a model.
+    """Options for reading a model.
 
     Attributes:
-        base: Frame of the model that is welded to the world; empty for the root link if the
-            model leaves it floating, else for the model's own world frame.
+        base: Frame of the model that is welded to the world; empty for the root link of a floating
+            model, else for the model's own world frame.
         base_pose: Pose of that frame in the world.
         gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
         fixed_joints: Joints that do not move, with their positions [rad or m].
-        packages: Folders of packages, beside those found above the model and in
+        packages: Folders of packages, in addition to those found above the model and in
             ``ROS_PACKAGE_PATH``.
-        elastic: What the joints become.
+        elastic: Elasticity of the joints.
         joint_damping: ``K_d`` of the elastic joints, base first; empty for the model's.
         by_velocity: Whether velocity servos move the joints. Kinematics suffice then: effort
-            limits of 0 in a URDF are taken for none, and if one of its links moves without mass
-            nothing has any, and nothing damps, see :func:`idealize_drives`.
+            limits of 0 in a URDF are ignored, and if one of its links moves without mass
+            all masses and damping are ignored, see :func:`idealize_drives`.
     """
 
     base: str = ""
@@ -83,7 +83,7 @@ class ModelOptions:
 
     @property
     def moves_joints(self) -> bool:
-        """Whether joints of the model are fixed or stand elsewhere."""
+        """Whether joints of the model are fixed or moved."""
         placed = bool(self.base) or not self.base_pose.IsExactlyIdentity()
         return placed or bool(self.fixed_joints)
 
@@ -96,18 +96,18 @@ def read_model(
 ) -> list[str]:
     """Add a robot to an empty plant and finalize it.
 
-    Joints that the model does not drive are driven at their joint, up to the effort limit that a
-    URDF gives. Geometry is read only if the plant is registered with a scene graph.
+    Joints without an actuator get one, up to the effort limit of a URDF. Geometry is read only if
+    the plant is registered with a scene graph.
 
     Args:
         plant: An empty plant.
         file: The model, URDF, SDF or MJCF.
-        options: What is to be made of it.
-        before_finalizing: What else is to be added to the plant.
+        options: Options for reading.
+        before_finalizing: Function that adds further elements to the plant.
 
     Returns:
-        What there is to say about the model, one sentence each: Drake's own warnings, and what
-        of the model is not simulated.
+        Warnings about the model, one sentence each: Drake's own, and features of the model that are
+        not simulated.
 
     Raises:
         InputError: If the model cannot be read, is not physical, or the options do not suit it.
@@ -127,11 +127,11 @@ def read_model(
         massless = options.by_velocity and _moves_without_mass(model, options, facts, packages)
         _parse(plant, model, options, packages, without_masses=massless)
         _refuse_replaced_inertia(file, messages)
-        with _named(file, "cannot be simulated"):
+        with _name_file(file, "cannot be simulated"):
             add_sites(plant, models)
             _take_constraints(plant, file, facts)
             fix_joints(plant, options.fixed_joints)
-            place_base(plant, options.base, options.base_pose)
+            weld_base(plant, options.base, options.base_pose)
             if options.moves_joints or facts.drives:  # Drake reads no springs of MJCF
                 springs = facts.springs.items()
                 add_springs(plant, [(plant.GetJointByName(j), K_s) for j, K_s in springs])
@@ -156,12 +156,12 @@ def read_model(
             plant.Finalize()
             require_regular_mass_matrix(plant, file)
     rubbing = [name for name in facts.friction if name not in options.fixed_joints]
-    # or of no account, since all that follows others is fixed
-    said_below = ["joint friction", "mimic", "equality"]
+    # or irrelevant, since all followers are fixed
+    covered = ["joint friction", "mimic", "equality"]
     if facts.drives:
-        said_below += ["actuatorfrcrange", "frictionloss", "child of 'actuator'", "'stiffness'"]
-        said_below += ["'springref'", *(f"'{tag}'" for tag in _OF_NO_ACCOUNT)]
-    warnings = [m for m in messages.warnings if not any(text in m for text in said_below)]
+        covered += ["actuatorfrcrange", "frictionloss", "child of 'actuator'", "'stiffness'"]
+        covered += ["'springref'", *(f"'{tag}'" for tag in _OF_NO_ACCOUNT)]
+    warnings = [m for m in messages.warnings if not any(text in m for text in covered)]
     if rubbing and not massless:
         warnings.append(
             f"{file}: dry friction in the model ({', '.join(rubbing)}) is not simulated; "
@@ -199,14 +199,14 @@ def _check_kind(model: ModelXml) -> None:
         )
     if model.root.name != expected:
         raise InputError(
-            f"{model.place(model.root)}: cannot be read: <{model.root.name}>; allowed in a "
+            f"{model.location(model.root)}: cannot be read: <{model.root.name}>; allowed in a "
             f"file *{model.file.suffix}: <{expected}>"
         )
 
 
 @contextmanager
-def _named(file: Path, trouble: str) -> Iterator[None]:
-    """Let what Drake throws name the file; some of its checks end the program otherwise."""
+def _name_file(file: Path, trouble: str) -> Iterator[None]:
+    """Re-raise Drake's exceptions with the name of the file; some of them would end the program."""
     try:
         yield
     except InputError:
@@ -226,7 +226,7 @@ def _parse(
     parser = Parser(plant)
     parser.package_map().AddMap(packages)
     edited = usable_text(model, without_springs=options.moves_joints, without_masses=without_masses)
-    with _named(model.file, "cannot be read"):
+    with _name_file(model.file, "cannot be read"):
         if edited is None:
             parser.AddModels(str(model.file))
         else:
@@ -236,14 +236,14 @@ def _parse(
 def _moves_without_mass(
     model: ModelXml, options: ModelOptions, facts: ModelFacts, packages: PackageMap
 ) -> bool:
-    """Return whether a link of a URDF model moves without mass, as it is fixed and placed."""
+    """Return whether a link of a URDF model moves without mass, with joints fixed and placed."""
     if model.root.name != "robot":
         return False
     plant = MultibodyPlant(0.0)
     _parse(plant, model, options, packages)
-    with _named(model.file, "cannot be simulated"):
+    with _name_file(model.file, "cannot be simulated"):
         fix_joints(plant, options.fixed_joints)
-        place_base(plant, options.base, options.base_pose)
+        weld_base(plant, options.base, options.base_pose)
     try:
         require_inertia(plant, model, facts)
     except InputError:
@@ -254,7 +254,7 @@ def _moves_without_mass(
 def _drive_limits(
     plant: MultibodyPlant, facts: ModelFacts, options: ModelOptions, *, massless: bool
 ) -> tuple[dict[str, float], list[str]]:
-    """Return effort limits by joint, and the joints whose limits of 0 are taken for none."""
+    """Return effort limits by joint, and the joints whose limits of 0 are ignored."""
     joints = [joint.name() for joint in drivable_joints(plant)]
     if massless:
         return dict.fromkeys(joints, np.inf), []
@@ -264,11 +264,11 @@ def _drive_limits(
 
 
 def _require_no_dynamics(options: ModelOptions) -> None:
-    for key, given in (
+    for key, is_set in (
         ("elastic", options.elastic.is_given),
         ("joint_damping", bool(options.joint_damping)),
     ):
-        if given:
+        if is_set:
             raise InputError(f"{key}: given; allowed: none where links move without mass")
 
 
@@ -279,7 +279,7 @@ def _refuse_replaced_inertia(file: Path, messages: DrakeMessages) -> None:
 
 
 def _take_constraints(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> None:
-    """Take out what ties fixed joints to others; refuse what else acts between bodies."""
+    """Remove constraints of fixed joints; refuse other elements between bodies."""
     constraints = plant.GetConstraintIds()
     known = UniformGravityFieldElement, RevoluteSpring, PrismaticSpring
     others = [type(e).__name__ for e in force_elements(plant) if not isinstance(e, known)]
@@ -293,7 +293,7 @@ def _take_constraints(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> N
 
 
 def _take_actuators(plant: MultibodyPlant, facts: ModelFacts) -> None:
-    """Take out what Drake makes of MJCF actuators: limits of controls, and servos' own gains."""
+    """Remove Drake's actuators of an MJCF model: limits of controls, and servos' own gains."""
     if facts.drives:
         for index in plant.GetJointActuatorIndices():
             plant.RemoveJointActuator(plant.get_joint_actuator(index))
@@ -317,7 +317,7 @@ def drive_joints(
     for joint in joints:
         if actuator_of(plant, joint) is not None:
             continue
-        # Drake drives every joint of an SDF model but those with an effort limit of 0
+        # Drake drives every joint of an SDF model except those with an effort limit of 0
         is_sdf = file.suffix.lower() == ".sdf"
         effort_limit = effort_limits.get(joint.name(), 0.0 if is_sdf else np.inf)
         if effort_limit == 0.0:
@@ -330,7 +330,7 @@ def drive_joints(
 
 
 def _require_rotors(plant: MultibodyPlant, file: Path) -> None:
-    """Refuse motors of elastic joints without inertia; nothing would hold against the spring."""
+    """Refuse motors of elastic joints without inertia, which could not balance the spring."""
     inboard = inboard_joints(plant)
     for sprung in sprung_joints(plant):
         motor = inboard.get(sprung.parent_body().index())
@@ -344,7 +344,7 @@ def _require_rotors(plant: MultibodyPlant, file: Path) -> None:
 
 
 def _release_velocities(plant: MultibodyPlant) -> list[str]:
-    """Take velocity limits of zero, which nobody filled in, for none; return the joints' names."""
+    """Remove velocity limits of zero, which are unset; return the joints' names."""
     names = []
     for joint in moving_joints(plant):
         if np.any(joint.velocity_upper_limits() == 0.0):

@@ -1,7 +1,7 @@
-"""Physical parameters of a serial robot, as held by ``models/<robot>/parameters.yaml``.
+"""Physical parameters of a serial robot, as in ``models/<robot>/parameters.yaml``.
 
-The dataclasses mirror the file, say what each key means and refuse what is out of range;
-``source`` always says where the numbers are from. :func:`load_parameters` reads the file.
+The dataclasses mirror the file, describe each key and refuse values out of range;
+``source`` always names the origin of the numbers. :func:`load_parameters` reads the file.
 """
 
 import copy
@@ -62,7 +62,7 @@ class DhParameters:
         _check_entries(self, axes=self.d.size)
 
     def table(self) -> DenavitHartenberg:
-        """Returns the table with its direct kinematics."""
+        """Return the table with its direct kinematics."""
         return DenavitHartenberg(self.d, self.a, np.deg2rad(self.alpha_deg))
 
 
@@ -142,7 +142,7 @@ class BodyParameters(Parameters):
         require(bool(physical), "inertia", self.inertia, allowed)
 
     def inertia_matrix(self) -> np.ndarray:
-        """Returns the inertia about the center of mass, ``[3, 3]`` [kg m^2]."""
+        """Return the inertia about the center of mass, ``[3, 3]`` [kg m^2]."""
         xx, yy, zz, xy, xz, yz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
@@ -302,7 +302,7 @@ class ArmParameters(Parameters):
 
 
 def load_parameters(robot: str | Path) -> ArmParameters:
-    """Returns the parameters of a robot.
+    """Return the parameters of a robot.
 
     Args:
         robot: the name of a shipped serial robot (``"comau_racer_1_4"``,
@@ -324,7 +324,7 @@ def load_parameters(robot: str | Path) -> ArmParameters:
 
 @functools.lru_cache(maxsize=16)
 def _parameters(path: Path, content: str) -> ArmParameters:
-    """Returns the parameters in a file, which says ``content``; not to be changed."""
+    """Return the parameters in a file with the text ``content``; not to be changed."""
     return load_file(ArmParameters, path)
 
 

@@ -1,4 +1,4 @@
-"""What a robot looks like: primitive shapes per body, as held by ``appearance.yaml``.
+"""Appearance of a robot: primitive shapes per body, as in ``appearance.yaml``.
 
 The file is read by ``load_file(Appearance, path)`` of :mod:`pfsc_drake.yaml.typed`.
 """
@@ -50,7 +50,7 @@ class Shape:
     radius: float = 0.0
 
     def pose(self) -> list[float]:
-        """Returns ``[x, y, z, roll, pitch, yaw]`` of the primitive in its frame [m, rad]."""
+        """Return ``[x, y, z, roll, pitch, yaw]`` of the primitive in its frame [m, rad]."""
         if self.kind in ("box", "sphere"):
             return [*self.center.tolist(), 0.0, 0.0, 0.0]
         x, y, z = (self.end - self.start).tolist()
@@ -59,7 +59,7 @@ class Shape:
         return [round(value, _DIGITS) for value in (*center.tolist(), 0.0, pitch, yaw)]
 
     def geometry(self) -> ET.Element:
-        """Returns the SDF ``<geometry>`` element."""
+        """Return the SDF ``<geometry>`` element."""
         geometry = ET.Element("geometry")
         shape = ET.SubElement(geometry, self.kind)
         if self.kind == "box":
@@ -79,7 +79,7 @@ class Appearance:
     Attributes:
         materials: colours ``[red, green, blue, opacity]``, each from 0 to 1, by name.
         elastic_axis_material: replaces the material of :attr:`axes` in models with elastic joints,
-            so that both kinds can be told apart.
+            to distinguish both kinds.
         bodies: shapes by name of the body, in the body's frame.
         axes: shapes around axis i in DH frame i - 1, where z is that axis. They turn with drive i.
     """
@@ -109,14 +109,14 @@ class Appearance:
 
 
 def check_shape(where: str, shape: Shape) -> None:
-    """Refuse a shape whose kind is unknown or whose dimensions are none.
+    """Refuse a shape of unknown kind or invalid dimensions.
 
     Args:
         where: Key of the shape, for messages.
         shape: To check; its material is not.
 
     Raises:
-        InputError: One line that names key, value and what is allowed.
+        InputError: One line that names key, value and allowed values.
     """
     if shape.kind not in _NEEDS:
         raise InputError(f"{where}.kind = {shape.kind!r}: must be one of {', '.join(_NEEDS)}")
@@ -139,13 +139,13 @@ def add_shapes(
     material: str = "",
     collisions: bool = False,
 ) -> None:
-    """Appends the shapes to an SDF ``<link>`` as visuals, and as collision geometry if asked.
+    """Append the shapes to an SDF ``<link>`` as visuals and, if requested, collision geometry.
 
     Args:
         link: the ``<link>`` element; its frame is the frame of the shapes.
         shapes: to append.
-        appearance: where the materials are.
-        material: replaces the shapes' own material, if given.
+        appearance: contains the materials.
+        material: replaces the shapes' own material, if not empty.
         collisions: whether the shapes are collision geometry, too.
     """
     for shape in shapes:
@@ -161,5 +161,5 @@ def add_shapes(
 
 
 def format_numbers(values: Sequence[float] | np.ndarray) -> str:
-    """Returns numbers in the shortest form that reads back exactly, separated by spaces."""
+    """Return numbers in the shortest form that reads back exactly, separated by spaces."""
     return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)

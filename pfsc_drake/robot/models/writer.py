@@ -1,4 +1,4 @@
-"""Writes the SDF models of a robot from its parameters.
+"""Writing of the SDF models of a robot from its parameters.
 
 Frames: the body frame of ``link_i`` is DH frame i, of ``base`` DH frame 0, of ``tool`` the last DH
 frame (the flange). Joint i turns about z of DH frame i - 1, and its position is the DH angle
@@ -9,7 +9,7 @@ Rigid joints: ``joint_i`` between two links, with an actuator whose reflected in
 The plant saturates the torque of an actuator at the effort limit, with continuous time, too.
 
 Elastic joints: ``link_{i-1} -> motor_i -> rotor_i -> flex_i -> link_i``. The position of
-``motor_i`` is ``q_M,i``; that of ``flex_i`` is ``q_J,i - q_M,i``, and it carries the spring ``K_s``
+``motor_i`` is ``q_M,i``; ``flex_i`` is at ``q_J,i - q_M,i`` and carries the spring ``K_s``
 and damper ``K_d`` of (2.66). The actuator with reflected inertia D_M,i acts on ``motor_i``. The
 plant then obeys (2.65) exactly: a rotor body is a point mass on the joint axis, where it moves as a
 point of ``link_{i-1}``; its mass is taken off that link.
@@ -45,7 +45,7 @@ def write_sdf(
     *,
     collisions: bool = False,
 ) -> str:
-    """Returns the text of one SDF model; the same input gives the same text.
+    """Return the text of one SDF model; the same input gives the same text.
 
     Args:
         parameters: of the robot, as checked by ``load_parameters``.
@@ -61,7 +61,7 @@ def write_sdf(
 
 
 def main() -> None:
-    """Writes all variants of all shipped serial robots next to their parameters."""
+    """Write all variants of all shipped serial robots next to their parameters."""
     for path in sorted(models_directory().glob("*/appearance.yaml")):  # parallel robots have none
         parameters = load_parameters(path.with_name("parameters.yaml"))
         appearance = load_file(Appearance, path)
@@ -108,7 +108,7 @@ class _Writer:
         return f'<?xml version="1.0"?>\n{body}\n'
 
     def _axis(self, i: int) -> None:
-        """Adds link i + 1 with the joint (or weld) that connects it; i counts from 0."""
+        """Add link i + 1 with the joint (or weld) that connects it; i counts from 0."""
         parent = self._robot.links[i - 1].name if i else "base"
         link = self._robot.links[i]
         theta = 0.0 if i < self._moving else float(self._fixed[i - self._moving])
@@ -129,7 +129,7 @@ class _Writer:
             self._flexible_joint(f"flex_{i + 1}", i, rotor, link.name)
 
     def _axis_shapes(self, i: int, parent: str) -> None:
-        """Adds what is seen of drive i: on its rotor body, or on the link that carries it."""
+        """Add the shapes of drive i to its rotor body, or to the link that carries it."""
         shapes = self._appearance.axes[i] if i < len(self._appearance.axes) else []
         if self._elasticity is None or i >= self._moving:
             carrier = self._model.find(f"link[@name='{parent}']")
@@ -144,7 +144,7 @@ class _Writer:
         add_shapes(rotor, shapes, self._appearance, material=material, collisions=self._collisions)
 
     def _without_rotor(self, link: BodyParameters, i: int) -> BodyParameters:
-        """Returns the link without the point mass of the next rotor body at its origin."""
+        """Return the link without the point mass of the next rotor body at its origin."""
         if self._elasticity is None or i + 1 >= self._moving:
             return link
         mass = link.mass - self._robot.rotors.body_mass
@@ -177,7 +177,7 @@ class _Writer:
         pose: list[float] | None = None,
         body: BodyParameters | None = None,
     ) -> ET.Element:
-        """Adds a body at a pose in its parent; without mass properties they are zero."""
+        """Add a body at a pose in its parent; without mass properties they are zero."""
         link = ET.SubElement(self._model, "link", name=name)
         if parent is not None and pose is not None:
             ET.SubElement(link, "pose", relative_to=parent).text = format_numbers(pose)
@@ -203,7 +203,7 @@ class _Writer:
         self._joint(name, "fixed", parent, child)
 
     def _revolute(self, name: str, parent: str, child: str) -> tuple[ET.Element, ET.Element]:
-        """Adds a joint about z of the parent's frame; returns the joint and its axis."""
+        """Add a joint about z of the parent's frame; returns the joint and its axis."""
         joint = self._joint(name, "revolute", parent, child)
         ET.SubElement(joint, "pose", relative_to=parent).text = format_numbers([0.0] * 6)
         axis = ET.SubElement(joint, "axis")
@@ -211,7 +211,7 @@ class _Writer:
         return joint, axis
 
     def _drive_joint(self, name: str, i: int, parent: str, child: str) -> None:
-        """Adds the joint that drive i moves, with limits and the drive's reflected inertia."""
+        """Add the joint that drive i moves, with limits and the drive's reflected inertia."""
         joint, axis = self._revolute(name, parent, child)
         limits = self._robot.joint_limits
         limit = ET.SubElement(axis, "limit")
@@ -228,7 +228,7 @@ class _Writer:
         ET.SubElement(joint, "drake:gear_ratio").text = format_numbers([rotors.gear_ratio[i]])
 
     def _flexible_joint(self, name: str, i: int, parent: str, child: str) -> None:
-        """Adds joint i's spring and damper; effort 0 means that there is no actuator."""
+        """Add joint i's spring and damper; effort 0 means that there is no actuator."""
         assert self._elasticity is not None
         _, axis = self._revolute(name, parent, child)
         dynamics = ET.SubElement(axis, "dynamics")

@@ -27,12 +27,12 @@ class SerialChain(Linkage, RobotModel):
 
     @property
     def is_massless(self) -> bool:
-        """Whether nothing of it has mass: its kinematics alone are known."""
+        """Whether all links have no mass: only the kinematics are modelled."""
         return not self.numeric.gather("mass").any()
 
     @cached_property
     def reach(self) -> float:
-        """How far the tool point can be from the origin of the first joint at most [m]."""
+        """Upper bound of the tool point's distance from the origin of the first joint [m]."""
         offsets = [np.linalg.norm(link.p_PF) for link in self.links[1:]]
         slides = [np.abs(link.position_limits).max() for link in self.links if not link.is_revolute]
         return float(sum(offsets) + np.linalg.norm(self.p_LT) + sum(slides))
@@ -46,7 +46,7 @@ class SerialChain(Linkage, RobotModel):
 
         Args:
             link: Index of the link, from 0.
-            point: In that link's frame [m], shape (3,).
+            point: Point in that link's frame [m], shape (3,).
         """
         return replace(self, links=self.links[: link + 1], R_LT=np.eye(3), p_LT=point)
 
@@ -63,30 +63,29 @@ class SerialChain(Linkage, RobotModel):
         return newton_euler.mass_matrix(self, q)
 
 
-# by which the sum of two principal moments may be below the third
+# tolerance of the triangle inequality of principal moments
 _ROUNDING = 1e-9
 
 
-def believed_chain(
+def nominal_chain(
     chain: SerialChain, error: ModelError, mass: float, p_LC: np.ndarray, tool: str = "tool"
 ) -> SerialChain:
-    """Return what is believed of a chain.
+    """Return the nominal model of a chain.
 
     Args:
-        chain: The true one, N links.
-        error: By how much it is off, N links.
-        mass: Mass of the tool among what is fixed to the last link [kg]; 0 where that link is the
-            tool.
+        chain: The actual chain, N links.
+        error: Errors of the model, N links.
+        mass: Mass of the tool within the last link [kg]; 0 if the link is the tool.
         p_LC: The tool's centre of mass in the last link frame [m], shape (3,).
         tool: Name of the tool's body, for messages.
 
     Raises:
-        InputError: If no body can have the believed mass properties of the tool.
+        InputError: If no body can have the nominal mass properties of the tool.
     """
     links = []
     for i, link in enumerate(chain.links):
         R, p = link.R_PF, link.p_PF
-        if i > 0:  # the first joint stands in the world, at the end of no link
+        if i > 0:  # the first joint is fixed in the world, not at the end of a link
             p = p * error.link_length[i - 1]
         offset = error.joint_offset[i]
         if link.is_revolute:
@@ -113,9 +112,9 @@ def believed_chain(
 def _with_other_tool(
     link: ChainLink, R_LT: np.ndarray, error: ModelError, mass: float, p_LC: np.ndarray, tool: str
 ) -> ChainLink:
-    """Return the last link with the tool's mass and centre as believed.
+    """Return the last link with the nominal mass and centre of the tool.
 
-    The tool's inertia about its own centre stays, so that only two point masses differ.
+    The tool's inertia about its own centre is unchanged, so that only two point masses differ.
     """
     mass, p_LC = mass * error.mass[-1], p_LC + error.center[-1]
     moved = p_LC + R_LT @ error.tool_center
@@ -137,7 +136,7 @@ def _with_other_tool(
     if principal[0] < 0.0 or principal[:2].sum() < principal[2] * (1.0 - _ROUNDING):
         raise InputError(
             f"tool_mass = {error.tool_mass:g} kg, tool_center = {error.tool_center.tolist()} m; "
-            f"allowed: those of a body, which has principal moments of inertia unlike "
+            f"allowed: values of a body, which has principal moments of inertia unlike "
             f"{np.round(principal, 6).tolist()} kg m^2"
         )
     return replace(link, mass=zeroth, p_LC=center, I_C=I_C)
@@ -153,10 +152,10 @@ _PARAMETERS = ("mass", "p_LC", "I_C", "reflected_inertia", "stiffness")
 
 @dataclass(frozen=True)
 class ParametricChain(SerialChain):
-    """A chain with symbols for masses, their places and inertias, rotor inertias and stiffnesses.
+    """Chain with symbols for masses, their centres and inertias, rotor inertias and stiffnesses.
 
-    Expressions of its dynamics have these symbols in them, free. They are the same in all chains
-    of N links, so that what was made of one is found again for another.
+    Expressions of its dynamics contain these symbols. They are the same in all chains
+    of N links, so that functions created for one are reused for another.
 
     Attributes:
         nominal: A chain with numbers, of the same geometry and limits.

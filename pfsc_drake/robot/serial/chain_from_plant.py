@@ -34,7 +34,7 @@ _ROTOR_MASS_LIMIT = 1e-3
 
 @dataclass(frozen=True)
 class PlantCoordinates:
-    """Where a chain's coordinates stand in the plant's state ``x = [q, v]``.
+    """Positions of a chain's coordinates in the plant's state ``x = [q, v]``.
 
     Attributes:
         num_states: Size of the plant's state.
@@ -43,8 +43,8 @@ class PlantCoordinates:
             equal to ``link_rows`` for rigid joints.
         joints: Names of the joints that drives move, base first.
         inputs: Index of each joint's actuator in the plant's actuation; None without an actuator.
-        others: State of everything else in the plant by default, zero at the chain's own
-            coordinates, shape (num_states,); 0 for nothing else.
+        others: Default state of all other coordinates of the plant, zero at the chain's own
+            coordinates, shape (num_states,); 0 if there are none.
     """
 
     num_states: int
@@ -95,7 +95,7 @@ class PlantCoordinates:
         """Return the matrix from drives to the plant's actuation, shape (num_actuators, N).
 
         Args:
-            num_actuators: Number of actuators of the plant, which may have others besides.
+            num_actuators: Number of actuators of the plant, which may have others, too.
 
         Raises:
             InputError: If a joint has no actuator.
@@ -114,7 +114,7 @@ def state_at_rest(chain: SerialChain, coordinates: PlantCoordinates, q_J: np.nda
 
     Args:
         chain: The chain.
-        coordinates: Where its coordinates stand in the plant's state.
+        coordinates: Its coordinates in the plant's state.
         q_J: Joint coordinates, shape (N,) [rad or m].
     """
     weight, rest = np.array(gravity_function(chain)(q_J)).ravel(), np.zeros(chain.dimension)
@@ -136,11 +136,11 @@ def chain_from_plant(
         tool_frame: Frame of the plant whose origin is the tool point.
 
     Returns:
-        The chain, and where its coordinates stand in the plant's state.
+        The chain, and its coordinates in the plant's state.
 
     Raises:
-        InputError: If the plant is not finalized, or the tool hangs on something
-            else than an open chain of revolute and prismatic joints.
+        InputError: If the plant is not finalized, or the tool is not at the end of
+            an open chain of revolute and prismatic joints.
     """
     if not plant.is_finalized():
         raise InputError("plant: not finalized; call Finalize() before extracting a chain")
@@ -169,8 +169,8 @@ def chain_from_plant(
         if following is not None and following.index() in springs:
             _check_elastic_pair(plant, context, joint, following)
             flex = next(remaining)
-        carried = _next_motor(joints, flex or joint, springs)
-        links.append(_link(plant, context, parent, joint, flex, carried, springs))
+        next_motor = _next_motor(joints, flex or joint, springs)
+        links.append(_link(plant, context, parent, joint, flex, next_motor, springs))
         motors.append(joint)
         flexes.append(flex)
         parent = (flex or joint).frame_on_child()
@@ -289,7 +289,7 @@ def _link(
     next_motor: Joint | None,
     springs: dict[JointIndex, float],
 ) -> ChainLink:
-    """Describe one joint, with everything welded to its child, in the joint's child frame.
+    """Describe one joint, with all bodies welded to its child, in the joint's child frame.
 
     The body between the next motor joint and its flex joint belongs to this link too.
     """

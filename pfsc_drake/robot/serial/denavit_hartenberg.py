@@ -9,7 +9,7 @@ from pfsc_drake.errors import InputError
 
 
 def dh_transform(theta: float, d: float, a: float, alpha: float) -> np.ndarray:
-    """Returns the homogeneous transformation from DH frame i to DH frame i - 1, eq. (2.4).
+    """Return the homogeneous transformation from DH frame i to DH frame i - 1, eq. (2.4).
 
     ``H_{i-1}^i = H_{Rz,theta} H_{Tz,d} H_{Tx,a} H_{Rx,alpha}`` with the block form (2.2).
 
@@ -68,7 +68,7 @@ class DenavitHartenberg:
         return self.d.size
 
     def link_poses(self, q: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Returns the poses of all DH frames in the base, ``H_0^i`` of (2.3) for i = 0..N.
+        """Return the poses of all DH frames in the base, ``H_0^i`` of (2.3) for i = 0..N.
 
         Args:
             q: ``[N]`` DH angles [rad].
@@ -91,7 +91,7 @@ class DenavitHartenberg:
     def pose(
         self, q: Sequence[float] | np.ndarray, tool_offset: Sequence[float] | np.ndarray = (0, 0, 0)
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns position and orientation of the end-effector, eq. (2.5).
+        """Return position and orientation of the end-effector, eq. (2.5).
 
         Args:
             q: ``[N]`` DH angles [rad].

@@ -39,7 +39,7 @@ class LinkMotion:
 
 
 def _joint_pose(link: ChainLink, q: Jet) -> tuple[Jet, Jet]:
-    """Pose of the link in the previous link's frame."""
+    """Return the pose of the link in the previous link's frame."""
     R_PF, p_PF = _symbolic(link.R_PF), _symbolic(link.p_PF)
     axis = _symbolic(link.axis)
     if link.is_revolute:
@@ -85,7 +85,7 @@ def inverse_dynamics(
     Args:
         chain: The robot, N joints.
         q: Joint coordinates, N scalar jets of order r >= 2.
-        motions: Motions for these very coordinates, if known already.
+        motions: Motions for the same coordinates, if known already.
 
     Returns:
         N scalar jets of order r - 2 [Nm or N].
@@ -148,15 +148,15 @@ def points_on_links(
     Args:
         chain: The robot, N joints.
         q: Joint coordinates, N scalar jets of order r >= 1.
-        points: Points of each the index of its link, 0 for the first that moves, to N - 1, and
-            where it is in that link's frame [m], shape (3,).
-        motions: Motions for these very coordinates, if known already.
+        points: Points, each by the index of its link, 0 for the first that moves, to N - 1, and
+            its position in that link's frame [m], shape (3,).
+        motions: Motions for the same coordinates, if known already.
 
     Returns:
         Positions in world axes [m], vector jets of order r, in the order of ``points``.
     """
     motions = link_motions(chain, q) if motions is None else motions
-    poses, places = _link_poses(motions), []
+    poses, positions = _link_poses(motions), []
     turns: dict[int, Jet] = {}
     for k, point in points:
         motion, (R_WL, p_WL) = motions[k], poses[k]
@@ -164,8 +164,8 @@ def points_on_links(
         if k not in turns:
             turns[k] = _integrate_rotation(R_WL, motion.w)
         velocity = turns[k] @ (motion.v + jets.cross(motion.w, p_LQ))
-        places.append(velocity.integrate(p_WL + R_WL @ p_LQ))
-    return places
+        positions.append(velocity.integrate(p_WL + R_WL @ p_LQ))
+    return positions
 
 
 def _link_poses(motions: Sequence[LinkMotion]) -> list[tuple[ca.SX, ca.SX]]:

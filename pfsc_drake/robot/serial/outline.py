@@ -1,4 +1,4 @@
-"""The outline of an arm: capsules along its links, by which its distance from others is told."""
+"""Outline of an arm: capsules along its links, for distances from obstacles."""
 
 from dataclasses import dataclass
 
@@ -19,11 +19,11 @@ _NEAR = 0.1
 class ArmOutline:
     """Capsules of one radius, end to end, from the second joint's origin to the tool point.
 
-    What is before the second joint turns on the spot at most.
+    Parts before the second joint are ignored: they turn on the spot at most.
 
     Attributes:
-        points: P points; of each the index of its link and where it is in that link's frame [m].
-        radius: Of all capsules [m].
+        points: P points, each by the index of its link and its position in the link's frame [m].
+        radius: Radius of all capsules [m].
     """
 
     points: tuple[tuple[int, tuple[float, float, float]], ...]
@@ -38,7 +38,7 @@ def arm_outline(chain: SerialChain, radius: float) -> ArmOutline:
 
     Args:
         chain: The arm, two joints or more.
-        radius: Of its capsules [m], within which all of its links are.
+        radius: Radius of its capsules [m], which contain all of its links.
 
     Raises:
         InputError: If there are fewer joints.
@@ -48,19 +48,21 @@ def arm_outline(chain: SerialChain, radius: float) -> ArmOutline:
         raise InputError(f"outline of an arm: {n} joint; allowed: two or more")
     middle = chain.gather("position_limits").clip(-np.pi, np.pi).mean(axis=1)
     every = [(k, (0.0, 0.0, 0.0)) for k in range(1, n)]
-    places = outline_points(chain, ArmOutline(tuple(every), radius))(middle).full().reshape(-1, 3)
-    kept, last = [every[0]], places[0]
-    for point, place in zip(every[1:], places[1:], strict=True):
-        if np.linalg.norm(place - last) >= _NEAR:
-            kept.append(point)
-            last = place
+    positions = (
+        outline_points(chain, ArmOutline(tuple(every), radius))(middle).full().reshape(-1, 3)
+    )
+    selected, last = [every[0]], positions[0]
+    for point, position in zip(every[1:], positions[1:], strict=True):
+        if np.linalg.norm(position - last) >= _NEAR:
+            selected.append(point)
+            last = position
     x, y, z = (float(value) for value in chain.p_LT)
-    return ArmOutline((*kept, (n - 1, (x, y, z))), radius)
+    return ArmOutline((*selected, (n - 1, (x, y, z))), radius)
 
 
 @once_per_content()
 def outline_points(chain: SerialChain, outline: ArmOutline) -> ca.Function:
-    """Return ``q -> points``, where the outline's points are in the world, shape (3P,) [m].
+    """Return ``q -> points``, the outline's points in the world, shape (3P,) [m].
 
     Args:
         chain: The arm, N joints.
@@ -68,6 +70,6 @@ def outline_points(chain: SerialChain, outline: ArmOutline) -> ca.Function:
     """
     q = ca.SX.sym("q", chain.dimension)
     still = [jets.constant(q[i], 1) for i in range(chain.dimension)]
-    points = [(link, np.array(place)) for link, place in outline.points]
-    places = [place.coefficients[0] for place in points_on_links(chain, still, points)]
-    return ca.Function("outline", [q], [ca.densify(ca.vertcat(*places))], ["q"], ["points"])
+    points = [(link, np.array(position)) for link, position in outline.points]
+    positions = [position.coefficients[0] for position in points_on_links(chain, still, points)]
+    return ca.Function("outline", [q], [ca.densify(ca.vertcat(*positions))], ["q"], ["points"])

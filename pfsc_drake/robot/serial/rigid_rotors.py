@@ -1,7 +1,7 @@
 """A serial robot with stiff joints and spinning rotors, (2.36) and (2.62).
 
-With the joints stiff the rotors turn with the links, ``q_M = q_J``. What is left of the full
-model's kinetic energy is, with ``D_E``, ``D_M`` and ``U`` of
+With the joints stiff the rotors turn with the links, ``q_M = q_J``. The full model's kinetic
+energy reduces to, with ``D_E``, ``D_M`` and ``U`` of
 :mod:`~pfsc_drake.robot.serial.rotor_coupling`::
 
     T = v' (D_E(q) + D_M + U(q) + U'(q)) v / 2
@@ -47,7 +47,7 @@ def rigid_bias_torque(
     bias = bias_torque(chain, q, v)
     if mounts is None:
         return bias
-    # Lagrange's equations for T_c = v' U' v, accelerations left out
+    # Lagrange's equations for T_c = v' U' v, without accelerations
     T_c = ca.dot(rotor_momentum(chain, mounts, q, v), v)
     return bias + ca.jtimes(ca.gradient(T_c, v), q, v) - ca.gradient(T_c, q)
 

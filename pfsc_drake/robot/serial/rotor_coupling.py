@@ -2,15 +2,15 @@
 
 The simplified model (2.65) counts a rotor's spin about its own axis only against the motor
 coordinate (``D_M``). The full model adds the last term of (2.62), by which a turning link
-accelerates the rotors it carries and the other way round::
+accelerates its rotors and vice versa::
 
     T_c = v_M' U'(q_J) v_J,   (U' v_J)_j = I_M,j / k_r,j  e_z,M,j . omega_i
 
-with rotor j carried by link i, its spin axis ``e_z,M,j``, its inertia ``I_M,j`` about that axis and
+with rotor j on link i, its spin axis ``e_z,M,j``, its inertia ``I_M,j`` about that axis and
 ``1 / k_r,j`` turns per turn of the joint, so that ``I_M,j / k_r,j = D_M,j k_r,j``.
 
-The link inertias have to contain the mass and the inertia of the rotors at rest, as they do in the
-models of this project; else the mass matrix is not positive definite.
+The link inertias must include the mass and the inertia of the rotors at rest, as in the models of
+this project; else the mass matrix is not positive definite.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ _FRAME_TOLERANCE, _INERTIA_TOLERANCE = 1e-6, 1e-4
 
 @dataclass(frozen=True, eq=False)
 class RotorMount:
-    """Where the rotor of one drive sits, a row of Tab. 2.3.
+    """Mounting of the rotor of one drive, a row of Tab. 2.3.
 
     Attributes:
         link: Link that carries it: 1 is the first moving link, 0 the base.
@@ -55,7 +55,7 @@ class RotorMount:
 def mounts_from_dh(
     links: Sequence[int], axes: np.ndarray, gear_ratios: np.ndarray, alpha: np.ndarray
 ) -> list[RotorMount]:
-    """Return mounts whose axes are given in DH frames, as in Tab. 2.3.
+    """Return mounts with axes in DH frames, as in Tab. 2.3.
 
     Args:
         links: Carrying link i of each rotor, N numbers from 0 (base) to N.
@@ -76,14 +76,14 @@ def _R_x(angle: float) -> np.ndarray:
 
 
 def mounts_from_parameters(chain: SerialChain, robot: ArmParameters) -> list[RotorMount]:
-    """Return where the rotors of a robot sit, of its first joints if the chain has fewer.
+    """Return the mounts of a robot's rotors, of its first joints if the chain has fewer.
 
     Args:
         chain: The robot, taken from a model that :mod:`~pfsc_drake.robot.models.writer` wrote.
         robot: Its parameters.
 
     Raises:
-        InputError: If the parameters do not say where, or are another robot's: joint frames
+        InputError: If the parameters do not define them, or belong to another robot: joint frames
             and ``D_M`` must agree.
     """
     rotors, table, n = robot.rotors, robot.denavit_hartenberg.table(), chain.dimension
@@ -100,8 +100,8 @@ def mounts_from_parameters(chain: SerialChain, robot: ArmParameters) -> list[Rot
             turned and np.allclose(link.axis, [0.0, 0.0, 1.0], rtol=0.0, atol=_FRAME_TOLERANCE)
         ):
             raise InputError(
-                f"{robot.name}: the frame of joint {j} ({link.name}) is not that of its "
-                "Denavit-Hartenberg table; must be, for spin_axes to mean the same"
+                f"{robot.name}: the frame of joint {j} ({link.name}) differs from its "
+                "Denavit-Hartenberg table; must be the same, for spin_axes to agree"
             )
         if not np.isclose(link.reflected_inertia, D_M, rtol=_INERTIA_TOLERANCE, atol=0.0):
             raise InputError(
@@ -138,10 +138,10 @@ def check_mounts(chain: SerialChain, mounts: Sequence[RotorMount]) -> None:
 def rotor_momentum(
     chain: SerialChain, mounts: Sequence[RotorMount], q_J: ca.SX, v_J: ca.SX
 ) -> ca.SX:
-    """Return ``U'(q_J) v_J``, what the links' motion adds to the motors' momenta, (N, 1).
+    """Return ``U'(q_J) v_J``, the contribution of the links to the motors' momenta, (N, 1).
 
     Args:
-        chain: The robot; its ``D_M`` holds the rotors' inertias.
+        chain: The robot; its ``D_M`` contains the rotors' inertias.
         mounts: Its rotors, N of them.
         q_J: Joint coordinates, shape (N, 1).
         v_J: Their velocities, shape (N, 1).

@@ -1,4 +1,4 @@
-"""The swivel angle of an arm: how far its elbow is turned about the line from shoulder to wrist."""
+"""Swivel angle of an arm: the turn of its elbow about the line from shoulder to wrist."""
 
 from collections.abc import Sequence
 
@@ -10,18 +10,17 @@ from pfsc_drake.jets import Jet
 from pfsc_drake.robot.serial.links import Linkage
 from pfsc_drake.robot.serial.newton_euler import points_on_links
 
-# of the angle between the arm's line and the direction from which a swivel angle is counted
+# of the angle between the arm's line and the reference direction of a swivel angle
 _LEAST_SINE = 0.3
 
 
 def swivel_angle(
     chain: Linkage, q: Sequence[Jet], joints: tuple[int, int, int], upward: np.ndarray
 ) -> Jet:
-    """Return the angle from the plane of shoulder, wrist and a direction to that of the elbow.
+    """Return the angle of the elbow about the line from shoulder to wrist.
 
-    It is counted about the direction from shoulder to wrist; zero where the elbow is on the side
-    of ``upward``. It is not defined where shoulder and wrist lie one above the other, or in line
-    with the elbow.
+    It is zero where the elbow is in the half-plane of ``upward``. It is not defined where shoulder
+    and wrist lie one above the other, or in line with the elbow.
 
     Args:
         chain: The arm.
@@ -44,10 +43,10 @@ def swivel_angle(
 
 
 def upward_direction(chain: Linkage, q: np.ndarray, joints: tuple[int, int, int]) -> np.ndarray:
-    """Return a direction from which a swivel angle can be counted, shape (3,).
+    """Return a reference direction for a swivel angle, shape (3,).
 
-    That is against gravity, unless shoulder and wrist stand nearly one above the other, or there
-    is no gravity: then it is the axis of the world that is most across.
+    It is opposite to gravity, unless shoulder and wrist lie nearly one above the other, or there
+    is no gravity: then it is the axis of the world that is most nearly perpendicular to their line.
 
     Args:
         chain: The arm.
@@ -67,5 +66,5 @@ def upward_direction(chain: Linkage, q: np.ndarray, joints: tuple[int, int, int]
 
 
 def _points(chain: Linkage, q: Sequence[Jet], joints: tuple[int, int, int]) -> list[Jet]:
-    """Return where shoulder, elbow and wrist are [m]."""
+    """Return the positions of shoulder, elbow and wrist [m]."""
     return points_on_links(chain, q, [(joint, np.zeros(3)) for joint in joints])

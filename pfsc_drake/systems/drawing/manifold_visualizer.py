@@ -1,4 +1,4 @@
-"""Paths, surfaces and regions in Meshcat; surfaces coloured by what is felt on them."""
+"""Paths, surfaces and regions in Meshcat, and colours of signed values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
@@ -13,22 +13,22 @@ from pfsc_drake.systems.drawing.numbers import SceneNumber
 from pfsc_drake.systems.drawing.tool_visualizer import draw_frame
 
 _PATH_ROOT, _SURFACE_ROOT, _REGION_ROOT = "path_following", "surface_following", "fixtures"
-_LINE = Rgba(0.15, 0.4, 0.85, 1.0)
+LINE_COLOR = Rgba(0.15, 0.4, 0.85, 1.0)
 _PATH_POINTS = 800
 
 
 class LineVisualizer(LeafSystem):
-    """Draws lines of a path, and the parallel transport frame at the projected point.
+    """Draws lines of a path, and the parallel transport frame at the closest point.
 
     The frame's axes are red ``e_par``, green ``e_perp``, blue ``e_cross``.
 
     Ports:
-        path_point (input): From the path's projector.
+        path_point (input): Path point from the projector.
 
     Args:
         lines: Points of each line [m], each (points, 3).
         layout: Layout of the path point.
-        meshcat: Where to draw.
+        meshcat: Meshcat instance.
         period: Time between frames [s].
     """
 
@@ -48,7 +48,7 @@ class LineVisualizer(LeafSystem):
     def _draw_path(self, context: Context) -> EventStatus:
         for k, points in enumerate(self._lines):
             name = f"{_PATH_ROOT}/path_{k}" if k else f"{_PATH_ROOT}/path"
-            self._meshcat.SetLine(name, points.T, 3.0, _LINE)
+            self._meshcat.SetLine(name, points.T, 3.0, LINE_COLOR)
         draw_frame(self._meshcat, f"{_PATH_ROOT}/frame")
         return EventStatus.Succeeded()
 
@@ -65,12 +65,12 @@ class LineVisualizer(LeafSystem):
 
 
 class PathVisualizer(LineVisualizer):
-    """Draws a path that is known, see :class:`LineVisualizer`.
+    """Draws a known path, see :class:`LineVisualizer`.
 
     Args:
         path: The path.
         layout: Layout of the path point.
-        meshcat: Where to draw.
+        meshcat: Meshcat instance.
         period: Time between frames [s].
     """
 
@@ -82,24 +82,24 @@ class PathVisualizer(LineVisualizer):
         super().__init__([line], layout, meshcat, period)
 
 
-_SKIN = Rgba(0.45, 0.65, 0.95, 0.35)
-_CORE, _TUBE = Rgba(0.85, 0.35, 0.05), Rgba(0.95, 0.65, 0.2, 0.2)
+SKIN_COLOR = Rgba(0.45, 0.65, 0.95, 0.35)
+GUIDE_COLOR, TUBE_COLOR = Rgba(0.85, 0.35, 0.05), Rgba(0.95, 0.65, 0.2, 0.2)
 
 
 class SurfaceVisualizer(LeafSystem):
-    """Draws a surface, and its frame at the projected point.
+    """Draws a surface, and its frame at the closest point.
 
-    The frame's axes are red the first tangent, green the second across it, blue the normal.
+    The frame's axes are red the first tangent, green the perpendicular tangent, blue the normal.
 
     Ports:
-        manifold_point (input): From the projector.
+        manifold_point (input): Manifold point from the projector.
 
     Args:
         skin: Points of the surface on a grid [m], shape (rows, columns, 3).
         lines: Lines on it [m], each (points, 3).
         size: Size of the manifold's point.
-        place: ``point -> (position, axes)``, shapes (3,) and (3, 3).
-        meshcat: Where to draw.
+        frame: ``point -> (position, axes)``, shapes (3,) and (3, 3).
+        meshcat: Meshcat instance.
         period: Time between frames [s].
     """
 
@@ -108,12 +108,12 @@ class SurfaceVisualizer(LeafSystem):
         skin: np.ndarray,
         lines: Sequence[np.ndarray],
         size: int,
-        place: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+        frame: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
         meshcat: Meshcat,
         period: float,
     ) -> None:
         super().__init__()
-        self._skin, self._lines, self._place, self._meshcat = skin, lines, place, meshcat
+        self._skin, self._lines, self._frame, self._meshcat = skin, lines, frame, meshcat
         self._point = self.DeclareVectorInputPort("manifold_point", size)
         self.DeclareInitializationPublishEvent(self._draw_surface)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
@@ -127,7 +127,7 @@ class SurfaceVisualizer(LeafSystem):
         point = self._point.Eval(context)
         if not np.isfinite(point).all():
             return
-        position, axes = self._place(point)
+        position, axes = self._frame(point)
         X_WF = RigidTransform(RotationMatrix.ProjectToRotationMatrix(axes), position)
         self._meshcat.SetTransform(f"{_SURFACE_ROOT}/frame", X_WF, context.get_time())
 
@@ -135,31 +135,31 @@ class SurfaceVisualizer(LeafSystem):
 def draw_surface(
     meshcat: Meshcat, root: str, skin: np.ndarray, lines: Sequence[np.ndarray]
 ) -> None:
-    """Draw a surface that one can see through.
+    """Draw a translucent surface.
 
     Args:
-        meshcat: Where to draw.
-        root: Meshcat path of what is drawn.
+        meshcat: Meshcat instance.
+        root: Meshcat path of the surface.
         skin: Points of the surface on a grid [m], shape (rows, columns, 3).
         lines: Lines on it [m], each (points, 3).
     """
     vertices, faces = _triangles(skin)
     both = np.vstack([faces, faces[:, ::-1]])
-    meshcat.SetTriangleMesh(f"{root}/skin", vertices.T, both.T, _SKIN)
+    meshcat.SetTriangleMesh(f"{root}/skin", vertices.T, both.T, SKIN_COLOR)
     for i, line in enumerate(lines):
-        meshcat.SetLine(f"{root}/line_{i}", line.T, 1.0, _LINE)
+        meshcat.SetLine(f"{root}/line_{i}", line.T, 1.0, LINE_COLOR)
 
 
 def draw_guide(meshcat: Meshcat, root: str, core: np.ndarray, tube: np.ndarray) -> None:
-    """Draw a path that attracts, and a tube round it that one can see through.
+    """Draw an attracting path and a translucent tube around it.
 
     Args:
-        meshcat: Where to draw.
-        root: Meshcat path of what is drawn.
+        meshcat: Meshcat instance.
+        root: Meshcat path of the drawing.
         core: Points of a thin tube, the path itself, on a grid [m], shape (rows, columns, 3).
         tube: Points of a wide one [m], likewise.
     """
-    for name, grid, colour in (("path", core, _CORE), ("tube", tube, _TUBE)):
+    for name, grid, colour in (("path", core, GUIDE_COLOR), ("tube", tube, TUBE_COLOR)):
         vertices, faces = _triangles(grid)
         both = np.vstack([faces, faces[:, ::-1]])
         meshcat.SetTriangleMesh(f"{root}/{name}", vertices.T, both.T, colour)
@@ -174,12 +174,12 @@ def _triangles(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid.reshape(-1, 3), faces.reshape(-1, 3)
 
 
-# so many numbers can be read at a time; of more, those are shown that are nearest to the tool
+# largest number of readable labels; of more, those nearest to the tool are shown
 _READABLE = 8
 
 
 class RegionVisualizer(LeafSystem):
-    """Draws the surfaces that a tool may not cross, and the world's axes at the tool.
+    """Draws the boundaries of regions, and the world's axes at the tool.
 
     Of more than eight numbers those of the nearest regions are shown.
 
@@ -190,11 +190,11 @@ class RegionVisualizer(LeafSystem):
     Args:
         surfaces: Surfaces of each region points on a grid [m], shape (rows, columns, 3), and lines
             on it [m], each (points, 3).
-        moving: How regions that move are placed at a time of the clock, by their index.
+        moving: Pose of each moving region at a time of the clock, by its index.
         size: Size of the manifold's point.
-        meshcat: Where to draw.
+        meshcat: Meshcat instance.
         period: Time between frames [s].
-        numbers: What stands beside surfaces, by their index, and moves with them.
+        numbers: Numbers beside surfaces, by their index, which move with them.
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class RegionVisualizer(LeafSystem):
     ) -> None:
         super().__init__()
         self._surfaces, self._moving, self._meshcat = surfaces, moving, meshcat
-        self._numbers, self._seen = numbers, set(numbers)
+        self._numbers, self._visible = numbers, set(numbers)
         ends = [*numbers, len(surfaces)][1:]
         self._clouds = {
             first: np.concatenate([skin.reshape(-1, 3) for skin, _ in surfaces[first:end]])
@@ -224,7 +224,7 @@ class RegionVisualizer(LeafSystem):
             draw_surface(self._meshcat, f"{_REGION_ROOT}/{i}", skin, lines)
         for i, shown in self._numbers.items():
             shown.draw(self._meshcat, f"{_REGION_ROOT}/{i}/number")
-        self._seen = set(self._numbers)
+        self._visible = set(self._numbers)
         draw_frame(self._meshcat, f"{_REGION_ROOT}/frame")
         return EventStatus.Succeeded()
 
@@ -233,28 +233,28 @@ class RegionVisualizer(LeafSystem):
         if np.isfinite(position).all():
             X_WF = RigidTransform(position)
             self._meshcat.SetTransform(f"{_REGION_ROOT}/frame", X_WF, context.get_time())
-        placed: dict[int, RigidTransform] = {}
+        poses: dict[int, RigidTransform] = {}
         if self._clock.HasValue(context):
             clock = float(self._clock.Eval(context)[0])
-            placed = {i: placement(clock) for i, placement in self._moving.items()}
-        for i, X_WR in placed.items():
+            poses = {i: placement(clock) for i, placement in self._moving.items()}
+        for i, X_WR in poses.items():
             self._meshcat.SetTransform(f"{_REGION_ROOT}/{i}", X_WR, context.get_time())
         if len(self._numbers) > _READABLE and np.isfinite(position).all():
-            self._show_nearest(position, placed, context.get_time())
+            self._show_nearest(position, poses, context.get_time())
 
     def _show_nearest(
-        self, position: np.ndarray, placed: Mapping[int, RigidTransform], time: float
+        self, position: np.ndarray, poses: Mapping[int, RigidTransform], time: float
     ) -> None:
-        """Show the numbers of the regions that are nearest to the tool."""
+        """Show the numbers of the regions nearest to the tool."""
         distances = {}
         for i, cloud in self._clouds.items():
-            p_R = placed[i].inverse() @ position if i in placed else position
+            p_R = poses[i].inverse() @ position if i in poses else position
             distances[i] = float(np.square(cloud - p_R).sum(axis=1).min())
         nearest = set(sorted(distances, key=distances.__getitem__)[:_READABLE])
-        for i in self._seen ^ nearest:  # what the scene does not show yet
+        for i in self._visible ^ nearest:  # those that change
             path = f"{_REGION_ROOT}/{i}/number"
             self._meshcat.SetProperty(path, "visible", i in nearest, time)
-        self._seen = nearest
+        self._visible = nearest
 
 
 # red, green, blue of the lowest value, of zero, and of the highest
@@ -266,8 +266,8 @@ def signed_color(value: float, largest: float) -> Rgba:
 
     Args:
         value: The value, in any unit.
-        largest: Magnitude of the values that have full colour, in the same unit, positive; what
-            is beyond has full colour, too.
+        largest: Magnitude that has full colour, in the same unit, positive; larger ones have it,
+            too.
     """
     share = min(abs(value) / largest, 1.0)
     end = _HIGH if value > 0.0 else _LOW

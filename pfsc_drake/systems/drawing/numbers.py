@@ -1,4 +1,4 @@
-"""Numbers in a scene, drawn as strokes: Meshcat knows no text, and no line but a thin one."""
+"""Numbers in a scene, drawn as strokes: Meshcat has no text, and thin lines only."""
 
 from dataclasses import dataclass
 
@@ -30,13 +30,13 @@ class SceneNumber:
 
     Attributes:
         number: Zero or a positive integer.
-        place: Where the middle of its foot is [m], shape (3,).
-        across: Unit vector in which it is read, shape (3,).
-        height: [m].
+        base: Middle of its lower edge [m], shape (3,).
+        across: Unit vector of the reading direction, shape (3,).
+        height: Height [m].
     """
 
     number: int
-    place: np.ndarray
+    base: np.ndarray
     across: np.ndarray
     height: float
 
@@ -48,11 +48,11 @@ class SceneNumber:
         )
         flat[:, 0] -= (_PITCH * (len(digits) - 1) + _CORNERS[1, 0]) / 2.0
         axes = np.stack([self.across, [0.0, 0.0, 1.0]])
-        points = self.place + self.height * flat @ axes
+        points = self.base + self.height * flat @ axes
         return np.stack([points[0::2], points[1::2]])
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return flat bars, seen from both sides: vertices [m] (K, 3), triangles (M, 3)."""
+        """Return flat bars, visible from both sides: vertices [m] (K, 3), triangles (M, 3)."""
         starts, ends = self.strokes()
         bold = _BOLD * self.height
         along = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
@@ -64,11 +64,11 @@ class SceneNumber:
         return corners.reshape(-1, 3), triangles.reshape(-1, 3)
 
     def draw(self, meshcat: Meshcat, path: str) -> None:
-        """Draw it.
+        """Draw the number.
 
         Args:
-            meshcat: Where to draw.
-            path: Path of the number, which moves with what is above it.
+            meshcat: Meshcat instance.
+            path: Meshcat path of the number, which moves with its parents.
         """
         vertices, triangles = self.mesh()
         meshcat.SetTriangleMesh(path, vertices.T, triangles.T, _INK)

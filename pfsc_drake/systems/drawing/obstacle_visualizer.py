@@ -1,4 +1,4 @@
-"""Obstacles in Meshcat: spheres, and columns as persons in the room that they may need."""
+"""Obstacles in Meshcat: spheres, and columns for persons with the space that they may need."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from pfsc_drake.control.obstacles.shapes import ObstacleShape
 _ROOT = "/drake/obstacles"
 # m, of a person who stands on the floor z = 0
 _HEIGHT, _BODY, _HEAD, _RIM = 1.75, 0.17, 0.11, 0.005
-_SOLID, _ROOM, _MARGIN = (
+OBSTACLE_COLOR, _ROOM, MARGIN_COLOR = (
     Rgba(0.12, 0.32, 0.52, 1.0),
     Rgba(0.2, 0.5, 0.8, 0.18),
     Rgba(0.85, 0.2, 0.15, 0.28),
@@ -20,15 +20,15 @@ _SOLID, _ROOM, _MARGIN = (
 
 
 class ObstacleVisualizer(LeafSystem):
-    """Draws obstacles, and around them the distance that is kept.
+    """Draws obstacles, and around them the safety distance.
 
     Ports:
-        positions (input): Of K obstacles [m], shape (3K,).
+        positions (input): Positions of K obstacles [m], shape (3K,).
 
     Args:
-        shapes: What they are.
-        margin: Distance that is kept from them [m].
-        meshcat: Where to draw, axes of the world.
+        shapes: Shapes of the obstacles.
+        margin: Safety distance [m].
+        meshcat: Meshcat instance, axes of the world.
         period: Time between frames [s].
     """
 
@@ -45,8 +45,8 @@ class ObstacleVisualizer(LeafSystem):
         for k, shape in enumerate(self._shapes):
             path, r = f"{_ROOT}/{k}", shape.radius
             if shape.kind == "sphere":
-                self._meshcat.SetObject(f"{path}/body", Sphere(r), _SOLID)
-                self._meshcat.SetObject(f"{path}/margin", Sphere(r + self._margin), _MARGIN)
+                self._meshcat.SetObject(f"{path}/body", Sphere(r), OBSTACLE_COLOR)
+                self._meshcat.SetObject(f"{path}/margin", Sphere(r + self._margin), MARGIN_COLOR)
                 continue
             if shape.kind == "capsules":
                 self._draw_parts(path, shape)
@@ -54,10 +54,10 @@ class ObstacleVisualizer(LeafSystem):
             body = min(_BODY, r)
             length = _HEIGHT - 2.0 * _HEAD - 2.0 * body
             parts = {
-                "body": (Capsule(body, length), _SOLID, body + length / 2.0),
-                "head": (Sphere(_HEAD), _SOLID, _HEIGHT - _HEAD),
+                "body": (Capsule(body, length), OBSTACLE_COLOR, body + length / 2.0),
+                "head": (Sphere(_HEAD), OBSTACLE_COLOR, _HEIGHT - _HEAD),
                 "room": (Cylinder(r, _HEIGHT), _ROOM, _HEIGHT / 2.0),
-                "margin": (Cylinder(r + self._margin, _RIM), _MARGIN, _RIM / 2.0),
+                "margin": (Cylinder(r + self._margin, _RIM), MARGIN_COLOR, _RIM / 2.0),
             }
             for name, (form, colour, height) in parts.items():
                 self._meshcat.SetObject(f"{path}/{name}", form, colour)
@@ -67,22 +67,22 @@ class ObstacleVisualizer(LeafSystem):
 
     def _draw_parts(self, path: str, shape: ObstacleShape) -> None:
         for i, part in enumerate(shape.parts):
-            start, way = np.array(part.start), np.subtract(part.end, part.start)
-            length, r = float(np.linalg.norm(way)), part.radius
+            start, axis = np.array(part.start), np.subtract(part.end, part.start)
+            length, r = float(np.linalg.norm(axis)), part.radius
             pose = RigidTransform(start)
             if length:
-                R_WP = RotationMatrix.MakeFromOneVector(way, 2)
-                pose = RigidTransform(R_WP, start + way / 2.0)
+                R_WP = RotationMatrix.MakeFromOneVector(axis, 2)
+                pose = RigidTransform(R_WP, start + axis / 2.0)
             for name, radius, colour in (
-                ("body", r, _SOLID),
-                ("margin", r + self._margin, _MARGIN),
+                ("body", r, OBSTACLE_COLOR),
+                ("margin", r + self._margin, MARGIN_COLOR),
             ):
                 form = Capsule(radius, length) if length else Sphere(radius)
                 self._meshcat.SetObject(f"{path}/{name}_{i}", form, colour)
                 self._meshcat.SetTransform(f"{path}/{name}_{i}", pose)
 
     def _draw(self, context: Context) -> None:
-        places = np.array(self._positions.Eval(context)).reshape(-1, 3)
-        for k, (shape, place) in enumerate(zip(self._shapes, places, strict=True)):
-            there = place * shape.axes.full().ravel()
-            self._meshcat.SetTransform(f"{_ROOT}/{k}", RigidTransform(there), context.get_time())
+        positions = np.array(self._positions.Eval(context)).reshape(-1, 3)
+        for k, (shape, position) in enumerate(zip(self._shapes, positions, strict=True)):
+            origin = position * shape.axes.full().ravel()
+            self._meshcat.SetTransform(f"{_ROOT}/{k}", RigidTransform(origin), context.get_time())

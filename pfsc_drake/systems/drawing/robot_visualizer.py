@@ -25,7 +25,7 @@ _ROOT = "visualizer"
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """Triangles.
+    """A triangle mesh.
 
     Attributes:
         vertices: Points [m], shape (v, 3).
@@ -38,14 +38,14 @@ class Triangles:
 
 @dataclass(frozen=True, eq=False)
 class BodyPart:
-    """Something drawn that moves with a body of a plant.
+    """A drawn part that moves with a body of a plant.
 
     Attributes:
         body: The body B.
-        name: Name, of its own among the parts of the body.
-        form: What it looks like.
+        name: Name, unique among the parts of the body.
+        form: Shape.
         X_BP: Pose of the part's frame P in B.
-        color: Colour, where the form has none of its own.
+        color: Colour, if the form has none of its own.
     """
 
     body: RigidBody
@@ -69,16 +69,16 @@ def body_path(plant: MultibodyPlant, body: RigidBody, root: str = _ROOT) -> str:
 class RobotVisualizer(LeafSystem):
     """Draws the parts of a plant's bodies.
 
-    The plant only says where its bodies are; it needs no geometry and stands in no diagram here.
-    Frames carry the time, so that a recording in progress gets them.
+    The plant provides only the poses of its bodies; it needs no geometry and is not in the diagram.
+    Frames carry the time, so that a recording in progress contains them.
 
     Ports:
         positions (input): ``q`` of the plant, shape (num_positions,).
 
     Args:
         plant: The plant, finalized.
-        parts: What to draw.
-        meshcat: Where to draw, axes of the world.
+        parts: Parts to draw.
+        meshcat: Meshcat instance, axes of the world.
         period: Time between frames [s].
         root: Path of all bodies.
     """
@@ -94,7 +94,7 @@ class RobotVisualizer(LeafSystem):
         super().__init__()
         self._plant, self._parts, self._meshcat, self._root = plant, parts, meshcat, root
         self._bodies = {body_path(plant, part.body, root): part.body for part in parts}
-        # a worksheet for kinematics; nothing in it outlives a frame
+        # used for kinematics only; nothing in it outlives a frame
         self._kinematics = plant.CreateDefaultContext()
         self._positions = self.DeclareVectorInputPort("positions", plant.num_positions())
         self.DeclareInitializationPublishEvent(self._draw_parts)
@@ -123,10 +123,10 @@ _SCENE = "/drake"
 
 
 def turn_scene_over(meshcat: Meshcat, height: float) -> None:
-    """Show z_0 downwards: turn all that is drawn by relative paths about x_0, base on top.
+    """Show z_0 downwards: turn everything with relative paths about x_0, base on top.
 
     Args:
-        meshcat: Where things are drawn.
+        meshcat: Meshcat instance.
         height: Height of the inertial frame's origin above the grid [m].
     """
     upside_down = RollPitchYaw(np.pi, 0.0, 0.0).ToRotationMatrix()
@@ -136,16 +136,15 @@ def turn_scene_over(meshcat: Meshcat, height: float) -> None:
 class DeltaVisualizer(LeafSystem):
     """Draws base, rails, slides, parallelogram rods and end-effector plate.
 
-    It serves the analytic plant as well as the constrained one, and a replay of a log. Frames
-    carry the time, so that a recording in progress gets them. Where the rods cannot meet,
-    nothing moves.
+    It serves the analytic plant, the constrained plant and a replay of a log. Frames carry the
+    time, so that a recording in progress contains them. Where the rods cannot meet, nothing moves.
 
     Ports:
         slide_positions (input): ``q`` [m], shape (3,).
 
     Args:
         robot: The robot.
-        meshcat: Where to draw, in axes of the inertial frame (:func:`turn_scene_over`).
+        meshcat: Meshcat instance, in axes of the inertial frame (:func:`turn_scene_over`).
         period: Time between frames [s].
         root: Meshcat path of the robot.
     """

@@ -8,23 +8,23 @@ from pydrake.geometry import Cylinder, Meshcat, MeshcatCone, Rgba, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
-_AXIS_COLORS = (Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.65, 0.2), Rgba(0.1, 0.25, 0.9))
+AXIS_COLORS = (Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.65, 0.2), Rgba(0.1, 0.25, 0.9))
 _AXIS_LENGTH, _AXIS_RADIUS = 0.08, 0.003
 
 
-def draw_frame(meshcat: Meshcat, place: str) -> None:
-    """Draw a frame at a place of the scene tree; its axes are red, green and blue.
+def draw_frame(meshcat: Meshcat, path: str) -> None:
+    """Draw a frame at a path of the scene tree; its axes are red, green and blue.
 
     Args:
-        meshcat: Where to draw.
-        place: Path of the frame, which can then be moved.
+        meshcat: Meshcat instance.
+        path: Meshcat path of the frame, which can then be moved.
     """
-    for i, color in enumerate(_AXIS_COLORS):
+    for i, color in enumerate(AXIS_COLORS):
         direction = np.eye(3)[i]
         X_FA = RigidTransform(
             RotationMatrix.MakeFromOneVector(direction, 2), direction * _AXIS_LENGTH / 2
         )
-        axis = f"{place}/axis_{i}"
+        axis = f"{path}/axis_{i}"
         meshcat.SetObject(axis, Cylinder(_AXIS_RADIUS, _AXIS_LENGTH), color)
         meshcat.SetTransform(axis, X_FA)
 
@@ -33,13 +33,13 @@ _WIDTH = 4.0
 
 
 class TrailVisualizer(LeafSystem):
-    """Draws the way that a point has come, piece by piece.
+    """Draws the past path of a point, piece by piece.
 
-    Frames carry the time, so that a recording in progress gets them.
+    Frames carry the time, so that a recording in progress contains them.
 
     Ports:
         point (input): World axes [m], shape (3,); nothing is drawn where it is not finite.
-        value (input): What the colour tells, shape (1,), if it tells anything.
+        value (input): Value shown by the colour, shape (1,), if any.
 
     State:
         Discrete: the point at the last frame [m], shape (3,), NaN before the first, and the
@@ -47,10 +47,10 @@ class TrailVisualizer(LeafSystem):
 
     Args:
         name: Meshcat path of the trail.
-        color: Its colour, or the colour that a value gives the piece that ends there.
-        meshcat: Where to draw, axes of the world.
+        color: Its colour, or the colour of a piece as a function of the value at its end.
+        meshcat: Meshcat instance, axes of the world.
         period: Time between frames [s].
-        longest: How many pieces stay; all of them by default.
+        longest: Largest number of pieces; all of them by default.
     """
 
     def __init__(
@@ -101,11 +101,11 @@ class TrailVisualizer(LeafSystem):
 
 @dataclass(frozen=True, eq=False)
 class ToolPart:
-    """Something drawn that moves with the tool.
+    """A drawn part that moves with the tool.
 
     Attributes:
-        name: Name, of its own among the parts.
-        shape: What it looks like.
+        name: Name, unique among the parts.
+        shape: Shape.
         color: Its colour.
         X_TP: Pose of the part's frame P in the tool's.
     """
@@ -119,14 +119,14 @@ class ToolPart:
 class ToolVisualizer(LeafSystem):
     """Draws parts that move with the tool.
 
-    Frames carry the time, so that a recording in progress gets them.
+    Frames carry the time, so that a recording in progress contains them.
 
     Ports:
         tool_pose (input): ``[y_t, R_e]``, shape (12,), with ``R_e`` row by row.
 
     Args:
-        parts: What to draw.
-        meshcat: Where to draw, axes of the inertial frame.
+        parts: Parts to draw.
+        meshcat: Meshcat instance, axes of the inertial frame.
         period: Time between frames [s].
         root: Path of all parts.
     """
@@ -149,31 +149,31 @@ class ToolVisualizer(LeafSystem):
 
     def _draw(self, context: Context) -> None:
         pose = self._tool_pose.Eval(context)
-        # interpolated between two frames, hence no rotation exactly
+        # interpolated between two frames, hence not exactly a rotation
         R_WT = RotationMatrix.ProjectToRotationMatrix(pose[3:].reshape(3, 3))
         self._meshcat.SetTransform(self._root, RigidTransform(R_WT, pose[:3]), context.get_time())
 
 
-_COLOR = Rgba(0.95, 0.65, 0.05, 1.0)
+FORCE_COLOR = Rgba(0.95, 0.65, 0.05, 1.0)
 _LENGTH = 0.25  # m, of the largest force
 _RADIUS, _HEAD_RADIUS, _HEAD_LENGTH = 0.008, 0.022, 0.06  # m
 _AWAY = 0.08  # m, of the tip from the point, which may be inside a link
-_LEAST = 0.02  # of the largest force; what is smaller is not drawn
+_LEAST = 0.02  # of the largest force; smaller forces are not drawn
 
 
 class ForceArrows(LeafSystem):
     """Draws forces as arrows that point at where they act, longer for larger forces.
 
-    Frames carry the time, so that a recording in progress gets them.
+    Frames carry the time, so that a recording in progress contains them.
 
     Ports:
-        points (input): Where K forces act, world axes [m], shape (3K,).
-        forces (input): World axes [N], shape (3K,).
+        points (input): Points of application of K forces, world axes [m], shape (3K,).
+        forces (input): Forces, world axes [N], shape (3K,).
 
     Args:
         count: Number K of forces.
         largest: Force whose arrow is the longest [N].
-        meshcat: Where to draw, axes of the world.
+        meshcat: Meshcat instance, axes of the world.
         period: Time between frames [s].
         root: Meshcat path of the arrows.
     """
@@ -195,11 +195,11 @@ class ForceArrows(LeafSystem):
             head, shaft = f"{arrow}/head", f"{arrow}/shaft/cylinder"
             # a cone stands on its tip
             self._meshcat.SetObject(
-                head, MeshcatCone(_HEAD_LENGTH, _HEAD_RADIUS, _HEAD_RADIUS), _COLOR
+                head, MeshcatCone(_HEAD_LENGTH, _HEAD_RADIUS, _HEAD_RADIUS), FORCE_COLOR
             )
             turned = RotationMatrix.MakeXRotation(np.pi)
             self._meshcat.SetTransform(head, RigidTransform(turned, [0.0, 0.0, -_AWAY]))
-            self._meshcat.SetObject(shaft, Cylinder(_RADIUS, 1.0), _COLOR)
+            self._meshcat.SetObject(shaft, Cylinder(_RADIUS, 1.0), FORCE_COLOR)
             self._meshcat.SetTransform(shaft, RigidTransform([0.0, 0.0, -0.5]))
             behind = RigidTransform([0.0, 0.0, -_AWAY - _HEAD_LENGTH])
             self._meshcat.SetTransform(f"{arrow}/shaft", behind)
@@ -212,9 +212,9 @@ class ForceArrows(LeafSystem):
         forces = self._forces.Eval(context).reshape(-1, 3)
         for arrow, point, force in zip(self._arrows, points, forces, strict=True):
             size = float(np.linalg.norm(force))
-            seen = bool(np.isfinite(size + point.sum()) and size > _LEAST * self._largest)
-            self._meshcat.SetProperty(arrow, "visible", seen, time)
-            if not seen:
+            is_visible = bool(np.isfinite(size + point.sum()) and size > _LEAST * self._largest)
+            self._meshcat.SetProperty(arrow, "visible", is_visible, time)
+            if not is_visible:
                 continue
             R_WA = RotationMatrix.MakeFromOneVector(force, 2)
             self._meshcat.SetTransform(arrow, RigidTransform(R_WA, point), time)

@@ -1,1 +1,1 @@
-"""Systems of the world around a plant: drives, friction, sensors, hands, forces."""
+"""Systems of a plant's environment: drives, friction, sensors, operators, forces."""

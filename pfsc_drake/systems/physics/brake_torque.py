@@ -1,4 +1,4 @@
-"""Torque of brakes that are anchored somewhere."""
+"""Torque of brakes with anchors."""
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -20,12 +20,12 @@ class BrakeTorque(Diagram):
 
     ``tau_b = k min(max(q_M - a + tau v_M, -g), g)`` with the stiffness ``k = f_c / delta`` and the
     relaxation ``tau`` of the bristles: the friction of
-    :class:`~pfsc_drake.physics.friction.BristleFriction`, anchored once in a tick by
-    :class:`~pfsc_drake.physics.holding_brakes.HoldingBrakes`. While all brakes are open (g = 0),
-    nothing is computed in the stages of an integration.
+    :class:`~pfsc_drake.physics.friction.BristleFriction`, with anchors from
+    :class:`~pfsc_drake.physics.holding_brakes.HoldingBrakes` at each tick. While all brakes are
+    open (g = 0), nothing is computed in the stages of an integration.
 
     Ports:
-        joint_state (input): True ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        joint_state (input): Simulated ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         anchor, give (input): ``a`` and ``g`` of the brakes [rad or m], each (N,).
         resistance (output): ``-tau_b``, the generalized force on the motors [Nm or N], shape (N,).
 
@@ -51,7 +51,7 @@ class BrakeTorque(Diagram):
 
 
 class _BrakeSprings(LeafSystem):
-    """Torque of the springs, and which input of a switch acts."""
+    """Torque of the springs, and the selector of a switch."""
 
     def __init__(self, friction: BristleFriction) -> None:
         super().__init__()
@@ -71,7 +71,7 @@ class _BrakeSprings(LeafSystem):
         )
 
     def _calc_closed(self, context: Context, output: AbstractValue) -> None:
-        # that of the selector is 0
+        # selector 0 is the open brake
         output.set_value(InputPortIndex(1 + int(self._give.Eval(context).any())))
 
     def _calc_torque(self, context: Context, output: BasicVector) -> None:

@@ -1,4 +1,4 @@
-"""What a person sets while a robot moves: live, or as it was recorded."""
+"""Settings of an operator while a robot moves: live, or recorded."""
 
 from collections.abc import Mapping
 
@@ -7,23 +7,23 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 
 class OperatorPanel(LeafSystem):
-    """Looks at a person's controls once per period.
+    """Samples an operator's controls once per period.
 
-    Whatever the controls are connected to - a live session that fixes their values, or
-    :class:`RecordedControls` - only their values at the ticks have an effect: so a recording of
-    these repeats a run to the last bit.
+    The controls come from a live session, which fixes their values, or from
+    :class:`RecordedControls`. Only their values at the ticks have an effect, so that a recording of
+    them repeats a run to the last bit.
 
     Ports:
-        controls (input, optional): All parts, one after the other, shape (size,); nobody is
-            there while it is neither connected nor fixed, and all parts stay as they start.
+        controls (input, optional): All parts, one after the other, shape (size,); while it is
+            neither connected nor fixed, all parts keep their initial values.
         NAME (output): One per part.
 
     State:
         Discrete: the controls at the last tick, shape (size,).
 
     Args:
-        parts: How each part starts, by name, 1-dimensional.
-        period: Time between looks [s].
+        parts: Initial values of the parts, by name, 1-dimensional.
+        period: Sampling time [s].
     """
 
     def __init__(self, parts: Mapping[str, np.ndarray], period: float) -> None:
@@ -36,7 +36,7 @@ class OperatorPanel(LeafSystem):
             self._add_output(name, slice(begin, begin + len(values)), memory)
             begin += len(values)
         self.period = period
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._look)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._sample)
 
     def _add_output(self, name: str, part: slice, memory: object) -> None:
         def calc(context: Context, output: BasicVector) -> None:
@@ -46,21 +46,20 @@ class OperatorPanel(LeafSystem):
             name, part.stop - part.start, calc, prerequisites_of_calc={memory}
         )
 
-    def _look(self, context: Context, state: DiscreteValues) -> None:
+    def _sample(self, context: Context, state: DiscreteValues) -> None:
         if self._controls.HasValue(context):
             state.set_value(self._controls.Eval(context))
 
 
 class RecordedControls(LeafSystem):
-    """Controls as they were recorded, held from one change to the next.
+    """Recorded controls, held from one change to the next.
 
     Ports:
-        controls (output): Those of the last row whose tick has come, before it those of the
-            first, shape (size,).
+        controls (output): The last row whose tick has come, before it the first row, shape (size,).
 
     Args:
-        ticks: When they changed, in sampling intervals, increasing, shape (rows,).
-        rows: What they became, shape (rows, size).
+        ticks: Ticks of the changes, in sampling intervals, increasing, shape (rows,).
+        rows: Values from these ticks on, shape (rows, size).
         period: Sampling interval [s].
     """
 
@@ -81,19 +80,20 @@ class RecordedControls(LeafSystem):
 
 
 class RecordedPen(LeafSystem):
-    """Messages of a drawing, each at its time, or later where there is no room for it before.
+    """Messages of a recorded drawing, each at its time, or later if there was no space before.
 
-    A message holds the last ``length`` way points: a further one is sent only when the first of
-    them has been taken, as a live session does it.
+    A message holds the last ``length`` waypoints: a further one is sent only after the first of
+    them has been taken, as in a live session.
 
     Ports:
         stream (input): See :class:`~pfsc_drake.control.streams.intake.WaypointIntake`, shape (4,).
         controls (output): The message, shape (size,).
 
     Args:
-        ticks: When messages change, in sampling intervals, not decreasing, shape (rows,).
-        messages: What they become, each by at most one way point more, shape (rows, size).
-        length: How many way points a message holds.
+        ticks: Ticks of the changes, in sampling intervals, not decreasing, shape (rows,).
+        messages: Messages from these ticks on, each with at most one waypoint more, shape (rows,
+            size).
+        length: Number of waypoints in a message.
         period: Sampling time [s].
     """
 
@@ -111,7 +111,7 @@ class RecordedPen(LeafSystem):
 
     def _calc_message(self, context: Context, output: BasicVector) -> None:
         tick = round(context.get_time() / self._period)
-        room = self._stream.Eval(context)[1] + self._length
+        last = self._stream.Eval(context)[1] + self._length
         come = np.searchsorted(self._ticks, tick, side="right")
-        fitting = np.searchsorted(self._totals, room, side="right")
+        fitting = np.searchsorted(self._totals, last, side="right")
         output.SetFromVector(self._messages[max(min(come, fitting) - 1, 0)])

@@ -1,4 +1,4 @@
-"""Noise of a sensor, drawn ahead."""
+"""Sensor noise, drawn in advance."""
 
 import math
 
@@ -7,18 +7,19 @@ from pydrake.systems.framework import Context, DiscreteValues, EventStatus, Leaf
 
 from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS
 
-_BLOCK = NOISE_TICKS // 2  # ticks whose noise is drawn at once
+_BLOCK = NOISE_TICKS // 2  # ticks whose noise is drawn together
 _ROUNDING = 1e-6  # of a period
 
 
 class SensorNoise(LeafSystem):
-    """White normal noise of the ticks of a sensor, which depends on seed and tick alone.
+    """White Gaussian noise of a sensor, which depends on seed and tick alone.
 
-    It is no block, for numpy draws it. While the noise of one half of the ticks is read, that of
-    the other half is there already, so that it does not matter who looks first at a tick.
+    It is not a block, because numpy draws it. While the noise of one half of the ticks is read, the
+    noise of the other half exists already, so that the order of evaluation at a tick does not
+    matter.
 
     Ports:
-        noise (output): Noise of NOISE_TICKS ticks, that of tick k at ``k mod NOISE_TICKS``, shape
+        noise (output): Noise of NOISE_TICKS ticks; tick k at ``k mod NOISE_TICKS``, shape
             (size NOISE_TICKS,).
 
     State:

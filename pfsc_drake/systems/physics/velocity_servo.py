@@ -1,4 +1,4 @@
-"""Joint velocity control, with what watches and stops it, in Drake."""
+"""Joint velocity control with supervision and safe stop, as a Drake diagram."""
 
 import math
 from dataclasses import replace
@@ -18,21 +18,20 @@ from pfsc_drake.systems.following_controller import FaultAccess
 
 
 class VelocityServo(Diagram):
-    """Lets the joints follow reference velocities, ``q' = q'_ref`` (3.48).
+    """Controls the joint velocities, ``q' = q'_ref`` (3.48).
 
     See :class:`VelocityServoLaw` for the law and
     :func:`~pfsc_drake.physics.velocity_servo.servo_gains` for its gains.
 
-    The output is a function of the inputs and the integral part; sample it with a hold of
-    the same period in front of the plant. A path controller with a longer period needs a
-    hold of its own in front of ``velocity_reference``, whose new value the servo takes up
-    one servo period after the tick.
+    The output is a function of the inputs and the integral part; sample it with a hold of the same
+    period in front of the plant. A path controller with a longer period needs a hold of its own in
+    front of ``velocity_reference``, whose new value acts one servo period after the tick.
 
-    An input that is not finite, a bus that is silent for too long and, if they are supervised, a
+    An input that is not finite, a bus that is silent for too long and, with supervision, a
     measurement that contradicts itself and torques that jump between their limits are faults. The
-    first one holds (:class:`FaultLatch`): from that instant on the servo stops the joints and holds
-    them where they have come to rest (:class:`SafeStop`), whatever the reference. Only a new
-    initialization leaves that state.
+    first one is latched (:class:`FaultLatch`): from that instant on the servo stops the joints and
+    holds them at rest (:class:`SafeStop`), whatever the reference. Only a new initialization leaves
+    this state.
 
     Ports:
         joint_state, velocity_reference, silence (optional) (input): See :class:`SampledServo`.
@@ -41,11 +40,11 @@ class VelocityServo(Diagram):
         stop_category (output): A :class:`~pfsc_drake.control.law.safe_stop.StopCategory`.
 
     Args:
-        robot: The robot as it is believed, N joints.
+        robot: Nominal model, N joints.
         law: The law; its gains' period is the sampling time.
-        safe_state: How to stop and hold; by default without more damping than that needs.
-        supervision: What of the measurement is watched; nothing if omitted.
-        longest_silence: How long a reference may be missing [s]; for ever if infinite.
+        safe_state: Parameters of stop and hold; by default without additional damping.
+        supervision: Parameters of the supervision of the measurement; no supervision if omitted.
+        longest_silence: Longest time without reference [s]; unlimited if infinite.
 
     Attributes:
         period: Sampling time [s].
@@ -86,7 +85,7 @@ class VelocityServo(Diagram):
             connect(watch, "suspects", stop, "suspects")
             causes["measurement"] = watch.GetOutputPort("fault")
             measures.append(watch)
-            # torques may be at a limit for long, for servos are told velocities
+            # torques may be at a limit for long, because servos are commanded velocities
             only_turns = replace(supervision, saturation_time=0.0)
             drives = add("drive_watch", DriveWatch(law.limits, only_turns, self.period))
             connect(servo, "drive_torque", drives, "drive")
@@ -96,10 +95,10 @@ class VelocityServo(Diagram):
         latch, switch = add("fault_latch", FaultLatch(list(causes))), add("switch", FaultSwitch(n))
         for name, port in causes.items():
             builder.Connect(port, latch.GetInputPort(name))
-        told = [(servo, "stopping"), (stop, "fault"), (switch, "fault")]
+        fault_inputs = [(servo, "stopping"), (stop, "fault"), (switch, "fault")]
         if supervision is not None:
-            told.append((drives, "stopping"))
-        for system, name in told:
+            fault_inputs.append((drives, "stopping"))
+        for system, name in fault_inputs:
             connect(latch, "fault", system, name)
         connect(servo, "drive_torque", switch, "drive")
         connect(stop, "torque", switch, "stop")
@@ -116,7 +115,7 @@ class VelocityServo(Diagram):
 
 
 class ServoAccess(FaultAccess):
-    """What a diagram's velocity servo has found, fused with other blocks or not.
+    """Access to the fault of a diagram's velocity servo, fused or not.
 
     Args:
         servo: The servo, in a builder under its name.

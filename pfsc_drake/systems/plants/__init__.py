@@ -1,1 +1,1 @@
-"""Plants that Drake does not have, and what acts on them."""
+"""Plants beyond Drake's own, and external forces on them."""

@@ -1,4 +1,4 @@
-"""Wrenches from outside, applied to bodies of a plant."""
+"""External wrenches, applied to bodies of a plant."""
 
 from collections.abc import Collection, Sequence
 
@@ -14,12 +14,12 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.physics.link_forces import link_torque_function
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.link_places import LinkPlace
+from pfsc_drake.robot.serial.link_points import LinkPoint
 from pfsc_drake.robot.tool_load import joint_torque_function
 
 
 class AppliedForces(LeafSystem):
-    """Wrenches on bodies as a plant takes them.
+    """Wrenches on bodies, in the form of a plant's input.
 
     Ports:
         wrenches (input): ``[force, torque]`` on each of K bodies at its origin, world axes, shape
@@ -52,7 +52,7 @@ class AppliedForces(LeafSystem):
 
 
 class PartnerForces(LeafSystem):
-    """Sums the point contact forces of each of K partners on whatever touches it.
+    """Sums the point contact forces of each of K partners on the bodies that touch it.
 
     Ports:
         contact_results (input): Contacts of the plant, abstract.
@@ -89,9 +89,9 @@ class PartnerForces(LeafSystem):
 class ExternalWrench(LeafSystem):
     """Applies a wrench to the body with the tool point.
 
-    Force and torque of the input act **on the robot** at the origin of the tool frame;
-    ``tau_ext = J_g(q_J)^T wrench`` (2.11) is what that means at the joints, with the sign
-    of (2.65a), ``D_E q'' + n_E = tau_J + tau_ext``.
+    Force and torque of the input act **on the robot** at the origin of the tool frame. Their joint
+    torques are ``tau_ext = J_g(q_J)^T wrench`` (2.11), with the sign of (2.65a),
+    ``D_E q'' + n_E = tau_J + tau_ext``.
 
     Ports:
         wrench (input): ``[force, torque]`` at the tool point, world axes, shape (6,) [N, Nm].
@@ -102,7 +102,7 @@ class ExternalWrench(LeafSystem):
 
     Args:
         tool_frame: Frame at the tool point, in the plant.
-        robot: The robot that carries it.
+        robot: The robot with this tool.
     """
 
     def __init__(self, tool_frame: Frame, robot: RobotModel) -> None:
@@ -152,29 +152,30 @@ class ExternalWrench(LeafSystem):
 class LinkPushes(LeafSystem):
     """Applies wrenches to points of an arm's links.
 
-    Forces and torques act **on the robot**; ``tau_ext = sum_k J_k(q_J)^T wrench_k`` is what they
-    mean at the joints, with the sign of (2.65a), ``D_E q'' + n_E = tau_J + tau_ext``.
+    Forces and torques act **on the robot**. Their joint torques are
+    ``tau_ext = sum_k J_k(q_J)^T wrench_k``, with the sign of (2.65a),
+    ``D_E q'' + n_E = tau_J + tau_ext``.
 
     Ports:
         wrenches (input): ``[force, torque]`` at each of K points, world axes, shape (6K,)
             [N, Nm].
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,); not needed for the next.
         applied_spatial_force (output): For the port of that name of a plant, abstract; without
-            points at which nothing acts.
-        tau_ext (output): External torques on the link side, shape (N,) [Nm or N], for plants that
-            bear no forces on bodies.
+            points whose wrench is zero.
+        tau_ext (output): External torques on the link side, shape (N,) [Nm or N], for plants
+            without forces on bodies.
 
     Args:
         chain: The arm, N joints.
-        places: The K points.
+        points: The K points.
     """
 
-    def __init__(self, chain: SerialChain, places: Sequence[LinkPlace]) -> None:
+    def __init__(self, chain: SerialChain, points: Sequence[LinkPoint]) -> None:
         super().__init__()
-        self.places = tuple(places)
-        n, size = chain.dimension, len(self.places)
-        points = [(place.link, place.p_LQ) for place in self.places]
-        self._torque_of = BoundFunction(link_torque_function(chain, points))
+        self.points = tuple(points)
+        n, size = chain.dimension, len(self.points)
+        link_points = [(point.link, point.p_LQ) for point in self.points]
+        self._torque_of = BoundFunction(link_torque_function(chain, link_points))
         self._wrenches = self.DeclareVectorInputPort("wrenches", 6 * size)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
         self.DeclareAbstractOutputPort(
@@ -192,12 +193,12 @@ class LinkPushes(LeafSystem):
 
     def _calc_applied(self, context: Context, output: Value) -> None:
         applied, wrenches = [], self._wrenches.Eval(context)
-        for k, place in enumerate(self.places):
+        for k, point in enumerate(self.points):
             wrench = wrenches[6 * k : 6 * k + 6]
             if not any(wrench.tolist()):
                 continue
             force = ExternallyAppliedSpatialForce()
-            force.body_index, force.p_BoBq_B = place.body, place.p_BQ
+            force.body_index, force.p_BoBq_B = point.body, point.p_BQ
             force.F_Bq_W = SpatialForce(tau=wrench[3:], f=wrench[:3])
             applied.append(force)
         output.set_value(applied)

@@ -18,10 +18,9 @@ class RigidPlant(LeafSystem):
 
         (D_E(q) + D_M + U(q) + U'(q)) q'' + C(q, q') q' + g(q) = tau
 
-    see :mod:`~pfsc_drake.robot.serial.rigid_rotors`. A MultibodyPlant with reflected inertias
-    obeys the same without U; this plant needs no model file, but a chain, which may be one
-    that no file describes, as a robot without its tool. Elastic joints of the chain are
-    taken for stiff ones.
+    see :mod:`~pfsc_drake.robot.serial.rigid_rotors`. A MultibodyPlant with reflected inertias has
+    the same equation without U; this plant needs no model file, only a chain, possibly one without
+    a file, such as a robot without its tool. Elastic joints of the chain are treated as stiff.
 
     Ports:
         actuation (input): Drive torques ``tau`` [Nm or N], shape (N,).
@@ -34,7 +33,7 @@ class RigidPlant(LeafSystem):
 
     Args:
         chain: The robot, N joints.
-        mounts: Where its rotors sit, N of them; None for no coupling.
+        mounts: Mounts of its N rotors; None for no coupling.
 
     Raises:
         InputError: If the mounts do not fit.
@@ -84,10 +83,10 @@ class FullElasticPlant(LeafSystem):
     ``[[D_E, U], [U', D_M]] q'' + [[C_E, C_1], [C_2, 0]] q' + g = [tau_J + tau_ext, tau_d - tau_J]``
     with ``q = [q_J, q_M]`` and ``tau_J`` of (2.66); see
     :mod:`~pfsc_drake.robot.serial.rotor_coupling`.
-    A MultibodyPlant with reflected inertias obeys (2.65) instead, where U, C_1 and C_2 are
-    zero. There is no geometry, no contact, no friction and no limit in this plant;
-    :class:`~pfsc_drake.systems.physics.joint_friction.JointFriction` has the port
-    ``resistance``, too.
+    A MultibodyPlant with reflected inertias has (2.65) instead, where U, C_1 and C_2 are zero. This
+    plant has no geometry, contact, friction or limits;
+    :class:`~pfsc_drake.systems.physics.joint_friction.JointFriction` has the port ``resistance``,
+    too.
 
     Ports:
         drive_torque (input): ``tau_d`` at the motors, joint side [Nm or N], shape (N,).
@@ -104,7 +103,7 @@ class FullElasticPlant(LeafSystem):
 
     Args:
         chain: A robot with elastic joints; N joints.
-        mounts: Where its N rotors sit.
+        mounts: Mounts of its N rotors.
 
     Raises:
         InputError: If a joint is rigid or has no rotor inertia, or the mounts do not fit.
@@ -139,7 +138,7 @@ class FullElasticPlant(LeafSystem):
         self._acceleration, self._evaluate = function.results["acceleration"], function.evaluate
 
     def set_joint_state(self, context: Context, joint_state: np.ndarray) -> None:
-        """Put the robot into a state.
+        """Set the joint state.
 
         Args:
             context: Context of this system.

@@ -14,7 +14,7 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 
-# a slide this far beyond its travel [m] is at its end but for rounding
+# m; a slide this far beyond its travel is at its end up to rounding
 _ROUNDING = 1e-9
 
 
@@ -25,10 +25,10 @@ class DeltaPlant(LeafSystem):
 
         D(q) q'' + C(q, q') q' + g(q) = tau + J_D^T f_ext
 
-    Integrate it by RK3 with error control or with a fixed step of 1 ms. Nothing holds a slide
-    at the end of its travel, and singular configurations are not far behind it: a step that
-    ends outside the travel fails, so that ``Simulator.AdvanceTo`` raises RuntimeError and says
-    which slide it was. (The constrained plant of ``add_delta_plant`` has stops.)
+    Integrate it by RK3 with error control or with a fixed step of 1 ms. Nothing holds a slide at
+    the end of its travel, and singular configurations are close: a step that ends outside the
+    travel fails, so that ``Simulator.AdvanceTo`` raises RuntimeError and names the slide. (The
+    constrained plant of ``add_delta_plant`` has stops.)
 
     Ports:
         actuation (input): Drive forces ``tau`` [N], shape (3,).

@@ -1,4 +1,4 @@
-"""What a plant's joints, tool and contacts bear; the load that its tool is to a sensor."""
+"""Reaction forces of joints, tool and contacts; the tool as load of a force/torque sensor."""
 
 import numpy as np
 from pydrake.common.value import Value
@@ -40,7 +40,7 @@ class JointReaction(LeafSystem):
 
 
 def reaction_index(plant: MultibodyPlant, joint: Joint) -> int:
-    """Return where a joint stands in a plant's reaction forces.
+    """Return the index of a joint in a plant's reaction forces.
 
     Args:
         plant: A finalized plant.
@@ -59,10 +59,10 @@ def reaction_index(plant: MultibodyPlant, joint: Joint) -> int:
 
 
 class ToolReaction(LeafSystem):
-    """Newton and Euler for the tool alone, see :func:`tool_reaction_function`.
+    """Newton-Euler equations of the tool alone, see :func:`tool_reaction_function`.
 
     Ports:
-        joint_state (input): ``[q_J, v_J, q_M, v_M]``, the true ones, shape (4N,).
+        joint_state (input): Simulated ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         acceleration (input): Accelerations of the links, from the plant, shape (N,).
         wrench (input): ``[force, torque]`` on the tool at the tool point, world axes, shape
             (6,) [N, Nm]; zero if not connected.
@@ -132,7 +132,7 @@ class ContactWrench(LeafSystem):
             info = results.hydroelastic_contact_info(i)
             surface, F_Ac_W = info.contact_surface(), info.F_Ac_W()
             on_M, on_N = surface.id_M() in self._geometries, surface.id_N() in self._geometries
-            # F_Ac_W acts on the body of M, the opposite on that of N
+            # F_Ac_W acts on the body of M, the opposite force on the body of N
             sign = float(on_M) - float(on_N)
             force = sign * F_Ac_W.translational()
             wrench[:3] += force
@@ -141,7 +141,7 @@ class ContactWrench(LeafSystem):
 
 
 def tool_load_from_plant(plant: MultibodyPlant, joint: Joint, tool_frame: Frame) -> ToolLoad:
-    """Return everything that a plant has fixed behind a sensor.
+    """Return the load of everything fixed behind a sensor in a plant.
 
     Args:
         plant: A finalized plant.
@@ -149,8 +149,8 @@ def tool_load_from_plant(plant: MultibodyPlant, joint: Joint, tool_frame: Frame)
         tool_frame: Frame at the tool point.
 
     Raises:
-        InputError: If the joint is not fixed, something moves behind it, or the tool point is
-            not behind it.
+        InputError: If the joint is not fixed, a part moves behind it, or the tool point is not
+            behind it.
     """
     bodies = _bodies_behind(plant, joint)
     if tool_frame.body().index() not in [body.index() for body in bodies]:

@@ -19,12 +19,18 @@ class ImpedanceOnNumbers:
         self.law = ImpedanceLaw(*arguments, **options)
         self.period, self.desired_order = self.law.period, self.law.desired_order
         self.m = m = self.law.num_outputs
-        state, force, given = ca.SX.sym("x", 6 * m), ca.SX.sym("tau", m), ca.SX.sym("z", 3 * m)
+        state, force, impedance_values = (
+            ca.SX.sym("x", 6 * m),
+            ca.SX.sym("tau", m),
+            ca.SX.sym("z", 3 * m),
+        )
         desired, y = ca.SX.sym("y_d", (self.desired_order + 1) * m), ca.SX.sym("y", m)
         now = ImpedanceState(state[:m], state[m : 2 * m], state[2 * m : 3 * m], state[3 * m :])
-        later, status = self.law.update(now, desired, force, given)
+        later, status = self.law.update(now, desired, force, impedance_values)
         reference = self.law.reference(now, desired)
-        self._update = _function([state, desired, force, given], [ca.vertcat(*later), status])
+        self._update = _function(
+            [state, desired, force, impedance_values], [ca.vertcat(*later), status]
+        )
         self._reference = _function([state, desired], [reference])
         self._impedance = _function([y], [self.law.impedance(y)])
 

@@ -1,4 +1,4 @@
-"""What force sensor and compliance stop a robot for."""
+"""Faults of force sensor and compliance that stop a robot."""
 
 import pytest
 

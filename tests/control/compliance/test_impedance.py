@@ -37,10 +37,10 @@ def make_law(tangential=TANGENTIAL, transversal=TRANSVERSAL, r=2, period=PERIOD,
     return ImpedanceOnNumbers(parameters, POSITION, r, period, **options)
 
 
-def on_numbers(profile, lap=None):
+def on_numbers(profile, revolution=None):
     """Return a profile as a function of arrays."""
     x = ca.SX.sym("x")
-    function = ca.Function("profile", [x], [profile.interpolant(lap)(x)])
+    function = ca.Function("profile", [x], [profile.interpolant(revolution)(x)])
     return lambda values: function(ca.DM(np.atleast_2d(values))).full().ravel()
 
 
@@ -307,15 +307,15 @@ def test_profiles():
 
 
 def test_profiles_go_round_closed_paths():
-    lap = 2.5
+    revolution = 2.5
     profile = Profile(over="eta", at=[0.5, 1.0, 2.0], values=[3.0, 9.0, 1.0])
-    value = on_numbers(profile, lap)
+    value = on_numbers(profile, revolution)
     eta = np.linspace(-3.0, 6.0, 2001)
     around = value(eta)
-    np.testing.assert_allclose(value(eta + 2 * lap), around, atol=1e-12)
-    for at, wanted in zip(profile.at, profile.values, strict=True):
-        assert value(at) == pytest.approx(wanted)
-        assert value(at - lap) == pytest.approx(wanted)
+    np.testing.assert_allclose(value(eta + 2 * revolution), around, atol=1e-12)
+    for at, expected_value in zip(profile.at, profile.values, strict=True):
+        assert value(at) == pytest.approx(expected_value)
+        assert value(at - revolution) == pytest.approx(expected_value)
     # from the last breakpoint to the first of the next lap it goes straight up, without a step
     seam = value(np.linspace(2.0, 3.0, 200))
     assert np.all(np.diff(seam) >= 0.0)
@@ -323,12 +323,14 @@ def test_profiles_go_round_closed_paths():
     slopes = np.gradient(around, eta)
     assert np.abs(np.diff(slopes)).max() < 1.0
     # one that names both ends of the lap
-    whole = on_numbers(Profile(over="eta", at=[0.0, 1.0, lap], values=[3.0, 9.0, 3.0]), lap)
-    assert whole(lap + 1.0) == pytest.approx(9.0)
+    whole = on_numbers(
+        Profile(over="eta", at=[0.0, 1.0, revolution], values=[3.0, 9.0, 3.0]), revolution
+    )
+    assert whole(revolution + 1.0) == pytest.approx(9.0)
     with pytest.raises(InputError, match=r"2\.5 m long"):
-        Profile(at=[0.0, 2.6], values=[1.0, 1.0]).interpolant(lap)
+        Profile(at=[0.0, 2.6], values=[1.0, 1.0]).interpolant(revolution)
     with pytest.raises(InputError, match="the last must be the first"):
-        Profile(at=[0.0, 2.5], values=[1.0, 2.0]).interpolant(lap)
+        Profile(at=[0.0, 2.5], values=[1.0, 2.0]).interpolant(revolution)
 
 
 def test_an_impedance_goes_round_closed_paths():
@@ -336,7 +338,7 @@ def test_an_impedance_goes_round_closed_paths():
         Profile(1.0), Profile(1.0), Profile(over="eta", at=[0.2, 1.0], values=[100.0, 900.0])
     )
     parameters = ImpedanceParameters(constant(*TANGENTIAL), soft)
-    law = ImpedanceOnNumbers(parameters, POSITION, 2, PERIOD, lap=2.0)
+    law = ImpedanceOnNumbers(parameters, POSITION, 2, PERIOD, revolution=2.0)
     straight = ImpedanceOnNumbers(parameters, POSITION, 2, PERIOD)
     y, later = np.array([0.6, 0.0, 0.0]), np.array([2.6, 0.0, 0.0])
     np.testing.assert_allclose(law.impedance(y), law.impedance(later), rtol=1e-12)

@@ -1,4 +1,4 @@
-"""The filter: over time, at its start, and when what it is told changes."""
+"""The filter: over time, at its start, and after changes of its inputs."""
 
 import numpy as np
 import pytest
@@ -126,8 +126,8 @@ def test_without_a_measured_velocity_it_starts_with_the_desired_one():
     law = ImpedanceOnNumbers(*arguments(r=1)).law
     system = BlockSystem(ImpedanceFilter(law, start="actual"), PERIOD)
     context = system.CreateDefaultContext()
-    given = {"desired_reference": DESIRED, "manifold_force": TAU, "manifold_state": MEASURED[:3]}
-    for name, value in given.items():
+    inputs = {"desired_reference": DESIRED, "manifold_force": TAU, "manifold_state": MEASURED[:3]}
+    for name, value in inputs.items():
         size = system.GetInputPort(name).size()
         system.GetInputPort(name).FixValue(context, value[:size])
     system.start(context)
@@ -148,7 +148,7 @@ def test_what_is_not_measured_yet_is_awaited():
     assert np.array_equal(bench.motion(), expected[:2])
 
 
-def test_a_given_start_is_kept_by_one_initialization():
+def test_an_initial_state_survives_one_initialization():
     bench = Bench(start="actual")
     position, velocity = np.array([0.3, 0.1, 0.2]), np.array([0.1, 0.0, -0.1])
     bench.system.set_state(bench.context, "position", position)

@@ -55,10 +55,10 @@ def law(length=LENGTH):
 def test_the_length_is_that_of_the_path():
     assert law().impedance(np.array([LENGTH]))[DAMPING, 0] == pytest.approx(MOST)
     assert law(2.0).impedance(np.array([2.0]))[DAMPING, 0] == pytest.approx(MOST)
-    given_length = ImpedanceParameters(
+    explicit_length = ImpedanceParameters(
         tangential=CoordinateImpedance(Profile(MASS), SlowEnds(length=0.5), Profile(STIFFNESS))
     )
-    assert given_length.on_path(LENGTH).tangential.damping.length == 0.5
+    assert explicit_length.on_path(LENGTH).tangential.damping.length == 0.5
 
 
 def test_an_impedance_with_it_never_gives_energy_back():
@@ -100,6 +100,6 @@ def test_wrong_numbers_are_refused(changes, part):
 
 def test_it_needs_a_path_with_ends():
     with pytest.raises(InputError, match="closed"):
-        SlowEnds(length=1.0).interpolant(lap=1.0)
+        SlowEnds(length=1.0).interpolant(revolution=1.0)
     with pytest.raises(InputError, match="length = 0"):
         SlowEnds().interpolant()

@@ -49,7 +49,7 @@ def station():
 
 
 @pytest.mark.slow
-def test_stiffness_changes_at_depth_without_a_jump_and_to_what_was_asked(station):
+def test_stiffness_changes_at_depth_without_a_jump_to_the_request(station):
     simulator, tuner, log = station
     root = simulator.get_mutable_context()
     request = tuner.GetInputPort("request")

@@ -41,8 +41,8 @@ def test_a_step_behind_the_amplifier_is_found_two_samples_later(size):
 
 @pytest.mark.parametrize("phase", [0.0, 0.3, 0.7, 0.95])
 @pytest.mark.parametrize("decay", [5e-4, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 1e-2, 1.0])
-def test_forces_that_step_and_impacts_are_believed(phase, decay):
-    """Of 400 N, at any instant within a sample, that fall off within 0.5 ms or never."""
+def test_force_steps_and_impacts_are_no_faults(phase, decay):
+    """Steps of 400 N at any instant within a sample, decaying within 0.5 ms or constant."""
     begin = (3.0 + phase) * PERIOD
     loads = filtered(lambda t: 400.0 * np.exp(-(t - begin) / decay) * (t >= begin))
     assert np.abs(np.diff(loads)).max() > SMALLEST[1]

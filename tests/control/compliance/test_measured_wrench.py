@@ -19,10 +19,10 @@ def search(taring, residuals):
     """Return how many residuals it takes, and the bias; None if it is not found in them."""
     stretch = empty()
     for k, residual in enumerate(residuals):
-        stretch = taring.extended(stretch, ca.DM(np.broadcast_to(residual, 6)))
-        bias, is_long, is_believed = taring.bias(stretch)
+        stretch = taring.extend(stretch, ca.DM(np.broadcast_to(residual, 6)))
+        bias, is_long, is_plausible = taring.bias(stretch)
         if is_long:
-            assert is_believed
+            assert is_plausible
             return k + 1, np.array(bias).ravel()
     return None
 
@@ -41,7 +41,7 @@ def test_what_fades_in_the_first_block_is_no_bias():
 
 
 def test_strokes_of_a_sample_do_not_keep_a_sensor_from_being_tared():
-    """What lasts does, though each sample differs from the next by less."""
+    """A permanent change prevents it, though successive samples differ by less."""
     taring = Taring(48, SPREAD, LARGEST, block=10)
     strokes = 2.0 + np.resize([4.0, -4.0, 0.0, 0.0, 0.0], 50)
     assert search(taring, strokes) == (50, pytest.approx(np.full(6, 2.0)))
@@ -49,16 +49,16 @@ def test_strokes_of_a_sample_do_not_keep_a_sensor_from_being_tared():
     assert search(taring, strokes + 0.05 * np.arange(50)) is None
 
 
-@pytest.mark.parametrize(("value", "believed"), [(10.0, True), (10.1, False), (-10.1, False)])
-def test_a_bias_that_is_too_large_is_not_believed(value, believed):
+@pytest.mark.parametrize(("value", "plausible"), [(10.0, True), (10.1, False), (-10.1, False)])
+def test_a_bias_that_is_too_large_is_implausible(value, plausible):
     taring = Taring(1, SPREAD, LARGEST)
-    stretch = taring.extended(empty(), ca.DM([0, 0, value, 0, 0, 0]))
-    _, is_long, is_believed = taring.bias(stretch)
-    assert (bool(is_long), bool(is_believed)) == (True, believed)
+    stretch = taring.extend(empty(), ca.DM([0, 0, value, 0, 0, 0]))
+    _, is_long, is_plausible = taring.bias(stretch)
+    assert (bool(is_long), bool(is_plausible)) == (True, plausible)
 
 
 def by_definition(residuals, samples, block):
-    """Return the same of all residuals at once: blocks are cut, and looked at from the end."""
+    """Return the result for all residuals: they are cut into blocks and evaluated from the end."""
     block = min(block, samples)
     needed = -(-samples // block)
     blocks = [residuals[k : k + block] for k in range(0, len(residuals) - block + 1, block)]
@@ -98,7 +98,7 @@ def test_it_is_what_its_definition_says(samples, block):
 def test_what_is_no_finite_number_is_a_lost_sensor(spoiled):
     wrench = np.arange(6.0)
     wrench[4] = wrench[4] if spoiled is None else spoiled
-    told = Stepper(MeasuredWrench()).step(wrench=wrench)
-    np.testing.assert_array_equal(told["measured"], wrench)
-    assert told["sensor_fault"][0] == (SensorFault.NONE if spoiled is None else SensorFault.LOST)
-    assert told["tared"][0] == 1.0
+    outputs = Stepper(MeasuredWrench()).step(wrench=wrench)
+    np.testing.assert_array_equal(outputs["measured"], wrench)
+    assert outputs["sensor_fault"][0] == (SensorFault.NONE if spoiled is None else SensorFault.LOST)
+    assert outputs["tared"][0] == 1.0

@@ -1,4 +1,4 @@
-"""A hand that leads a tool to the ends of an open path, and leans on them."""
+"""An operator who guides a tool to the ends of an open path, and pushes against them."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ ENDS = (0.1, 0.5)
 STRONG = 45.0  # N
 
 
-class Led:
+class CompliantReference:
     """The reference along a path from 0.1 to 0.5 m; ``ended`` is whether the path is open."""
 
     def __init__(self, eta, stiffness=0.0, *, ended=True):
@@ -36,14 +36,14 @@ class Led:
         """Return ``y_p`` and ``y_p'`` along the path, and take a force for a period."""
         if desired is not None:
             self._desired[::3] = desired
-        given = {"desired_reference": self._desired, "manifold_state": np.zeros(3)}
-        reference = self._stepper.step(manifold_force=[force, 0.0, 0.0], **given)["reference"]
+        inputs = {"desired_reference": self._desired, "manifold_state": np.zeros(3)}
+        reference = self._stepper.step(manifold_force=[force, 0.0, 0.0], **inputs)["reference"]
         return reference[0], reference[3]
 
 
-def led(forces, eta, **options):
+def simulate(forces, eta, **options):
     """Return ``[y_p, y_p']`` at each tick, shape (ticks + 1, 2)."""
-    tool = Led(eta, **options)
+    tool = CompliantReference(eta, **options)
     return np.array([tool.step(force) for force in [*forces, 0.0]])
 
 
@@ -51,7 +51,7 @@ def led(forces, eta, **options):
 def test_a_hand_leans_on_an_end(end, sign):
     """It brakes with the time constant, comes to rest at the end, and is let go of inwards."""
     forces = np.full(1500, sign * STRONG)
-    motion = led(np.append(forces, np.full(200, -sign * STRONG)), 0.3)
+    motion = simulate(np.append(forces, np.full(200, -sign * STRONG)), 0.3)
     h = sign * (end - motion[:, 0])
     assert h.min() >= 0.0
     assert h[1500] < 1e-6
@@ -61,20 +61,20 @@ def test_a_hand_leans_on_an_end(end, sign):
     rate = sign * motion[1:1501, 1][near] / h[:1500][near]
     np.testing.assert_allclose(rate, 1.0 / SETTLING, rtol=1e-9)
     # as free as at first on the way back
-    back = led(np.full(200, -sign * STRONG), end)
+    back = simulate(np.full(200, -sign * STRONG), end)
     np.testing.assert_allclose(motion[1500:, 0], back[:, 0], rtol=0.0, atol=2e-6)
     assert sign * (end - motion[-1, 0]) > 0.1
 
 
 def test_what_has_no_ends_goes_on():
-    motion = led(np.full(1500, STRONG), 0.3, ended=False)
+    motion = simulate(np.full(1500, STRONG), 0.3, ended=False)
     assert motion[-1, 0] > ENDS[1] + 0.5
 
 
 def test_between_the_ends_nothing_changes():
     """To the last bit."""
     forces = np.random.default_rng(2).normal(0.0, 10.0, 1000)
-    motions = [led(forces, 0.3, ended=ended) for ended in (True, False)]
+    motions = [simulate(forces, 0.3, ended=ended) for ended in (True, False)]
     assert np.ptp(motions[0][:, 0]) > 1e-3
     np.testing.assert_array_equal(*motions)
 
@@ -87,7 +87,7 @@ def test_a_motion_to_an_end_arrives_as_planned(end):
     desired = curve.derivatives(np.minimum(times, curve.domain[1]), 4)[:, :, 0]
 
     def along(ended, force):
-        tool = Led(0.3, 3000.0, ended=ended)
+        tool = CompliantReference(0.3, 3000.0, ended=ended)
         return np.array([tool.step(force, row)[0] for row in desired])
 
     np.testing.assert_allclose(along(True, 0.0), along(False, 0.0), rtol=0.0, atol=1e-7)
@@ -104,7 +104,7 @@ def test_an_end_gives_a_hand_no_energy(seed):
     random = np.random.default_rng(seed)
     changes = random.uniform(-STRONG, STRONG, 400) + 20.0
     forces = np.repeat(changes, random.integers(1, 25, 400))
-    motion = led(forces, ENDS[1] - 1e-5)
+    motion = simulate(forces, ENDS[1] - 1e-5)
     # beyond by what a force moves the mass while it turns it within a period
     assert motion[:, 0].max() < ENDS[1] + PERIOD**2 * 2 * STRONG / (4.0 * MASS)
     assert np.sum(motion[:, 0] > ENDS[1] - 1e-4) > 100
@@ -117,10 +117,10 @@ def test_an_end_gives_a_hand_no_energy(seed):
 
 
 def test_beyond_an_end_nothing_pushes_back():
-    """A tool that starts there is led back by the hand alone."""
+    """A tool that starts there returns only by the force of the operator."""
     outside = ENDS[1] + 0.01
-    resting = led(np.full(100, STRONG), outside)
+    resting = simulate(np.full(100, STRONG), outside)
     np.testing.assert_allclose(resting, [[outside, 0.0]] * 101, rtol=0.0, atol=1e-12)
-    inwards = led(np.full(100, -STRONG), outside)
-    free = led(np.full(100, -STRONG), outside, ended=False)
+    inwards = simulate(np.full(100, -STRONG), outside)
+    free = simulate(np.full(100, -STRONG), outside, ended=False)
     np.testing.assert_array_equal(inwards, free)

@@ -1,4 +1,4 @@
-"""The weight of what is held, taken off a wrench."""
+"""Compensation of the weight of a grasped payload in a wrench."""
 
 import numpy as np
 import pytest
@@ -29,12 +29,12 @@ def load(share):
     return np.concatenate([force, np.cross(R.apply(CENTER), force)])
 
 
-def test_nothing_held_changes_nothing():
+def test_without_a_payload_nothing_changes():
     np.testing.assert_array_equal(compensated([0, 0], [0, 1]), WRENCH)
 
 
 @pytest.mark.parametrize("share", [0.25, 1.0])
-def test_what_is_held_is_taken_off(share):
+def test_the_weight_of_the_payload_is_subtracted(share):
     expected = WRENCH - load(share)
     np.testing.assert_allclose(compensated([0, share], [0, 1]), expected, atol=1e-12)
 
@@ -52,7 +52,7 @@ def test_what_was_tared_is_not_taken_off_twice():
 @pytest.mark.parametrize("share", [np.nan, np.inf, -np.inf])
 def test_a_share_that_is_no_number_loses_the_sensor(share):
     stepper = Stepper(PayloadCompensation(MASS, CENTER, GRAVITY))
-    given = {"wrench": WRENCH, "tool_pose": POSE, "tared": 1.0}
-    assert stepper.step(held=share, sensor_fault=0.0, **given)["fault"] == SensorFault.LOST
+    inputs = {"wrench": WRENCH, "tool_pose": POSE, "tared": 1.0}
+    assert stepper.step(held=share, sensor_fault=0.0, **inputs)["fault"] == SensorFault.LOST
     for fault in (SensorFault.NONE, SensorFault.SATURATED):
-        assert stepper.step(held=1.0, sensor_fault=fault, **given)["fault"] == fault
+        assert stepper.step(held=1.0, sensor_fault=fault, **inputs)["fault"] == fault

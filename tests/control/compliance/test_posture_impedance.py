@@ -1,4 +1,4 @@
-"""The posture that yields: against its differential equation, integrated independently."""
+"""The compliant posture against its differential equation, integrated independently."""
 
 import casadi as ca
 import numpy as np

@@ -9,9 +9,9 @@ from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.network_program import Program
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.posture_impedance import (
+    CompliantPosture,
     NullSpaceImpedance,
     NullSpaceImpedanceParameters,
-    YieldingPosture,
 )
 from pfsc_drake.control.law.linearization import decoupling_function
 from pfsc_drake.control.law.posture import Posture, free_motion_function
@@ -41,7 +41,7 @@ def posture(weight):
 
 def yielding(arm, weight=None, **pull):
     impedance = NullSpaceImpedance(NullSpaceImpedanceParameters(1.0, 20.0, 0.0), 2, PERIOD)
-    return YieldingPosture(arm[0], arm[1], posture(weight), impedance, **pull)
+    return CompliantPosture(arm[0], arm[1], posture(weight), impedance, **pull)
 
 
 def at_rest(q):
@@ -50,16 +50,16 @@ def at_rest(q):
 
 def started(law, q, point, torque=None):
     """Return a stepper of a law, and what it is given."""
-    given = {"joint_state": at_rest(q), "manifold_point": point}
+    inputs = {"joint_state": at_rest(q), "manifold_point": point}
     stepper = Stepper(law, () if torque is None else ("tau_ext",))
-    return stepper, given | ({} if torque is None else {"tau_ext": torque})
+    return stepper, inputs | ({} if torque is None else {"tau_ext": torque})
 
 
 def drift(law, arm, torque, steps=5):
     """Return in which direction the posture starts to move, shape (7,)."""
-    stepper, given = started(law, *arm[2:], torque)
+    stepper, inputs = started(law, *arm[2:], torque)
     for _ in range(steps):
-        stepper.step(**given)
+        stepper.step(**inputs)
     return stepper.states["motion"][14:21]
 
 
@@ -187,10 +187,10 @@ def fixture_run():
     point = path.evaluator(ELASTIC).evaluate_at(0.3)
 
     def run(duration, goal=None, torque=None):
-        law = YieldingPosture(chain, manifold, Posture(gains, None), impedance, goal=goal)
-        stepper, given = started(law, q, point, torque)
+        law = CompliantPosture(chain, manifold, Posture(gains, None), impedance, goal=goal)
+        stepper, inputs = started(law, q, point, torque)
         ticks = range(round(duration / PERIOD) + 1)
-        rows = [stepper.step(**given)["posture_reference"] for _ in ticks]
+        rows = [stepper.step(**inputs)["posture_reference"] for _ in ticks]
         return np.reshape(rows, (-1, ELASTIC + 1, 7))
 
     return run

@@ -106,7 +106,7 @@ def test_guard(arm, inertia, tared, latched, case):
 
 
 def test_it_is_tared_by_the_mean_that_counts(arm):
-    """The first of two blocks of 10 ms does not; the reading of the next tick is what is left."""
+    """The first of two blocks of 10 ms does not; the reading of the next tick is the residual."""
     readings = np.random.default_rng(2).normal(BIAS, 0.05, (30, 6))
     block = stepper(arm, taring_time=0.02)
     found = watch(block, readings)
@@ -287,16 +287,16 @@ def test_parameters_out_of_range(key, value):
 def test_accelerations_in_steps_are_the_filtered_differences_of_velocities(arm):
     """As if the held acceleration itself were given, through the same low-pass."""
     rng, low_pass = np.random.default_rng(4), LowPass(200.0, PERIOD)
-    differentiated, given = (
+    differentiated, explicit = (
         compensation_function(*arm, low_pass, inertia) for inertia in ("differentiated", "given")
     )
-    states = [np.zeros(differentiated.nnz_in(1)), np.zeros(given.nnz_in(1))]
+    states = [np.zeros(differentiated.nnz_in(1)), np.zeros(explicit.nnz_in(1))]
     q, v, known, largest = REST.copy(), np.zeros(6), 0.0, 0.0
     for k in range(40):
         a = rng.uniform(-8.0, 8.0, 6) if k else np.zeros(6)
         q, v = q + PERIOD * v, v + PERIOD * a
         motions, residuals = (np.concatenate([q, v]), np.concatenate([q, v, a])), []
-        for i, function in enumerate((differentiated, given)):
+        for i, function in enumerate((differentiated, explicit)):
             _, residual, states[i] = function(motions[i], states[i], known, np.zeros(6), 0.0)
             residuals.append(np.array(residual).ravel())
         np.testing.assert_allclose(*residuals, rtol=0, atol=1e-9)

@@ -223,7 +223,7 @@ def test_a_saturated_or_loaded_sensor_is_not_tared(bias, fault):
 
 
 def test_a_sensor_at_the_end_of_its_range_is_not_tared_though_its_reading_is_steady():
-    """It reads 12 N, little enough for a bias, whatever it bears; tared, a push would be lost."""
+    """It reads 12 N, a plausible bias, under any load; once tared, it would not measure a push."""
     sensor = ForceTorqueParameters(
         bias=np.array([30.0, 0, 0, 0, 0, 0]), noise=np.zeros(6), measurement_range=np.full(6, 12.0)
     )

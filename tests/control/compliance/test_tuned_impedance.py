@@ -71,10 +71,10 @@ class Bench:
     def tank(self):
         return self.tuner.states["tank"][0]
 
-    def hold_at(self, place, ticks, strength=5e3):
+    def hold_at(self, position, ticks, strength=5e3):
         """Lead the second coordinate to a place, as a stiff hand does."""
         for _ in range(ticks):
-            error, rate = place - self.state[0, 1], self.state[1, 1]
+            error, rate = position - self.state[0, 1], self.state[1, 1]
             self.tick((0.0, strength * error - 100.0 * rate, 0.0))
 
     @property
@@ -102,7 +102,7 @@ def test_nobody_can_pump_energy_out_of_it():
 
 @pytest.mark.slow
 def test_without_the_tank_somebody_could():
-    """What the test above is worth."""
+    """Negative control of the test above."""
     bench = Bench(capacity=1e6, reserve=1e6)
     pump(bench, 10)
     assert bench.work < bench.stored - 2.0

@@ -42,7 +42,7 @@ def test_is_drakes_jacobian_transposed(robot):
 
 
 def test_what_is_connected_adds_up(robot):
-    """Torques in the joints to those of the wrench; what is not connected is none."""
+    """Torques in the joints add to those of the wrench; unconnected inputs are zero."""
     chain, tau = robot
     link = np.arange(6.0)
     for connected, expected in (

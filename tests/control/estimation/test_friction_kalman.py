@@ -55,18 +55,18 @@ def swing(count=3 * COUNT):
 
 def estimate(kalman, states, drives, velocity=None):
     """Return the estimates at all samples, shape (samples, 3N)."""
-    given = {} if velocity is None else {"velocity": velocity}
-    stepper = Stepper(kalman, tuple(given))
+    inputs = {} if velocity is None else {"velocity": velocity}
+    stepper = Stepper(kalman, tuple(inputs))
     return np.array(
         [
-            stepper.step(joint_state=state, drive_torque=drive, **given)["estimate"]
+            stepper.step(joint_state=state, drive_torque=drive, **inputs)["estimate"]
             for state, drive in zip(states, [*drives, drives[-1]], strict=True)
         ]
     )
 
 
 def test_is_the_filter_of_the_appendix(drake_arm):
-    """(A.5) with its matrices for all axes at once, on a motion of Drake's arm."""
+    """(A.5) with its matrices for all axes, on a motion of Drake's arm."""
     arm, n = drake_arm("rigid"), 3
     drives = np.array([150.0, -250.0, 90.0]) * np.sin(0.3 * np.arange(40)[:, None] + [0, 1, 2])
     friction = np.array([20.0, -30.0, 8.0])
@@ -148,13 +148,15 @@ def test_the_torque_is_that_of_the_coefficients():
     result = estimate(kalman, states, drives)[-1]
     f_c, f_v, v = result[2:4], result[4:], states[-1, 6:]
     np.testing.assert_allclose(result[:2], f_c * np.tanh(v / 0.1) + f_v * v, rtol=1e-12)
-    wanted = np.array([0.05, -0.2])
-    result = estimate(kalman, states, drives, wanted)[-1]
-    np.testing.assert_allclose(result[:2], f_c * np.tanh(wanted / 0.1) + f_v * wanted, rtol=1e-12)
+    velocities = np.array([0.05, -0.2])
+    result = estimate(kalman, states, drives, velocities)[-1]
+    np.testing.assert_allclose(
+        result[:2], f_c * np.tanh(velocities / 0.1) + f_v * velocities, rtol=1e-12
+    )
 
 
 def test_a_drive_that_sticks_teaches_nothing():
-    """Whatever it is told; the axis beside it learns."""
+    """For any command; the axis beside it is updated."""
     states, drives = swing()
     states[:, [0, 4]], states[:, [2, 6]] = 0.3, 1e-4
     drives[:, 0] = 8.0
@@ -176,7 +178,7 @@ def test_a_lost_sample_costs_no_more_than_its_interval():
 
 
 def test_known_torques_are_taken_off(drake_arm):
-    """What acts besides, told as such, teaches the same as none."""
+    """Known additional torques do not change the estimate."""
     arm, push = drake_arm("rigid"), np.array([25.0, -40.0, 15.0])
     drives = np.array([150.0, -250.0, 90.0]) * np.sin(0.3 * np.arange(40)[:, None] + [0, 1, 2])
     model = drive_momentum(arm.chain)

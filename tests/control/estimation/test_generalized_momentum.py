@@ -29,12 +29,12 @@ def test_a_momentum_changes_by_what_acts_on_it(drake_arm, kind, momentum):
     rates = arm.rates(state, DRIVE, FRICTION, TAU_EXT)
     function = model.function
     forces = np.array(function(state)[1]).ravel()
-    told = forces + model.drive_weight * DRIVE + model.known_weight * known
-    found = model.sign * (derivative(function, state, rates) - told)
+    rate = forces + model.drive_weight * DRIVE + model.known_weight * known
+    found = model.sign * (derivative(function, state, rates) - rate)
     np.testing.assert_allclose(found, unknown, rtol=0, atol=2e-4)
 
 
-def test_friction_of_elastic_joints_is_told_by_the_motors_alone(drake_arm):
+def test_friction_of_elastic_joints_depends_on_the_motors_alone(drake_arm):
     arm = drake_arm("elastic")
     model, state = drive_momentum(arm.chain), arm.state()
     assert not model.known_weight.any()
@@ -55,8 +55,8 @@ def test_of_a_closed_chain():
     state, rates = np.tile(np.concatenate([q, v]), 2), np.tile(np.append(v, acceleration), 2)
     function = model.function
     tau_ext = np.array(ca.DM(robot.jacobian(ca.SX(q)))).T @ push
-    told = np.array(function(state)[1]).ravel() + force + model.known_weight * tau_ext
-    np.testing.assert_allclose(derivative(function, state, rates), told, rtol=0, atol=1e-6)
+    rate = np.array(function(state)[1]).ravel() + force + model.known_weight * tau_ext
+    np.testing.assert_allclose(derivative(function, state, rates), rate, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("momentum", [drive_momentum, link_momentum])

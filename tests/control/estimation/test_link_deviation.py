@@ -1,4 +1,4 @@
-"""Standard deviations of links that are found, against each of what goes into them."""
+"""Standard deviations of estimated links against each of their causes."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ STATE = np.concatenate(
 BEND, SWING = STATE[6:9] - STATE[:3], STATE[9:] - STATE[3:6]
 
 
-def told(robot, state=STATE, **errors):
+def deviations(robot, state=STATE, **errors):
     known = {"noise": np.zeros((2, 3)), "share": 0.0, "lag": 0.0}
     known |= dict.fromkeys(("coulomb", "stuck", "viscous"), NOTHING)
     return Stepper(LinkDeviation(robot, LinkErrors(**(known | errors)))).step(joint_state=state)
@@ -28,7 +28,7 @@ def told(robot, state=STATE, **errors):
 @pytest.mark.parametrize("kind", ["elastic", "mixed"])
 def test_shares_and_noise_add_up_as_squares(drake_arm, kind):
     robot, noise = drake_arm(kind).chain, np.array([[2e-5, 1e-5, 0.0], [1e-3, 2e-3, 3e-3]])
-    found = told(robot, noise=noise, share=0.05)
+    found = deviations(robot, noise=noise, share=0.05)
     expected = np.sqrt(noise[0] ** 2 + (0.05 * BEND) ** 2)
     np.testing.assert_allclose(found["position_deviation"], expected, rtol=1e-12)
     expected = np.sqrt(noise[1] ** 2 + (0.05 * SWING) ** 2)
@@ -36,7 +36,7 @@ def test_shares_and_noise_add_up_as_squares(drake_arm, kind):
 
 
 def test_torques_that_come_late(drake_arm):
-    found = told(drake_arm("elastic").chain, lag=2e-3)
+    found = deviations(drake_arm("elastic").chain, lag=2e-3)
     np.testing.assert_allclose(found["position_deviation"], 2e-3 * np.abs(SWING), rtol=1e-12)
     assert "velocity_deviation" not in found
 
@@ -50,7 +50,7 @@ def test_friction_is_an_error_while_joints_move_and_anything_while_they_rest(
 ):
     robot, state, three = drake_arm("mixed").chain, STATE.copy(), np.ones(3)
     state[3:6] = state[9:] = speed
-    found = told(
+    found = deviations(
         robot, state, lag=1e-3, coulomb=6.0 * three, stuck=30.0 * three, viscous=4.0 * three
     )
     expected = np.where(robot.elastic_joints, torque / robot.K_s, 0.0)
@@ -61,7 +61,7 @@ def test_the_tool_point_against_links_that_are_drawn(drake_arm):
     """So small that the tool moves in proportion."""
     robot = drake_arm("elastic").chain
     sigma = np.array([3e-5, 1e-5, 8e-5])
-    found = told(robot, noise=np.array([sigma, NOTHING]))
+    found = deviations(robot, noise=np.array([sigma, NOTHING]))
     rng, count = np.random.default_rng(3), 4000
     q = STATE[:3] + sigma * rng.standard_normal((count, 3))
     y = np.array(pose_function(robot).map(count)(q.T)).T[:, :3]

@@ -1,4 +1,4 @@
-"""Noise of links that are found, against samples of it that are drawn; what is believed."""
+"""Noise of estimated links against random samples; nominal friction."""
 
 import numpy as np
 import pytest
@@ -112,7 +112,7 @@ def test_noise_of_what_motors_tell(drake_arm, encoders):
 
 
 def test_the_lag_is_that_of_a_ramp(drake_arm):
-    """Drives that push ever harder on motors that never move tell of springs that do so."""
+    """Growing drive torques on motors at rest are attributed to their springs."""
     robot = drake_arm("elastic").chain
     errors = errors_of_observed_torques(
         robot, StateUncertainty(), EXACT, Q, BANDWIDTH, PERIOD, None
@@ -122,8 +122,8 @@ def test_the_lag_is_that_of_a_ramp(drake_arm):
     rate, count = np.array([400.0, -300.0, 200.0]), 60
     for k in range(count + 1):
         # over an interval drives hold the mean of what the springs' torque ramps through
-        held = weight + rate * (k + 0.5) * PERIOD
-        found = finder.step(joint_state=rest, drive_torque=held, known_torque=weight)
+        spring_torque = weight + rate * (k + 0.5) * PERIOD
+        found = finder.step(joint_state=rest, drive_torque=spring_torque, known_torque=weight)
     q_J, v_J, q_M, _ = np.split(found["joint_state"], 4)
     observed = robot.K_s * (q_M - q_J) - robot.K_d * v_J
     late = (weight + rate * count * PERIOD - observed) / rate
@@ -136,21 +136,21 @@ def test_exact_measurements_leave_no_noise(drake_arm):
     sure = StateUncertainty(torque_noise=0.0)
     errors = errors_of_measured_torques(robot, sure, EXACT, Q, BANDWIDTH, PERIOD)
     assert not errors.noise.any()
-    assert errors.of_sensors
+    assert errors.has_torque_sensors
     assert errors.share == pytest.approx(np.hypot(sure.stiffness, sure.torque_scale))
 
 
-def test_friction_that_is_believed_and_that_is_not(drake_arm):
+def test_modelled_and_unmodelled_friction(drake_arm):
     robot, known = drake_arm("elastic").chain, StateUncertainty(friction=0.3, coulomb=0.04)
     f_c, f_v = np.array([10.0, 20.0, 5.0]), np.array([3.0, 4.0, 1.0])
 
     def errors(friction):
         return errors_of_observed_torques(robot, known, EXACT, Q, BANDWIDTH, PERIOD, friction)
 
-    believed, not_believed = errors((f_c, f_v)), errors(None)
-    np.testing.assert_allclose(believed.coulomb, 0.3 * f_c)
-    np.testing.assert_allclose(believed.viscous, 0.3 * f_v)
-    np.testing.assert_array_equal(believed.stuck, f_c)
-    np.testing.assert_allclose(not_believed.coulomb, 0.04 * robot.gather("effort_limit"))
-    np.testing.assert_array_equal(not_believed.stuck, not_believed.coulomb)
-    assert not believed.of_sensors
+    modelled, unmodelled = errors((f_c, f_v)), errors(None)
+    np.testing.assert_allclose(modelled.coulomb, 0.3 * f_c)
+    np.testing.assert_allclose(modelled.viscous, 0.3 * f_v)
+    np.testing.assert_array_equal(modelled.stuck, f_c)
+    np.testing.assert_allclose(unmodelled.coulomb, 0.04 * robot.gather("effort_limit"))
+    np.testing.assert_array_equal(unmodelled.stuck, unmodelled.coulomb)
+    assert not modelled.has_torque_sensors

@@ -1,4 +1,4 @@
-"""What no sensor tells of a robot's state: links behind elastic joints, and a few ticks on."""
+"""Estimated robot state: links behind elastic joints, and prediction over a delay."""
 
 import numpy as np
 import pytest
@@ -41,13 +41,13 @@ def test_torques_tell_where_the_links_are(drake_arm, kind):
     arm = drake_arm(kind)
     _, states = moved(arm)
     torques = measured_torques(arm.chain, states)
-    given = motors_only(states)
-    given[:, :6] = np.where(np.tile(arm.chain.elastic_joints, 2), np.nan, states[:, 6:])
+    inputs = motors_only(states)
+    inputs[:, :6] = np.where(np.tile(arm.chain.elastic_joints, 2), np.nan, states[:, 6:])
     found = Stepper(LinkState(arm.chain, 800.0, PERIOD))
     links = np.array(
         [
             found.step(joint_state=x, joint_torque=tau)["joint_state"]
-            for x, tau in zip(given, torques, strict=True)
+            for x, tau in zip(inputs, torques, strict=True)
         ]
     )
     np.testing.assert_array_equal(links[:, 6:], states[:, 6:])
@@ -61,7 +61,7 @@ def test_torques_tell_where_the_links_are(drake_arm, kind):
 
 
 def test_a_robot_at_rest_is_at_rest_from_the_first_tick(drake_arm):
-    """Its springs bear the weight: the links are not where the motors are."""
+    """Its springs carry the weight: links and motors have different positions."""
     arm = drake_arm("elastic")
     q = np.array([0.3, 1.3, -0.5])
     weight = gravity_function(arm.chain)(q).full().ravel()
@@ -69,8 +69,8 @@ def test_a_robot_at_rest_is_at_rest_from_the_first_tick(drake_arm):
     found = Stepper(LinkState(arm.chain, 800.0, PERIOD))
     assert np.abs(weight / arm.chain.K_s).max() > 1e-3
     for _ in range(3):
-        told = found.step(joint_state=motors_only(state[None])[0], joint_torque=weight)
-        np.testing.assert_allclose(told["joint_state"], state, rtol=0, atol=1e-10)
+        link_state = found.step(joint_state=motors_only(state[None])[0], joint_torque=weight)
+        np.testing.assert_allclose(link_state["joint_state"], state, rtol=0, atol=1e-10)
 
 
 def test_links_are_expected_where_springs_move_them_that_bend_meanwhile(drake_arm):
@@ -91,10 +91,10 @@ def test_links_are_expected_where_springs_move_them_that_bend_meanwhile(drake_ar
         atol=1e-13,
     ).y[:, -1]
     found = Stepper(LinkState(arm.chain, 800.0, PERIOD))
-    given = {"joint_state": state, "joint_torque": weight}
-    found.start(**given)
+    inputs = {"joint_state": state, "joint_torque": weight}
+    found.start(**inputs)
     found.set_state("prediction", np.concatenate([q, NOTHING, NOTHING]))
-    found.step(**given)
+    found.step(**inputs)
     expected = found.states["prediction"][:6]
     np.testing.assert_allclose(expected[3:], later[3:6], rtol=0.1)
     assert np.all(np.abs(expected[:3] - later[:3]) < 0.2 * PERIOD * np.abs(later[3:6]))
@@ -159,7 +159,7 @@ def test_springs_are_observed_by_what_they_do_to_the_motors(drake_arm):
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.01 * swing)
 
 
-def test_friction_that_is_not_believed_is_taken_for_a_spring(drake_arm):
+def test_unmodelled_friction_is_taken_for_a_spring(drake_arm):
     arm = drake_arm("elastic")
     model = motor_momentum(arm.chain, (np.array([5.0, 0.0, 0.0]), NOTHING))
     state = np.zeros(12)
@@ -180,15 +180,15 @@ def drives():
     return np.array([120.0, -300.0, 80.0]) * np.cos(turns)
 
 
-def told(predictor, states, told_torques, **more):
-    """Return what a predictor makes of states, being told torques."""
+def predicted_states(predictor, states, commands, **more):
+    """Return the predictions for states and commanded torques."""
     stepper = Stepper(predictor, tuple(more))
     return np.array(
         [
             stepper.step(joint_state=x, drive_torque=tau, **{k: v[i] for k, v in more.items()})[
                 "joint_state"
             ]
-            for i, (x, tau) in enumerate(zip(states, told_torques, strict=False))
+            for i, (x, tau) in enumerate(zip(states, commands, strict=False))
         ]
     )
 
@@ -197,11 +197,13 @@ def told(predictor, states, told_torques, **more):
 @pytest.mark.parametrize("kind", ["rigid", "elastic", "mixed"])
 @pytest.mark.parametrize("ticks", [1, 2, 3])
 def test_the_state_is_that_of_so_many_ticks_later(drake_arm, kind, ticks):
-    """The arm acts on what it was told ``ticks`` before."""
+    """The arm applies the torques that were commanded ``ticks`` before."""
     arm, sent = drake_arm(kind), drives()
     states = np.array(arm.move(sent, lambda _: NOTHING, lambda _: NOTHING, PERIOD))
-    # what acts from tick k on was told at tick k - ticks
-    found = told(StatePredictor(arm.chain, ticks, PERIOD), states, [*sent[ticks:], *sent])
+    # torques from tick k on were commanded at tick k - ticks
+    found = predicted_states(
+        StatePredictor(arm.chain, ticks, PERIOD), states, [*sent[ticks:], *sent]
+    )
     settled = slice(ticks + 1, PREDICTED - ticks)
     later = states[settled.start + ticks : PREDICTED]
     scale = np.repeat([1.0, 100.0, 1.0, 100.0], 3)
@@ -212,7 +214,7 @@ def test_the_state_is_that_of_so_many_ticks_later(drake_arm, kind, ticks):
 
 
 def test_springs_are_exact_and_inertia_is_that_of_the_middle(drake_arm):
-    """Against the matrix exponential of the linear system that Drake tells there."""
+    """Against the matrix exponential of Drake's linearized system there."""
     arm, ticks = drake_arm("elastic"), 3
     state, K_s, n = arm.state(), arm.chain.K_s, 3
     v, middle = state[3:6], state[:3] + 0.5 * ticks * PERIOD * state[3:6]
@@ -234,7 +236,7 @@ def test_springs_are_exact_and_inertia_is_that_of_the_middle(drake_arm):
     A[3 * n : -1, 3 * n : -1] -= np.diag(BEARINGS / arm.chain.D_M)
     A[3 * n : -1, -1] = tau / arm.chain.D_M
     expected = (scipy.linalg.expm(ticks * PERIOD * A) @ [*state, 1.0])[:-1]
-    found = told(StatePredictor(arm.chain, ticks, PERIOD), [state], [tau])[0]
+    found = predicted_states(StatePredictor(arm.chain, ticks, PERIOD), [state], [tau])[0]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
@@ -245,7 +247,7 @@ def test_velocities_of_difference_quotients_are_brought_up_to_positions(drake_ar
     late = states[1:].copy()
     for position, velocity in ((slice(0, 3), slice(3, 6)), (slice(6, 9), slice(9, 12))):
         late[:, velocity] = np.diff(states[:, position], axis=0) / PERIOD
-    found = told(StatePredictor(arm.chain, 0, PERIOD, PERIOD / 2), late, sent[1:])
+    found = predicted_states(StatePredictor(arm.chain, 0, PERIOD, PERIOD / 2), late, sent[1:])
     error = np.abs(found - states[1:PREDICTED])[1:, [3, 4, 5, 9, 10, 11]].max()
     before = np.abs(late[:-1] - states[1:PREDICTED])[1:, [3, 4, 5, 9, 10, 11]].max()
     assert before > 0.01
@@ -255,7 +257,7 @@ def test_velocities_of_difference_quotients_are_brought_up_to_positions(drake_ar
 
 @pytest.mark.parametrize(("ticks", "age"), [(0, 1e-3), (2, 0.8e-3)])
 def test_inertia_is_that_of_the_middle_between_old_velocities_and_the_end(drake_arm, ticks, age):
-    """Of a rigid arm whose weight is held: ``v + (age + ticks T) D^-1 (tau - n)``, by Drake."""
+    """A rigid arm whose weight is compensated: ``v + (age + ticks T) D^-1 (tau - n)``, by Drake."""
     arm = drake_arm("rigid")
     state, v = arm.state(), 5.0 * arm.state()[3:6]
     state[3:6] = state[9:] = v
@@ -266,33 +268,35 @@ def test_inertia_is_that_of_the_middle_between_old_velocities_and_the_end(drake_
         at = np.concatenate([q, v, q, v])
         return v + (age + ticks * PERIOD) * arm.rates(at, tau, NOTHING, NOTHING)[3:6]
 
-    found = told(StatePredictor(arm.chain, ticks, PERIOD, age), [state], [tau])[0][3:6]
+    found = predicted_states(StatePredictor(arm.chain, ticks, PERIOD, age), [state], [tau])[0][3:6]
     middle = 0.5 * (ticks * PERIOD - age)
     scale = np.abs(reached(middle) - reached(0.5 * ticks * PERIOD)).max()
     assert scale > 1e-5
     np.testing.assert_allclose(found, reached(middle), rtol=0, atol=0.1 * scale)
 
 
-def test_friction_that_is_told_is_taken_off(drake_arm):
+def test_estimated_friction_is_subtracted(drake_arm):
     arm, sent, f = drake_arm("elastic"), drives(), np.array([30.0, -40.0, 20.0])
     states = np.array(arm.move(sent, lambda _: f, lambda _: NOTHING, PERIOD))[:PREDICTED]
     rubbing = np.tile(f, (PREDICTED, 1))
     later = slice(5, PREDICTED - 2)
-    with_it = told(
+    with_it = predicted_states(
         StatePredictor(arm.chain, 2, PERIOD), states, [*sent[2:], *sent], friction_torque=rubbing
     )[later]
-    without = told(StatePredictor(arm.chain, 2, PERIOD), states, [*sent[2:], *sent])[later]
+    without = predicted_states(StatePredictor(arm.chain, 2, PERIOD), states, [*sent[2:], *sent])[
+        later
+    ]
     true = states[7:PREDICTED]
     assert np.abs(with_it - true)[:, 9:].max() < 0.03 * np.abs(without - true)[:, 9:].max()
 
 
 def test_a_robot_at_rest_stays_at_rest(drake_arm):
-    """At the start what is on its way holds the weight."""
+    """Initially the pending torques carry the weight."""
     arm = drake_arm("elastic")
     q = np.array([0.3, 1.3, -0.5])
     weight = gravity_function(arm.chain)(q).full().ravel()
     state = np.concatenate([q, NOTHING, q + weight / arm.chain.K_s, NOTHING])
-    found = told(StatePredictor(arm.chain, 3, PERIOD), [state], [weight])[0]
+    found = predicted_states(StatePredictor(arm.chain, 3, PERIOD), [state], [weight])[0]
     np.testing.assert_allclose(found, state, rtol=0, atol=1e-12)
 
 
@@ -305,11 +309,11 @@ def test_numbers_out_of_range(drake_arm, ticks, age, message):
 
 
 def test_what_is_not_measured_is_not_foretold(drake_arm):
-    """The rest is passed on, so that a stop still sees it; afterwards all is foretold again."""
+    """The measured state is passed through for a stop; afterwards all is predicted again."""
     arm = drake_arm("elastic")
     states = np.array(arm.move(drives(), lambda _: NOTHING, lambda _: NOTHING, PERIOD))[:3]
-    whole = told(StatePredictor(arm.chain, 2, PERIOD), states, drives())
+    whole = predicted_states(StatePredictor(arm.chain, 2, PERIOD), states, drives())
     states[1, 7] = np.nan
-    found = told(StatePredictor(arm.chain, 2, PERIOD), states, drives())
+    found = predicted_states(StatePredictor(arm.chain, 2, PERIOD), states, drives())
     np.testing.assert_array_equal(found[1], states[1])
     np.testing.assert_array_equal(found[[0, 2]], whole[[0, 2]])

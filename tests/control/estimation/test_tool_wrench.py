@@ -36,7 +36,7 @@ def test_the_force_of_three_torques(load_robot):
 
 
 def test_damping_keeps_a_singular_posture_from_blowing_up(load_robot):
-    """A straight wrist: torques that it could not bear are no enormous wrench."""
+    """A straight wrist: torques in its singular direction cause no large wrench."""
     robot, straight = load_robot("comau_racer_1_4"), Q.copy()
     straight[4] = 1e-6
     noise = 0.1 * np.array([1.0, -1.0, 1.0, 1.0, 1.0, -1.0])

@@ -154,7 +154,7 @@ def assert_linear_dynamics(Y, v, outputs, reference):
     """Check that outputs are what they are called, and obey the linear dynamics of their poles.
 
     Args:
-        Y: Derivatives 0..r-1 that the law tells, shape (samples, r, m).
+        Y: Derivatives 0..r-1 that the law reports, shape (samples, r, m).
         v: Virtual inputs, shape (samples, m).
         outputs: By other means, shape (samples, m).
         reference: Derivatives 0..r, shape (samples, r + 1, m).

@@ -202,7 +202,7 @@ def test_visco_elastic_hold_form_tends_to_the_printed_law(load_robot):
 
 
 def test_elastic_law_averages_over_the_hold(load_robot):
-    """What the torque is needed for on average, against Drake's plant with the torque held.
+    """Mean torque demand, against Drake's plant with the torque held.
 
     ``D_M K_s^-1 tau_J'' = tau_d - (D_M a_J + tau_J)``; the bracket changes during the interval.
     """
@@ -316,12 +316,16 @@ def test_extrapolation_makes_the_held_law_second_order(load_robot):
     for T_s in (1e-3, 5e-4, 2.5e-4):
         evaluate = compile_law(robot.chain, actuation.elastic, 3, T_s)
         for extrapolated, error in errors.items():
-            state, last_held = start, None
+            state, last_varying_input = start, None
             for _ in range(2):
                 q, gain, drift, offset = evaluate(state, none)
                 held = gain @ wanted + drift
-                lead = 0.5 * (held - last_held) if extrapolated and last_held is not None else 0.0
-                drive, last_held = held + lead + offset, held
+                lead = (
+                    0.5 * (held - last_varying_input)
+                    if extrapolated and last_varying_input is not None
+                    else 0.0
+                )
+                drive, last_varying_input = held + lead + offset, held
                 state = simulate(robot, state, drive, lambda t: np.zeros(3), T_s).y[:, -1]
             jerk_after = evaluate(state, none)[0][3]
             error.append(np.abs((jerk_after - q[3]) / T_s - wanted).max())

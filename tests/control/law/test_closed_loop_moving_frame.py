@@ -1,7 +1,7 @@
 """The law along a path that is carried by a moving frame, on Drake's own plant.
 
-As the test along a path that rests: every output, told in the frame, obeys the linear dynamics of
-its poles, whatever the frame does. A law that is not told the frame's highest derivative does not.
+As the test along a path at rest: every output, measured in the frame, obeys the linear dynamics of
+its poles for any motion of the frame. A law without the frame's highest derivative does not.
 """
 
 import math
@@ -136,7 +136,7 @@ def test_outputs_obey_the_predicted_linear_dynamics(
 def test_without_the_highest_derivative_they_do_not(
     load_robot, make_law, virtual_output, oriented_path
 ):
-    """So that the test above can fail: the loop is disturbed by what it is not told."""
+    """So that the test above can fail: unmodelled derivatives disturb the loop."""
     loop, x = begun("rigid", load_robot, make_law, oriented_path)
     loop.untold = 1
     told = followed(loop, x, oriented_path, virtual_output)

@@ -264,7 +264,7 @@ def test_joints_that_may_be_as_fast_as_they_like_are_not_held_back(scale, slope)
 @pytest.mark.parametrize("velocity", [True, False])
 @pytest.mark.parametrize("scale", [None, np.diag(np.linspace(0.5, 2.0, 7))])
 def test_joints_become_as_fast_as_they_may_and_outputs_stay(velocity, scale):
-    """What outputs take of the velocity is its part next to nothing, by the same weight."""
+    """The velocity for the outputs is the weighted least-norm part of it."""
     settling, speeds = (3.0 if velocity else 1.0), np.full(7, 5.0)
     A, rhs, v, spare, solution = held_back(settling, speeds, velocity, scale)
     np.testing.assert_allclose(A @ solution.x, rhs, atol=1e-12)

@@ -1,4 +1,4 @@
-"""The first fault stays, and decides what drives are told."""
+"""The first fault is latched, and switches the commands to the drives."""
 
 import numpy as np
 import pytest

@@ -123,7 +123,7 @@ def test_an_end_of_an_open_path(rigid_3r, position_path, make_law, tick, beyond)
 
 
 def test_a_stretched_arm_is_singular(rigid_3r, position_path, make_law, tick):
-    """Where both pivots and the tool point are in line, which no joint limit of the law forbids."""
+    """Singular posture: both pivots and the tool point in line, within the joint limits."""
     law = make_law(rigid_3r.chain, "rigid", False, inverse=DecouplingInverse(1e-3))
 
     def smallest(angle):
@@ -190,10 +190,10 @@ def test_half_a_tick_is_extrapolated(sampling_time, lead, load_robot, position_p
     law = make_law(robot.chain, "elastic", False, sampling_time=sampling_time)
     tick = Tick(robot, position_path, law, q)
     alone = tick()
-    held, drive = alone[law.layout.held], alone[law.layout.drive]
+    held, drive = alone[law.layout.varying_input], alone[law.layout.drive]
     change = np.array([3.0, -5.0, 7.0])
-    result = tick(last_held=held - change)
-    assert np.allclose(result[law.layout.held], held, rtol=1e-12)
+    result = tick(last_varying_input=held - change)
+    assert np.allclose(result[law.layout.varying_input], held, rtol=1e-12)
     assert np.allclose(result[law.layout.drive], drive + lead * change, rtol=0, atol=1e-8)
     assert np.array_equal(tick(), alone)
 

@@ -1,4 +1,4 @@
-"""What a posture asks for: against its potential and its error dynamics."""
+"""Demands of a posture: against its potential and its error dynamics."""
 
 import casadi as ca
 import numpy as np

@@ -1,4 +1,4 @@
-"""Joints beyond the number of outputs: they never touch the outputs, and keep what they are told.
+"""Redundant joints: they never disturb the outputs, and track their reference.
 
 Closed loops on Drake's own plant, as in the test of the outputs' linear dynamics.
 """
@@ -93,7 +93,7 @@ def test_a_weight_changes_the_joints_alone(weight, load_robot, make_law, positio
 
 @pytest.mark.slow
 def test_a_posture_comes_back_to_its_reference(load_robot, make_law, position_path):
-    """What is left of the deviation moves the outputs: its free part has died out."""
+    """The remaining deviation moves the outputs: its null-space part has decayed."""
     station = Station(load_robot, make_law, position_path, "rigid", weight=np.ones(6))
     deviation = []
     for i in (0, -1):
@@ -149,7 +149,7 @@ def test_damping_tells_what_it_lets_the_outputs_miss(load_robot, make_law, posit
 def test_a_posture_far_away_asks_for_no_more_than_drives_can_do(
     load_robot, make_law, position_path
 ):
-    """Drives at their limits would miss the outputs; what is left of the posture misses none."""
+    """Drives at their limits would disturb the outputs; the reduced posture does not."""
     chain = load_robot("comau_racer_1_4").chain
     far = make_law(chain, "rigid", False)
     posture = replace(far.posture, speeds=np.full(6, np.inf))

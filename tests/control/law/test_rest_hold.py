@@ -39,7 +39,7 @@ class Held:
 
 @pytest.mark.parametrize("stiffness", [1e7, 1e8])
 def test_a_stuck_motor_makes_the_exact_law_unstable(stiffness):
-    """The real part that the module tells is that of the characteristic polynomial's roots."""
+    """The real part in the module docstring equals that of the polynomial's roots."""
     w = np.sqrt(K / M)
     polynomial = np.poly(POLES) + stiffness / D * np.array([0.0, 0.0, 1.0, 0.0, w**2])
     roots = np.roots(polynomial)

@@ -1,4 +1,4 @@
-"""Gains and what they bear: against the rule of the fast pair and the chain of integrators."""
+"""Gains and tolerated errors: against the rule of the fast pair and the chain of integrators."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_sampled_fast_the_modes_are_the_poles(arm, law, poles):
     """Exact linearization: three coordinates, each with all the poles."""
     period = 2e-5
     robot, _ = arm(period, law)
-    found = modes(robot.loop.closed(gains(*poles)), period)
+    found = modes(robot.loop.closed_loop(gains(*poles)), period)
     slow = found.rate > -150.0
     assert np.sum(slow) == 3 * len(poles)
     np.testing.assert_allclose(
@@ -59,7 +59,7 @@ def test_integral_parts_add_a_mode_each(arm):
     tried = gains(-20, -25, -60)
     tried.outputs.integral = np.full(3, 20.0 * 25.0 * 60.0 * 5.0)
     expected = np.roots([1.0, *tried.outputs.proportional[::-1, 0], tried.outputs.integral[0]])
-    found = modes(robot.loop.closed(tried), period)
+    found = modes(robot.loop.closed_loop(tried), period)
     slow = found.rate > -150.0
     np.testing.assert_allclose(
         np.sort(found.rate[slow]), np.repeat(np.sort(expected.real), 3), rtol=0.03
@@ -82,7 +82,7 @@ def test_joints_to_spare_have_the_modes_of_their_posture(
     loop = LoopAtRest(robot.chain, made.linearization, rest, period, made.posture)
     own = Stabilization([gains_from_poles((-11.0, -13.0, -17.0, -70.0))] * 6, 4, ["x"] * 6)
     outputs = gains(-20, -25, -60, -80).outputs
-    found = modes(loop.closed(LoopGains(outputs, own)), period)
+    found = modes(loop.closed_loop(LoopGains(outputs, own)), period)
     slow = np.sort(found.rate[found.rate > -150.0])
     expected = np.repeat([-80.0, -70.0, -60.0, -25.0, -20.0, -17.0, -13.0, -11.0], 3)
     np.testing.assert_allclose(slow, expected, rtol=0.02)
@@ -93,7 +93,7 @@ def test_the_borne_error_follows_the_rule(arm, fast):
     """``p_3 p_4 = delta omega^2 / 1..3`` at the edge, omega the fastest resonance."""
     robot, resonances = arm(1e-3)
     poles = rule_of_poles(8.0, fast, 4)
-    borne = robot.borne(gains(*poles), RobotError(stiffness=1.01))
+    borne = robot.largest_error(gains(*poles), RobotError(stiffness=1.01))
     assert 0.0 < borne < 0.3
     assert 0.8 < borne * resonances[-1] ** 2 / (poles[2] * poles[3]) < 3.5
 
@@ -102,12 +102,15 @@ def test_what_is_borne_separates_stable_from_unstable(arm):
     robot, _ = arm(1e-3)
     slow = gains(*rule_of_poles(8.0, 25.0, 4))
     for direction in (RobotError(mass=0.99), RobotError(stiffness=1.01)):
-        borne = robot.borne(slow, direction)
+        borne = robot.largest_error(slow, direction)
         sign = np.sign([direction.mass - 1.0, direction.stiffness - 1.0])
         inside, outside = (RobotError(*(1.0 + factor * borne * sign)) for factor in (0.97, 1.05))
         assert robot.rate(slow, inside) <= 0.0 < robot.rate(slow, outside)
-    assert robot.unborne(slow, 0.9 * robot.borne(slow, RobotError(stiffness=1.01))) is None
-    assert robot.unborne(slow, 0.3) is not None
+    assert (
+        robot.destabilizing_error(slow, 0.9 * robot.largest_error(slow, RobotError(stiffness=1.01)))
+        is None
+    )
+    assert robot.destabilizing_error(slow, 0.3) is not None
 
 
 def test_the_fast_pole_is_the_slowest_that_suffices(arm):
@@ -152,7 +155,7 @@ class SlowerWithTwoErrors(SampledRobot):
 
 
 def test_mass_and_stiffness_may_be_wrong_together():
-    """Half of 20 1/s is kept from 200 1/s on; with one error at a time 100 1/s would do."""
+    """Half of 20 1/s is retained from 200 1/s on; with one error at a time 100 1/s would do."""
     robot = SlowerWithTwoErrors(None, 1e-3, is_elastic=True)
     fast = choose_fast_pole(robot, lambda fast: fast, [20.0], 0.1)
     assert 200.0 <= fast < 250.0
@@ -166,5 +169,5 @@ def test_rule_of_poles():
 
 
 def test_errors_in_words():
-    assert str(RobotError(mass=0.95)) == "masses believed 5 % too low"
-    assert str(RobotError(stiffness=1.05)) == "joint stiffnesses believed 5 % too high"
+    assert str(RobotError(mass=0.95)) == "nominal masses 5 % too low"
+    assert str(RobotError(stiffness=1.05)) == "nominal joint stiffnesses 5 % too high"

@@ -50,7 +50,7 @@ class Robot:
         return stepper
 
     def state(self, q, v):
-        """Return the plant's state with springs that bear the weight."""
+        """Return the plant's state with springs under the weight."""
         weight = self.weight(q)
         x = np.concatenate([q, v, q + weight / self.chain.K_s, v])
         return self.coordinates.plant_state(x)
@@ -188,7 +188,7 @@ def test_a_value_that_comes_back_is_used_unless_it_was_implausible(robot):
 
 
 def test_fast_joints_are_given_the_time_that_their_drives_need(robot):
-    """Three times the speed: the limits are kept, and the robot stands within a second."""
+    """Three times the speed: the limits are respected, and the robot stands within a second."""
     states, torques = stop(robot, speed=2.5 * SPEED)
     check(states, travel=1.0)
     assert np.mean(np.abs(torques) >= robot.limits) < 0.01
@@ -211,7 +211,7 @@ def test_what_moves_up_stops_sooner_than_what_moves_down(robot):
 
 
 def test_braking_peaks_at_the_share_of_the_drive_that_it_was_planned_with(robot):
-    """Axis 1, which bears no weight: momentum p in T takes 1.5 p / T at the steepest."""
+    """Axis 1, which carries no weight: momentum p in T takes 1.5 p / T at the steepest."""
     if np.isfinite(robot.chain.K_s).all():
         pytest.skip("the swing of elastic links adds to it")
     speed = np.array([2.0, 0.0, 0.0])
@@ -238,7 +238,7 @@ def test_nothing_jumps_where_motors_and_links_part(robot):
 
 @pytest.mark.parametrize("lost", [1, 2 * N + 1])
 def test_an_implausible_side_is_taken_from_the_other_and_the_weight_between(robot, lost):
-    """A position of link or motor 2, long wrong: the spring tells where it is."""
+    """A position of link or motor 2, long wrong: the spring reveals it."""
     true = robot.rows @ robot.state(POSTURE, np.zeros(N))
     wrong, suspects = true.copy(), NOTHING.copy()
     wrong[lost] += 0.5

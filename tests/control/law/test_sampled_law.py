@@ -17,7 +17,7 @@ PERIOD, THETA = 1e-3, 0.6
 
 
 class Loop:
-    """A law and what it is told: joints beside a path, at rest in space."""
+    """A law and its inputs: joints beside a path, at rest in space."""
 
     def __init__(self, robot, path, law):
         self.law, n, r = law, robot.n, law.linearization.relative_degree
@@ -42,9 +42,7 @@ class Loop:
 @pytest.fixture(name="loop", params=[False, True])
 def fixture_loop(request, load_robot, position_path, make_law):
     robot = load_robot("comau_racer_1_4_3r")
-    law = make_law(
-        robot.chain, "rigid", False, integral=40.0, tells_reference_velocity=request.param
-    )
+    law = make_law(robot.chain, "rigid", False, integral=40.0, has_reference_velocity=request.param)
     return Loop(robot, position_path, law)
 
 
@@ -70,7 +68,7 @@ def test_ticks_are_those_of_the_law_with_what_it_remembers(loop):
         for name in ("manifold_state", "virtual_input"):
             part = found["evaluation"][getattr(layout, name)]
             np.testing.assert_allclose(found[name], part, rtol=1e-14)
-        held, output = expected[layout.held], found["manifold_state"][:3]
+        held, output = expected[layout.varying_input], found["manifold_state"][:3]
         integral = integral + PERIOD * (output - loop.reference[:3])
 
 
@@ -94,7 +92,7 @@ def test_friction_is_added_to_what_drives_give(model, load_robot, position_path,
     reference = np.zeros((r + 1) * 3)
     reference[0] = point[1]
     told, drive = (state, point, reference, np.zeros(3)), law.layout.drive
-    for held in (None, law.evaluate(*told)[law.layout.held]):
+    for held in (None, law.evaluate(*told)[law.layout.varying_input]):
         without = law.evaluate(*told, held)[drive]
         found = law.evaluate(*told, held, friction=friction)[drive]
         np.testing.assert_allclose(found - without, friction, rtol=1e-9)
@@ -121,7 +119,7 @@ def test_faults_of_inputs_are_told_apart(loop):
 def test_the_reference_velocity_is_that_of_the_last_tick(loop):
     first = loop.tick()
     if "reference_velocity" not in first:
-        pytest.skip("the law does not tell it")
+        pytest.skip("the law does not output it")
     assert not first["reference_velocity"].any()
     found = loop.tick()
     np.testing.assert_array_equal(

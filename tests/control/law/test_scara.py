@@ -117,7 +117,7 @@ def test_virtual_work_with_drakes_jacobian(load_robot, path):
 
 
 def test_the_start_keeps_the_tilt_and_takes_the_turn(load_robot):
-    """A target that is tilted against the tool: its turn is taken, its tilt told."""
+    """A target that is tilted against the tool: its rotation is used, its tilt reported."""
     chain = load_robot(MODEL).chain
     there = np.array(pose_function(chain)(BENT)).ravel()
     tilt = Rotation.from_rotvec([0.2, -0.1, 0.0])

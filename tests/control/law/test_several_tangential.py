@@ -71,7 +71,7 @@ def test_a_loop_at_rest_on_a_surface_has_the_poles_of_its_gains(law, load_robot)
     gains = Stabilization([gains_from_poles(p) for p in poles], r, names)
     rest = RestPosture(q, SurfaceEvaluator(surface("paraboloid"), r).evaluate_at(theta))
     loop = LoopAtRest(robot.chain, linearization, rest, period)
-    values = np.linalg.eigvals(loop.closed(LoopGains(gains, None)))
+    values = np.linalg.eigvals(loop.closed_loop(LoopGains(gains, None)))
     # besides them: sums of errors, which no gain listens to, and held inputs
     values = values[(np.abs(values) > 0.5) & (np.abs(values - 1.0) > 1e-9)]
     rates = np.sort((np.log(values) / period).real)

@@ -1,4 +1,4 @@
-"""A reference towards way points that come while the tool moves."""
+"""A reference towards waypoints that are received while the tool moves."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def streamed(order, goals, speeds=None, limits=LIMITS, **options):
 
 
 def any_stream(seed, ticks=3000):
-    """Return arc lengths of last way points that grow now and then, and what is no number."""
+    """Return arc lengths of last waypoints that grow now and then, and NaN."""
     random = np.random.default_rng(seed)
     steps = random.exponential(0.1, ticks) * (random.random(ticks) < 4e-3)
     steps[ticks // 2 :] = 0.0  # it runs dry
@@ -51,7 +51,7 @@ def test_a_stream_is_followed_smoothly_within_its_limits_and_never_beyond(order,
     acceleration = np.diff(eta[:, 1]) / PERIOD
     assert np.abs(acceleration).max() <= LIMITS.acceleration * (1.0 + 1e-6)
     for k in range(order):
-        # each derivative is what the one below grows by, whenever way points come
+        # each derivative is what the one below grows by, whenever waypoints come
         means = PERIOD * (eta[1:, k + 1] + eta[:-1, k + 1]) / 2.0
         scale = LIMITS.acceleration * LIMITS.bandwidth ** (k + 1) * PERIOD**3
         np.testing.assert_allclose(np.diff(eta[:, k]), means, rtol=0, atol=scale)

@@ -117,7 +117,7 @@ def slow_motion(speed):
 @pytest.mark.parametrize("filter_time", [PERIOD, 10.0 * PERIOD])
 @pytest.mark.parametrize(("side", "name"), [(0, "q_J_1"), (2 * N, "q_M_1")])
 def test_an_encoder_that_froze_at_rest_is_found_by_the_tolerance(chain, filter_time, side, name):
-    """At 0.03 rad/s, though joints may move at 4 rad/s: velocities are late by what is slow now."""
+    """At 0.03 rad/s, though joints may move at 4 rad/s: velocities are late by a slow motion."""
     speed = 0.03
     frozen = slow_motion(speed)
     assert watch(chain, frozen, joint_limits=False, filter_time=filter_time) is None
@@ -170,7 +170,7 @@ def test_a_joint_beyond_its_largest_speed(chain, too_fast):
 
 
 def test_a_velocity_that_jumps_beyond_the_limit_is_a_sensor_to_blame(chain):
-    """Only the sensor says so; the positions tell that the joint is slower."""
+    """Only the sensor says so; the positions show that the joint is slower."""
     states = motion(chain)
     states[BEGIN:, N + 1] += 1.2 * chain.gather("velocity_limit")[1]
     _, fault, suspects = watch(chain, states)

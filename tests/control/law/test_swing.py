@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.law.swing import Swing, SwingingManifold, SwingingReference
+from pfsc_drake.control.law.swing import OscillatingManifold, OscillatingReference, Swing
 from pfsc_drake.errors import InputError
 
 SWING = Swing(coordinate=2, amplitude=0.02, frequency=0.5, begin=0.4, ramp=0.8)
@@ -17,7 +17,7 @@ def at(reference, time):
 
 
 def test_derivatives_are_those_of_the_value():
-    reference, h = SwingingReference([SWING], **ROWS), 1e-5
+    reference, h = OscillatingReference([SWING], **ROWS), 1e-5
     for time in (0.5, 0.9, 1.19, 1.3, 2.7):
         values = at(reference, time)
         differences = (at(reference, time + h) - at(reference, time - h))[:-1] / (2.0 * h)
@@ -26,7 +26,7 @@ def test_derivatives_are_those_of_the_value():
 
 
 def test_it_is_a_sine_from_the_ramp_on():
-    reference = SwingingReference([SWING], **ROWS)
+    reference = OscillatingReference([SWING], **ROWS)
     omega, t = np.pi, 3.0
     angle = omega * (t - 0.4)
     expected = [0.02 * omega**k * np.sin(angle + k * np.pi / 2.0) for k in range(5)]
@@ -34,7 +34,7 @@ def test_it_is_a_sine_from_the_ramp_on():
 
 
 def test_it_rests_before_and_begins_without_a_jump():
-    reference = SwingingReference([SWING], **ROWS)
+    reference = OscillatingReference([SWING], **ROWS)
     assert not at(reference, 0.4).any()
     assert np.abs(at(reference, 0.4 + 1e-7)).max() < 1e-6
     before, after = at(reference, 1.2 - 1e-7), at(reference, 1.2 + 1e-7)
@@ -42,14 +42,14 @@ def test_it_rests_before_and_begins_without_a_jump():
 
 
 def test_swings_of_one_coordinate_add_up():
-    one, both = SwingingReference([SWING], **ROWS), SwingingReference([SWING, SWING], **ROWS)
+    one, both = OscillatingReference([SWING], **ROWS), OscillatingReference([SWING, SWING], **ROWS)
     np.testing.assert_allclose(at(both, 2.0), 2.0 * at(one, 2.0))
 
 
 def test_a_reference_swings():
-    """What is added is there at each tick, in rows beside what was planned."""
-    swings, planned = SwingingReference([SWING], **ROWS), np.arange(30.0)
-    stepper = Stepper(SwingingManifold(swings, 30, 1e-3))
+    """The oscillation is added at each sample, in the rows beside the plan."""
+    swings, planned = OscillatingReference([SWING], **ROWS), np.arange(30.0)
+    stepper = Stepper(OscillatingManifold(swings, 30, 1e-3))
     stepper.tick = 1700
     swung = stepper.step(desired_reference=planned)["reference"]
     np.testing.assert_allclose(swung - planned, at(swings, 1.7).ravel(), atol=1e-14)
@@ -72,4 +72,4 @@ def test_wrong_swings_are_refused(change, part):
 
 def test_a_coordinate_that_is_not_there_is_refused():
     with pytest.raises(InputError, match=r"swings\[0\]: coordinate = 2; there is 1"):
-        SwingingReference([SWING], first=2, transversal=1, outputs=6, order=2)
+        OscillatingReference([SWING], first=2, transversal=1, outputs=6, order=2)

@@ -1,4 +1,4 @@
-"""The reference over time, as planned and at another pace."""
+"""The reference over time, as planned and with a speed scaling."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_an_override_of_one_is_the_plan(motion):
 
 
 def test_pace_follows_the_filter_integrated_by_another_method(motion):
-    """``(d/dt / b + 1)^3 z = w`` with w = 0.5 from the start at rest of pace 1.4 on."""
+    """``(d/dt / b + 1)^3 z = w`` with w = 0.5 from an initial scaling of 1.4 on."""
     times, rows = paced(motion, 3, lambda t: 1.4 if t < PERIOD / 2.0 else 0.5, 1.5)
     b = 20.0
 
@@ -141,7 +141,7 @@ def test_own_time_waits_at_the_end(motion):
     """A second beyond the end the override turns from 1 to -1, and z_1 by the filter of order 2.
 
     ``z_1 = -1 + 2 (1 + b t) exp(-b t)`` is zero at ``b t = x``; from there on own time goes back,
-    which it does later than at once by ``(x + 2 (2 + x) exp(-x)) / b`` in the end.
+    which is later than an immediate change by ``(x + 2 (2 + x) exp(-x)) / b`` in the end.
     """
     end, b = motion.domain[1], 20.0
     times, rows = paced(motion, 2, lambda t: 1.0 if t < end + 1.0 else -1.0, end + 2.5)

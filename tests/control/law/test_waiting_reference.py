@@ -1,4 +1,4 @@
-"""A reference at a pace that others decide, against the one that it is made of."""
+"""A reference with a speed scaling from outside, against its base class."""
 
 import numpy as np
 import pytest
@@ -7,14 +7,14 @@ from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.law.waiting_reference import WaitingReference
-from pfsc_drake.control.obstacles.waiting_pace import WaitingPace
+from pfsc_drake.control.obstacles.stoppable_scaling import StoppableScaling
 
 PERIOD = 1e-3
 MOTION = rest_to_rest([0.0, 1.0], velocity=0.5, acceleration=2.0, dwell=0.1)
 
 
 def test_it_starts_at_rest_and_then_is_a_timed_reference():
-    pace = WaitingPace(4, 25.0, 0.05)
+    pace = StoppableScaling(4, 25.0, 0.05)
     paced = Stepper(WaitingReference(MOTION, pace, 3, PERIOD))
     timed = Stepper(TimedReference(MOTION, 4, 3, PERIOD, 25.0), ("override",))
     timed.start(override=0.0)

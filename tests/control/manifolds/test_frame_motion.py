@@ -12,7 +12,7 @@ from pfsc_drake.control.manifolds.frame_motion import (
     FlangeFrame,
     FramedPoint,
     PlannedFrame,
-    SeenTool,
+    RelativeTool,
     flange_motion_function,
 )
 from pfsc_drake.control.manifolds.moving_frame import POSE_SIZE, FramedLayout
@@ -52,25 +52,25 @@ def output(block, **inputs):
 
 def test_a_flange_moves_as_drake_says(load_robot, joints):
     robot = load_robot("comau_racer_1_4")
-    told = output(FlangeFrame(robot.chain, ORDER, ORDER), joint_jet=joints.ravel())
+    known = output(FlangeFrame(robot.chain, ORDER, ORDER), joint_jet=joints.ravel())
     samples = np.array([flange(robot, moved(joints, t)) for t in NODES])
-    assert_derivatives(told.reshape(ORDER + 1, POSE_SIZE), samples)
+    assert_derivatives(known.reshape(ORDER + 1, POSE_SIZE), samples)
 
 
-def test_a_base_that_is_believed_elsewhere(load_robot, joints):
+def test_a_base_with_another_nominal_pose(load_robot, joints):
     robot, R = load_robot("comau_racer_1_4"), zyx_to_matrix([0.02, -0.01, 0.03])
     p = np.array([1e-3, -2e-3, 5e-4])
     block = FlangeFrame(robot.chain, ORDER, 2, np.append(p, R))
-    told = output(block, joint_jet=joints.ravel()).reshape(3, POSE_SIZE)
+    known = output(block, joint_jet=joints.ravel()).reshape(3, POSE_SIZE)
     true = output(FlangeFrame(robot.chain, ORDER, 2), joint_jet=joints.ravel()).reshape(3, -1)
     for k in range(3):
         position = R @ true[k, :3] + (p if k == 0 else 0.0)
-        assert np.allclose(told[k, :3], position, rtol=0, atol=1e-14)
+        assert np.allclose(known[k, :3], position, rtol=0, atol=1e-14)
         rotation = R @ true[k, 3:].reshape(3, 3)
-        assert np.allclose(told[k, 3:], rotation.ravel(), rtol=0, atol=1e-14)
+        assert np.allclose(known[k, 3:], rotation.ravel(), rtol=0, atol=1e-14)
 
 
-def test_what_is_not_told_is_zero(load_robot, joints):
+def test_omitted_derivatives_are_zero(load_robot, joints):
     robot = load_robot("comau_racer_1_4")
     whole = output(FlangeFrame(robot.chain, ORDER, 3), joint_jet=joints.ravel())
     part = output(FlangeFrame(robot.chain, ORDER, 3, highest=1), joint_jet=joints.ravel())
@@ -83,46 +83,46 @@ def test_differences_are_those_of_the_last_ticks(load_robot, joints):
     robot = load_robot("comau_racer_1_4")
     function, times = flange_motion_function(robot.chain, 2), SMALL * np.arange(-6, 1)
     block = Stepper(DifferencedFrame(2, 2, SMALL))
-    told = []
+    known = []
     for t in times:
         rows = [moved(joints[k:], t) for k in range(3)]
         frame = np.array(function(np.concatenate(rows))).ravel()
-        told.append(block.step(frame_jet=frame)["differenced"].reshape(3, POSE_SIZE).copy())
-    assert not told[0][1:].any()
+        known.append(block.step(frame_jet=frame)["differenced"].reshape(3, POSE_SIZE).copy())
+    assert not known[0][1:].any()
     for k in (1, 2):
         middle = times[-1] - k * SMALL / 2.0
         rows = [moved(joints[i:], middle) for i in range(3)]
         expected = np.array(function(np.concatenate(rows))).reshape(3, POSE_SIZE)[k]
         # what is left is of second order in the step
-        assert np.abs(told[-1][k] - expected).max() < 5e-6
-    for before, now in pairwise(told):
+        assert np.abs(known[-1][k] - expected).max() < 5e-6
+    for before, now in pairwise(known):
         assert np.allclose(now[1], (now[0] - before[0]) / SMALL, rtol=0, atol=1e-12)
 
 
 def test_differences_above_the_highest_are_zero():
     frame, block = np.arange(36.0), Stepper(DifferencedFrame(2, 1, SMALL))
     block.step(frame_jet=frame)
-    told = block.step(frame_jet=frame + 1.0)["differenced"]
-    assert np.allclose(told[POSE_SIZE : 2 * POSE_SIZE], 1.0 / SMALL) and not told[24:].any()
+    known = block.step(frame_jet=frame + 1.0)["differenced"]
+    assert np.allclose(known[POSE_SIZE : 2 * POSE_SIZE], 1.0 / SMALL) and not known[24:].any()
 
 
 @pytest.mark.parametrize("highest", [0, 1, 4])
 def test_a_plan_tells_the_derivatives_of_a_measured_pose(highest):
     measured, planned = np.arange(36.0), -np.arange(1.0, 37.0)
-    told = output(PlannedFrame(2, highest), frame_jet=measured, planned=planned).reshape(3, -1)
-    assert np.array_equal(told[0], measured[:POSE_SIZE])
+    known = output(PlannedFrame(2, highest), frame_jet=measured, planned=planned).reshape(3, -1)
+    assert np.array_equal(known[0], measured[:POSE_SIZE])
     last = min(highest, 2)
-    assert np.array_equal(told[1 : last + 1], planned.reshape(3, -1)[1 : last + 1])
-    assert not told[last + 1 :].any()
+    assert np.array_equal(known[1 : last + 1], planned.reshape(3, -1)[1 : last + 1])
+    assert not known[last + 1 :].any()
 
 
 def test_a_tool_in_a_frame():
     R_WC, R_e = zyx_to_matrix([0.3, 0.2, -0.4]), zyx_to_matrix([-0.1, 0.5, 0.2])
     p, y = np.array([0.3, -0.2, 0.5]), np.array([0.7, 0.1, 0.9])
     frame = np.concatenate([p, R_WC.ravel(), np.full(12, np.nan)])
-    seen = output(SeenTool(1), tool_pose=np.append(y, R_e), frame_jet=frame)
-    assert np.allclose(seen[:3], R_WC.T @ (y - p), rtol=0, atol=1e-15)
-    assert np.allclose(seen[3:].reshape(3, 3), R_WC.T @ R_e, rtol=0, atol=1e-15)
+    relative_pose = output(RelativeTool(1), tool_pose=np.append(y, R_e), frame_jet=frame)
+    assert np.allclose(relative_pose[:3], R_WC.T @ (y - p), rtol=0, atol=1e-15)
+    assert np.allclose(relative_pose[3:].reshape(3, 3), R_WC.T @ R_e, rtol=0, atol=1e-15)
 
 
 def test_a_point_with_its_frame():

@@ -63,7 +63,7 @@ def test_force_of_a_moving_point_is_its_power(oriented, axis, yaw):
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_angles_and_torques_are_called_by_the_axis_they_turn_about(oriented_path, axis):
+def test_angles_and_torques_are_named_by_the_axis_they_turn_about(oriented_path, axis):
     """Small turns of the tool away from the path's orientation, about one axis of it."""
     manifold, unit = PathManifold(2, oriented=True), np.eye(3)["xyz".index(axis)]
     point = oriented_path.evaluator(2).evaluate_at(0.7)

@@ -11,7 +11,7 @@ from pfsc_drake.control.manifolds.moving_frame import (
     frame_jets,
     frame_size,
     frame_vector,
-    seen_from,
+    relative_to,
 )
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
@@ -51,9 +51,9 @@ def motions():
     return tool, frame
 
 
-def test_a_tool_seen_from_a_frame_that_moves(motions):
+def test_a_tool_relative_to_a_moving_frame(motions):
     tool, frame = motions
-    y_C, R_Ce = seen_from(frame.y, frame.R, tool.y, tool.R)
+    y_C, R_Ce = relative_to(frame.y, frame.R, tool.y, tool.R)
     samples = [seen(tool, frame, t) for t in NODES]
     derivatives = numbers([y_C[i] for i in range(3)])
     assert_derivatives(derivatives, np.array([y for y, _ in samples]))
@@ -74,7 +74,7 @@ def test_velocity_and_acceleration_are_those_of_mechanics(motions):
     w_dot = np.array([turning[2, 1], turning[0, 2], turning[1, 0]])
     v_rel = v - np.cross(w, d)
     a_rel = a - np.cross(w_dot, d) - np.cross(w, np.cross(w, d)) - 2.0 * np.cross(w, v_rel)
-    y_C, _ = seen_from(p, R, y, tool.R)
+    y_C, _ = relative_to(p, R, y, tool.R)
     assert np.allclose(np.array(ca.DM(y_C.derivative(1))).ravel(), R_0.T @ v_rel, atol=1e-14)
     assert np.allclose(np.array(ca.DM(y_C.derivative(2))).ravel(), R_0.T @ a_rel, atol=1e-13)
 
@@ -124,8 +124,8 @@ def test_forces_have_the_power_of_the_relative_motion(motions, oriented_path):
     framed = ca.SX(ca.DM(np.concatenate([point, whole(frame)])))
     outputs = numbers(manifold.virtual_output(tool.y, tool.R, framed, []))
     wrench = np.array([3.0, -2.0, 5.0, 0.4, 0.3, -0.2])
-    told = (ca.SX(ca.DM(wrench)), framed, ca.SX(ca.DM(outputs[0])))
-    force = np.array(ca.DM(manifold.force(*told, with_turning=True))).ravel()
+    known = (ca.SX(ca.DM(wrench)), framed, ca.SX(ca.DM(outputs[0])))
+    force = np.array(ca.DM(manifold.force(*known, with_turning=True))).ravel()
     y, R_e, p, R = tool.y, tool.R, frame.y, frame.R
     W = np.array(ca.DM(R.derivative(1) @ R.derivative(0).T))
     W_e = np.array(ca.DM(R_e.derivative(1) @ R_e.derivative(0).T))

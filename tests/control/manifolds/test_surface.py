@@ -110,7 +110,7 @@ def test_the_situations_are_far_and_bent():
     assert all(alpha != 0.0 for alpha in alphas.values())
 
 
-def test_coordinates_are_called_by_what_they_mean():
+def test_coordinates_are_named_by_their_meaning():
     names = [c.name for c in SurfaceManifold(2, orientation="normal").coordinates]
     assert names == ["eta_1", "eta_2", "xi", "phi_z", "phi_y", "phi_x"]
     kinds = [c.kind for c in SurfaceManifold(2).coordinates]

@@ -100,8 +100,8 @@ def test_power_of_random_motions(name, orientation):
         if len(tau) == 3:
             continue
         # without the turning: the power relative to the orientation that moves with the tool
-        held = np.append(twist[:3], np.zeros(3))
-        omega_d = frame_velocity(outputs, len(manifold.coordinates), held)
+        fixed = np.append(twist[:3], np.zeros(3))
+        omega_d = frame_velocity(outputs, len(manifold.coordinates), fixed)
         relative = acting @ np.append(twist[:3], twist[3:] - omega_d)
         tau = force(manifold, wrench, point, still)
         assert tau @ rates == pytest.approx(relative, abs=1e-11)

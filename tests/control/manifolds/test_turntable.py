@@ -68,38 +68,38 @@ def moved(rows, t):
 
 def test_a_workpiece_moves_as_drake_says(table, rows):
     motion = turntable_motion_function(AXES, ORDER)
-    told = np.array(motion(rows.ravel())).reshape(ORDER + 1, POSE_SIZE)
-    assert_derivatives(told, np.array([table(moved(rows, t)) for t in NODES]))
+    known = np.array(motion(rows.ravel())).reshape(ORDER + 1, POSE_SIZE)
+    assert_derivatives(known, np.array([table(moved(rows, t)) for t in NODES]))
 
 
 def test_the_derivatives_are_those_of_the_command(rows):
     """At the angles that are measured; those above the highest are zero."""
     measured = np.array([0.3, -0.2])
     block = Stepper(TurntableFrame(AXES, ORDER, 2))
-    told = block.step(measured=measured, planned=rows.ravel())["frame_jet"].reshape(ORDER + 1, -1)
+    known = block.step(measured=measured, planned=rows.ravel())["frame_jet"].reshape(ORDER + 1, -1)
     both = np.vstack([measured, rows[1:3]])
     expected = np.array(turntable_motion_function(AXES, 2)(both.ravel())).reshape(3, -1)
-    assert np.allclose(told[:3], expected, rtol=0, atol=1e-14)
-    assert not told[3:].any()
+    assert np.allclose(known[:3], expected, rtol=0, atol=1e-14)
+    assert not known[3:].any()
 
 
 def test_the_pose_alone_needs_no_command():
     block = Stepper(TurntableFrame(AXES, ORDER, 0))
-    told = block.step(measured=np.array([0.3, -0.2]))["frame_jet"]
-    assert told[:POSE_SIZE].any() and not told[POSE_SIZE:].any()
+    known = block.step(measured=np.array([0.3, -0.2]))["frame_jet"]
+    assert known[:POSE_SIZE].any() and not known[POSE_SIZE:].any()
 
 
 @pytest.mark.parametrize(("delay", "bound"), [(4e-3, 1e-11), (8e-3, 3e-10)])
-def test_a_frame_is_led_on_to_now(table, rows, delay, bound):
+def test_a_frame_is_extrapolated_to_the_present(table, rows, delay, bound):
     """The pose up to the derivative of order five, times ``d^5 / 120``."""
     motion = turntable_motion_function(AXES, ORDER)
     ago = [moved(rows[k:], -delay) for k in range(ORDER + 1)]
-    told = np.array(motion(np.concatenate(ago))).ravel()
-    led = Stepper(AdvancedFrame(ORDER, delay)).step(frame_jet=told)["advanced"]
+    known = np.array(motion(np.concatenate(ago))).ravel()
+    advanced = Stepper(AdvancedFrame(ORDER, delay)).step(frame_jet=known)["advanced"]
     now = np.array(motion(rows.ravel())).ravel()
-    assert np.abs(led[:POSE_SIZE] - table(moved(rows, 0.0))).max() < bound
-    assert np.abs(told[:POSE_SIZE] - now[:POSE_SIZE]).max() > 1e-3
+    assert np.abs(advanced[:POSE_SIZE] - table(moved(rows, 0.0))).max() < bound
+    assert np.abs(known[:POSE_SIZE] - now[:POSE_SIZE]).max() > 1e-3
     for k in range(1, ORDER):
         rows_k = slice(POSE_SIZE * k, POSE_SIZE * (k + 1))
         off, left = ORDER + 1 - k, np.abs(now).max()
-        assert np.abs(led - now)[rows_k].max() < 30 * left * delay**off / math.factorial(off)
+        assert np.abs(advanced - now)[rows_k].max() < 30 * left * delay**off / math.factorial(off)

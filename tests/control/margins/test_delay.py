@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.margins import MOST, delay_margin, delayed
+from pfsc_drake.control.margins import MOST, delay_margin, with_delay
 
 T = 1e-3
 
 
 def simulated(a, b, gain, intervals, steps=400):
-    """``x+ = a x + b u``, ``u = -gain x`` told now and acting some intervals later."""
+    """``x+ = a x + b u``, ``u = -gain x`` commanded now and acting some intervals later."""
     x, told = np.array([1.0, -0.5]), [np.zeros(1)] * intervals
     history = []
     for _ in range(steps):
@@ -27,13 +27,13 @@ def double_integrator():
 
 def test_without_delay_nothing_changes():
     closed = double_integrator()[3]
-    np.testing.assert_array_equal(delayed(closed, np.array([2]), 0), closed)
+    np.testing.assert_array_equal(with_delay(closed, np.array([2]), 0), closed)
 
 
 @pytest.mark.parametrize("intervals", [1, 2, 3])
 def test_the_delayed_map_moves_like_the_delayed_loop(intervals):
     a, b, gain, closed = double_integrator()
-    A = delayed(closed, np.array([2]), intervals)
+    A = with_delay(closed, np.array([2]), intervals)
     x = np.zeros(len(A))
     x[:2] = [1.0, -0.5]
     x[2] = (-gain @ x[:2])[0]

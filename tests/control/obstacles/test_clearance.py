@@ -1,4 +1,4 @@
-"""How far an arm is from obstacles, against distances of many points."""
+"""Distances of an arm from obstacles, against distances of many points."""
 
 import itertools
 
@@ -22,7 +22,7 @@ SHAPES = {
     "sphere": ObstacleShape("sphere", 0.2),
     "column": ObstacleShape("column", 0.2),
     "person": ObstacleShape("person", 0.2),
-    "capsules": ObstacleShape("capsules", 0.2, given=(BEAM, Capsule((0, 0, 1), (0, 0, 1), 0.3))),
+    "capsules": ObstacleShape("capsules", 0.2, capsules=(BEAM, Capsule((0, 0, 1), (0, 0, 1), 0.3))),
 }
 
 
@@ -52,7 +52,7 @@ def test_distances_are_those_of_many_points(kind):
         state = np.append(p, v)
         near = float(nearness(arm.ravel(), state)[0])
         assert near == pytest.approx(_sampled(arm, shape, p), abs=5e-3)
-        # the one for the log goes another way
+        # the function for logs uses another method
         found = least_distances(arm.reshape(1, -1), p[None], [shape], RADIUS)
         assert found[0, 0] == pytest.approx(near, abs=1e-9)
         times = 0.1 + np.linspace(0.5, 2.0, 60)
@@ -62,7 +62,7 @@ def test_distances_are_those_of_many_points(kind):
 
 @pytest.mark.parametrize("kind", SHAPES)
 def test_an_obstacle_that_moves_is_not_near_before_its_time(kind):
-    """As it is measured it goes on, or turns round to the nearest place of the arm."""
+    """The obstacle continues as measured, or reverses towards the nearest point of the arm."""
     rng, shape = np.random.default_rng(3), SHAPES[kind]
     nearness = nearness_function([shape], REACH, SPENT, 3, RADIUS)
     arm = np.array([[0.0, 0, 0], [0.3, 0, 0.5], [0.8, 0, 0.6]])
@@ -83,7 +83,7 @@ def test_an_obstacle_that_moves_is_not_near_before_its_time(kind):
                 assert _sampled(arm, shape, straight + t**2 * goal / 2.0, 60) >= SPENT - 0.02
 
 
-def test_the_time_counts_what_is_spent_and_how_it_moves():
+def test_time_depends_on_margin_and_velocity():
     arm = np.array([0.0, 0, -1, 0, 0, 1])
     nearness = nearness_function([SHAPES["sphere"]], REACH, SPENT, 2, RADIUS)
     for v, x in itertools.product((-1.0, 0.0, 1.0), (0.7, 2.5)):
@@ -92,7 +92,7 @@ def test_the_time_counts_what_is_spent_and_how_it_moves():
         assert float(until) == pytest.approx(float(REACH.time(x - 0.3 - SPENT, v)))
 
 
-def test_what_is_expected_spreads_with_time_and_ends_at_the_horizon():
+def test_prediction_spreads_with_time_and_ends_at_the_horizon():
     shape, arm = ObstacleShape("sphere", 0.2), np.array([0.0, -1.0, 0.0, 0.0, 1.0, 0.0])
     spreading = Foresight(age=0.0, horizon=2.0, spread=0.1)
     foresight = foresight_function([shape], spreading, 2, RADIUS)

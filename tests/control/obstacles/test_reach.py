@@ -1,4 +1,4 @@
-"""When an obstacle can be somewhere at the earliest, against obstacles that hurry there."""
+"""Earliest arrival of an obstacle, against obstacles that take the fastest motion."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ REACH = Reach(V, A, 0.0)
 @pytest.mark.slow(but=["0.01-0.4", "0.01--1.6", "0.2-0.0", "0.2--0.7", "0.9-1.6", "0.9--0.7"])
 @pytest.mark.parametrize("receding", [-1.6, -0.7, 0.0, 0.4, 1.6])
 @pytest.mark.parametrize("gap", [0.01, 0.2, 0.9])
-def test_it_is_when_one_who_turns_round_and_runs_arrives(gap, receding):
+def test_time_is_that_of_an_obstacle_that_reverses_at_its_limits(gap, receding):
     def rates(_, x):
         return [x[1], 0.0 if x[1] <= -V else -A]
 
@@ -26,7 +26,7 @@ def test_it_is_when_one_who_turns_round_and_runs_arrives(gap, receding):
 
 
 @pytest.mark.slow
-def test_nobody_within_his_limits_is_there_sooner():
+def test_no_obstacle_within_its_bounds_arrives_sooner():
     """Points in space that accelerate at random, from a line: its distance is convex."""
     rng, step = np.random.default_rng(4), 2e-3
     nearest = np.inf
@@ -47,22 +47,22 @@ def test_nobody_within_his_limits_is_there_sooner():
     assert nearest < 0.05
 
 
-def test_without_an_acceleration_velocities_say_nothing():
+def test_velocities_are_ignored_without_an_acceleration_limit():
     blind = Reach(V, None, 0.3)
     for receding in (-1.0, 0.0, 1.0):
         assert float(blind.time(0.8, receding)) == pytest.approx(0.5)
-        # what accelerates at once
+        # unlimited acceleration
         assert float(Reach(V, 1e9, 0.3).time(0.8, receding)) == pytest.approx(0.5, abs=1e-6)
 
 
-def test_what_is_not_known_of_a_velocity_is_against_it():
+def test_velocity_uncertainty_reduces_the_time():
     for receding in (-1.6, -0.5, 0.3):
         assert float(Reach(V, A, 0.3).time(0.4, receding)) == float(
             REACH.time(0.4, max(receding - 0.3, -V))
         )
 
 
-def test_where_there_is_no_gap_there_is_no_time():
+def test_no_gap_leaves_no_time():
     times = [float(REACH.time(gap, 1.0)) for gap in (-0.1, 0.0, 1e-9)]
     assert times[0] < 0.0
     assert times[1] == 0.0

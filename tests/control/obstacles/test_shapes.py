@@ -1,4 +1,4 @@
-"""What obstacles are made of."""
+"""Shapes of obstacles and their parts."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from pfsc_drake.control.obstacles.shapes import Capsule, ObstacleShape
 from pfsc_drake.errors import InputError
 
 
-def test_a_person_stands_on_the_floor_and_is_as_tall_as_said():
+def test_a_person_stands_on_the_floor_and_has_the_given_height():
     trunk, head = ObstacleShape("person", 0.25, 1.8).parts
     assert trunk.start[2] - trunk.radius == pytest.approx(0.0)
     assert head.start[2] + head.radius == pytest.approx(1.8)
@@ -16,9 +16,9 @@ def test_a_person_stands_on_the_floor_and_is_as_tall_as_said():
     assert not trunk.is_sphere
 
 
-def test_capsules_are_what_is_given():
+def test_parts_are_the_capsules():
     beam = Capsule((-0.5, 0.0, 1.0), (0.5, 0.0, 1.0), 0.05)
-    assert ObstacleShape("capsules", 0.25, given=(beam,)).parts == (beam,)
+    assert ObstacleShape("capsules", 0.25, capsules=(beam,)).parts == (beam,)
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_capsules_are_what_is_given():
         (("sphere", 0.2, 1.75, (Capsule((0, 0, 0), (0, 0, 1), 0.1),)), "parts = given"),
     ],
 )
-def test_what_is_no_obstacle_is_refused(arguments, message):
+def test_wrong_obstacles_are_rejected(arguments, message):
     with pytest.raises(InputError, match=message):
         ObstacleShape(*arguments)
 
@@ -44,6 +44,6 @@ def test_what_is_no_obstacle_is_refused(arguments, message):
         (((0, 0, 0), (0, 0, 1), -0.1), "radius"),
     ],
 )
-def test_what_is_no_capsule_is_refused(arguments, message):
+def test_wrong_capsules_are_rejected(arguments, message):
     with pytest.raises(InputError, match=message):
         Capsule(*arguments)

@@ -1,15 +1,15 @@
-"""Polynomials of the drives' demand against the demand itself."""
+"""Polynomials of the drive demand against the demand itself."""
 
 import numpy as np
 import pytest
 
 from pfsc_drake.control.planning.demand_polynomial import DemandPolynomial, exponents
-from pfsc_drake.control.planning.drive_demand import DriveDemand, with_pace
+from pfsc_drake.control.planning.drive_demand import DriveDemand, apply_scaling
 
 LAWS = {"rigid": 4, "singular_perturbation": 7, "elastic": 12}
 
 
-def course(highest, samples=5):
+def trajectory(highest, samples=5):
     """Return any motion of three joints and its derivatives."""
     rng = np.random.default_rng(3)
     return (
@@ -18,16 +18,16 @@ def course(highest, samples=5):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_torques_at_any_pace(law, load_robot):
-    """Exact but for rounding, far from the paces that the coefficients were found at."""
+def test_torques_at_any_scaling(law, load_robot):
+    """Exact up to rounding, far from the scalings that determined the coefficients."""
     chain = load_robot("comau_racer_1_4_elastic_3r").chain
     viscous, damping = np.array([3.0, 2.0, 1.0]), np.full(3, 0.004)
     demand = DriveDemand(chain, law, viscous, damping)
-    motion = course(demand.derivatives)
+    motion = trajectory(demand.derivatives)
     polynomial = DemandPolynomial.of(demand, motion, 0.04)
     assert polynomial.coefficients.shape == (5, LAWS[law], 3)
     rates = np.random.default_rng(4).normal(size=(5, 4)) * [2.0, 60.0, 1e3, 1e5]
-    expected = demand.of(with_pace(motion, rates))[:, :3]
+    expected = demand.of(apply_scaling(motion, rates))[:, :3]
     assert np.allclose(
         polynomial.torques(rates), expected, rtol=0, atol=1e-10 * np.abs(expected).max()
     )

@@ -1,9 +1,9 @@
-"""What a motion asks of the drives, against Drake's dynamics along it."""
+"""Drive demand of a motion against Drake's inverse dynamics along it."""
 
 import numpy as np
 import pytest
 
-from pfsc_drake.control.planning.drive_demand import DriveDemand, DriveLimits, with_pace
+from pfsc_drake.control.planning.drive_demand import DriveDemand, DriveLimits, apply_scaling
 from pfsc_drake.errors import InputError
 
 ELASTIC = "comau_racer_1_4_elastic"
@@ -21,7 +21,7 @@ def sway(times):
 
 
 def joint_torque(rigid, time):
-    """Return what the links need, by Drake."""
+    """Return the links' torques from Drake's inverse dynamics."""
     q, v, a = sway(time)[:3]
     D_E, n_E = rigid.link_dynamics(q, v)
     return D_E @ a + n_E
@@ -39,7 +39,7 @@ def test_torque_of_rigid_joints(time, load_robot):
 
 @pytest.mark.parametrize("time", [0.0, 0.37, 1.1])
 def test_torque_of_elastic_joints(time, load_robot):
-    """The motors' acceleration by differences of where the springs need them."""
+    """The motors' acceleration by differences of their positions behind the springs."""
     robot, rigid, h = load_robot(ELASTIC), load_robot("comau_racer_1_4"), 1e-3
     steps = h * np.arange(-3, 4)
     torques = np.array([joint_torque(rigid, time + step) for step in steps])
@@ -63,23 +63,25 @@ def test_boundary_layer_takes_its_share(load_robot):
     assert np.allclose(whole - slow, [*(-damping * rate), *np.zeros(6)], rtol=1e-6, atol=1e-4)
 
 
-def test_at_an_even_pace_a_polynomial_tells_the_demand(load_robot):
-    demand, course = DriveDemand(load_robot(ELASTIC).chain, "elastic"), sway([0.1, 0.5])
-    coefficients = demand.at_constant_rate(course)
-    for pace in (0.0, 0.3, 0.8, 1.3):
-        told = np.einsum("skn,k->sn", coefficients, pace ** np.arange(5))
-        rates = np.tile([pace, 0.0, 0.0, 0.0], (2, 1))
-        assert np.allclose(told, demand.of(with_pace(course, rates)), rtol=1e-9, atol=1e-7)
+def test_demand_at_constant_scaling_is_a_polynomial(load_robot):
+    demand, trajectory = DriveDemand(load_robot(ELASTIC).chain, "elastic"), sway([0.1, 0.5])
+    coefficients = demand.at_constant_rate(trajectory)
+    for scaling in (0.0, 0.3, 0.8, 1.3):
+        demanded = np.einsum("skn,k->sn", coefficients, scaling ** np.arange(5))
+        rates = np.tile([scaling, 0.0, 0.0, 0.0], (2, 1))
+        assert np.allclose(
+            demanded, demand.of(apply_scaling(trajectory, rates)), rtol=1e-9, atol=1e-7
+        )
 
 
-def test_derivatives_of_a_motion_at_a_changing_pace():
+def test_derivatives_of_a_motion_at_a_changing_scaling():
     """``Q(tau(t))`` by differences."""
     t, h = 0.3, 2e-3
     tau = np.polynomial.Polynomial([0.1, 0.6, 0.4, -0.7, 0.5])
     rates = np.array([[tau.deriv(k)(t) for k in (1, 2, 3, 4)]])
-    motion = with_pace(sway([tau(t)]), rates)[0]
+    motion = apply_scaling(sway([tau(t)]), rates)[0]
     for k in range(4):
-        around = [with_pace(sway([tau(s)]), np.array([[tau.deriv(j)(s) for j in (1, 2, 3, 4)]]))
+        around = [apply_scaling(sway([tau(s)]), np.array([[tau.deriv(j)(s) for j in (1, 2, 3, 4)]]))
                   for s in t + h * np.array([-2.0, -1.0, 1.0, 2.0])]  # fmt: skip
         slope = np.array([1.0, -8.0, 8.0, -1.0]) @ np.array([x[0, k] for x in around]) / (12.0 * h)
         assert np.allclose(motion[k + 1], slope, rtol=1e-4, atol=1e-4)

@@ -1,4 +1,4 @@
-"""What limits a motion, told of a few samples."""
+"""Active limits of a motion of a few samples."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_shares(limiting):
     assert np.allclose(limiting.by_kind[1], [0.5, 1.0, 0.1, 0.0])
 
 
-def test_what_is_active_on_which_part_of_the_way(limiting):
+def test_active_limits_and_their_shares_of_the_path(limiting):
     assert limiting.active.tolist() == [6, 4, 0, 1, 1, 1]
-    parts = limiting.of_the_way(np.array([1.0, 1.0, 2.0, 1.0, 2.0, 3.0]))
+    parts = limiting.path_shares(np.array([1.0, 1.0, 2.0, 1.0, 2.0, 3.0]))
     assert parts == pytest.approx({"none": 0.2, "torque_1": 0.6, "speed_2": 0.1, "rate_2": 0.1})

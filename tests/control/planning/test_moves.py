@@ -1,4 +1,4 @@
-"""Moves from rest to rest, at whatever progress."""
+"""Moves from rest to rest, with any progress."""
 
 import numpy as np
 import pytest
@@ -25,15 +25,15 @@ def test_moves_of_a_motion(dwell):
 
 
 def test_one_after_another_with_rests():
-    places = [[0.0, 0.1], [0.4, -0.1], [0.4, 0.5]]
-    moves = straight_moves(straight_lines(places, 0.5, 2.0, DWELL), 4)
+    points = [[0.0, 0.1], [0.4, -0.1], [0.4, 0.5]]
+    moves = straight_moves(straight_lines(points, 0.5, 2.0, DWELL), 4)
     motion, begins = one_after_another(moves, DWELL)
     assert motion.first_discontinuity(4) is None
     assert np.allclose(begins, [DWELL, 2 * DWELL + moves[0].duration])
     assert motion.domain[1] == pytest.approx(3 * DWELL + sum(move.duration for move in moves))
     inside = [0.5 * DWELL, begins[0] + moves[0].duration + 0.1, motion.domain[1] - 0.05]
-    assert np.allclose(motion.derivatives(inside, 0)[:, 0], places, rtol=0, atol=1e-12)
-    # along the straight line between two places
+    assert np.allclose(motion.derivatives(inside, 0)[:, 0], points, rtol=0, atol=1e-12)
+    # along the straight line between two points
     x, y = motion.derivatives(begins[0] + np.linspace(0.0, moves[0].duration, 20), 0)[:, 0].T
     assert np.allclose(y, 0.1 - 0.5 * x, rtol=0, atol=1e-12)
 

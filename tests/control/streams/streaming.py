@@ -1,4 +1,4 @@
-"""A stream of way points and a tool that is where its reference is, for tests."""
+"""Stream of waypoints and a tool that follows its reference exactly, for tests."""
 
 from dataclasses import dataclass
 
@@ -8,24 +8,24 @@ from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.blocks.block import Block, Port
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.law.pace import PacedReference
+from pfsc_drake.control.law.paced_reference import PacedReference
+from pfsc_drake.control.streams.growing_path import GrowingPath
 from pfsc_drake.control.streams.intake import WaypointIntake
 from pfsc_drake.control.streams.messages import WaypointLayout, WaypointSender
 from pfsc_drake.control.streams.projector import StreamedProjector
-from pfsc_drake.control.streams.stream_course import Course
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse
 
 PERIOD = 1e-3
 _WIRES = """
-t.tool_pose.p i.course.p p.manifold_point.i p.manifold_point.t r.motion.i r.reference.t
+t.tool_pose.p i.path.p p.manifold_point.i p.manifold_point.t r.motion.i r.reference.t
 r.stop.i i.goal.r i.stretches.r i.stretch_speeds.r
 """
-_TOLD = "i.course i.goal i.stream p.manifold_point r.reference r.overrun"
+_OUTPUTS = "i.path i.goal i.stream p.manifold_point r.reference r.overrun"
 
 
 class IdealTool(Block):
-    """A tool point that moves along the path as the reference says, a tick later."""
+    """Tool point that follows the reference along the path, a tick later."""
 
     def __init__(self, start, order, m, size):
         self.inputs = {"manifold_point": Port(size), "reference": Port((order + 1) * m)}
@@ -46,7 +46,7 @@ class IdealTool(Block):
 
 @dataclass
 class Run:
-    """What was told at each tick."""
+    """Outputs at each tick."""
 
     points: np.ndarray
     eta: np.ndarray
@@ -55,8 +55,8 @@ class Run:
     overrun: np.ndarray
     pieces: np.ndarray
     layout: object
-    course: Course
-    courses: list
+    path: GrowingPath
+    paths: list
 
     @property
     def sigma(self):
@@ -64,81 +64,81 @@ class Run:
 
 
 class Stream:
-    """Intake, projector, pace and an ideal tool as one stepper."""
+    """Intake, projector, reference and an ideal tool as one stepper."""
 
     def __init__(self, parameters, start, order=4, m=3, length=32, direction=(1.0, 0.0, 0.0)):
         start = np.asarray(start, float)
-        self.course = Course(order, len(start), parameters.columns)
+        self.path = GrowingPath(order, len(start), parameters.columns)
         self.layout = WaypointLayout(len(start), length)
         intake = WaypointIntake(
-            self.course, parameters, self.layout, order, PERIOD, at_rest=start, direction=direction
+            self.path, parameters, self.layout, order, PERIOD, at_rest=start, direction=direction
         )
-        projector = StreamedProjector(self.course)
-        pace = PacedReference(parameters.limits, order, m, PERIOD, stretches=self.course.spans)
+        projector = StreamedProjector(self.path)
+        reference = PacedReference(parameters.limits, order, m, PERIOD, stretches=self.path.spans)
         tool = IdealTool(start, order, m, projector.layout.size)
         position = projector.layout.position.start
         tool.position, tool.slope = slice(position, position + 3), slice(position + 3, position + 6)
         builder = DiagramBuilder()
         systems = {
             name: builder.AddNamedSystem(name, BlockSystem(block, PERIOD))
-            for name, block in {"i": intake, "p": projector, "r": pace, "t": tool}.items()
+            for name, block in {"i": intake, "p": projector, "r": reference, "t": tool}.items()
         }
         for wire in _WIRES.split():
             source, port, target = wire.split(".")
             builder.Connect(systems[source].GetOutputPort(port), systems[target].GetInputPort(port))
         builder.ExportInput(systems["i"].GetInputPort("waypoints"), "waypoints")
-        for told in _TOLD.split():
-            source, port = told.split(".")
+        for output in _OUTPUTS.split():
+            source, port = output.split(".")
             builder.ExportOutput(systems[source].GetOutputPort(port), port)
         self.projector_layout, self.m, self.order = projector.layout, m, order
         self.stepper = Stepper(fuse(builder.Build()).network)
 
     def run(self, message, ticks, keep=50):
-        """Return what was told; ``message(tick, stream) -> message``."""
+        """Return the outputs; ``message(tick, stream) -> message``."""
         self.stepper.restart()
         rows = {name: [] for name in ("manifold_point", "reference", "goal", "stream", "overrun")}
-        pieces, courses, stream = [], [], np.zeros(4)
+        pieces, paths, stream = [], [], np.zeros(4)
         for k in range(ticks):
-            told = self.stepper.step(waypoints=message(k, stream))
-            stream = told["stream"]
+            outputs = self.stepper.step(waypoints=message(k, stream))
+            stream = outputs["stream"]
             for name, row in rows.items():
-                row.append(told[name])
-            pieces.append(told["course"][1])
+                row.append(outputs[name])
+            pieces.append(outputs["path"][1])
             if k % keep == 0:
-                courses.append(told["course"])
-        told = {name: np.array(row) for name, row in rows.items()}
+                paths.append(outputs["path"])
+        signals = {name: np.array(row) for name, row in rows.items()}
         return Run(
-            told["manifold_point"],
-            told["reference"].reshape(ticks, self.order + 1, self.m)[:, :, 0],
-            told["goal"][:, 0],
-            told["stream"],
-            told["overrun"][:, 0],
+            signals["manifold_point"],
+            signals["reference"].reshape(ticks, self.order + 1, self.m)[:, :, 0],
+            signals["goal"][:, 0],
+            signals["stream"],
+            signals["overrun"][:, 0],
             np.array(pieces),
             self.projector_layout,
-            self.course,
-            courses,
+            self.path,
+            paths,
         )
 
 
-_MADE = {}
+_STREAMS = {}
 
 
 def make_stream(parameters, start, **options):
-    """Return a stream; made once of the same content."""
+    """Return a stream; built once for the same content."""
     key = repr((parameters, np.asarray(start).tolist(), options))
-    if key not in _MADE:
-        _MADE[key] = Stream(parameters, start, **options)
-    return _MADE[key]
+    if key not in _STREAMS:
+        _STREAMS[key] = Stream(parameters, start, **options)
+    return _STREAMS[key]
 
 
 def sent_at(layout, waypoints, times, new=(), end=True, heard=False):
-    """Return the message at each tick of way points that come at times [s], good or bad ones."""
+    """Return the messages by tick of waypoints, valid or not, that arrive at times [s]."""
     sender, state = WaypointSender(layout), {"next": 0}
 
     def message(k, stream):
         while state["next"] < len(times) and times[state["next"]] <= PERIOD * k:
             row = [*waypoints[state["next"]], float(state["next"] in new)]
-            sender._rows.append(row)  # what no sender would tell, too
+            sender._rows.append(row)  # also rows that a sender rejects
             state["next"] += 1
         if end and state["next"] == len(times):
             sender.end()

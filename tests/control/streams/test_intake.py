@@ -1,4 +1,4 @@
-"""Way points that come while the tool moves become a path that it can always stop on."""
+"""Waypoints that arrive while the tool moves become a path on which it can always stop."""
 
 import numpy as np
 import pytest
@@ -10,10 +10,10 @@ from pfsc_drake.control.streams.stream_parameters import StreamParameters
 from pfsc_drake.errors import InputError
 from tests.control.streams.streaming import PERIOD, make_stream, sent_at
 
-# what has the same start, order and parameters is made once
+# streams of the same start, order and parameters are built once
 START, UPPER = np.array([0.8, 0.0, 1.1]), [2.0, 2.0, 2.0]
 BEND = StreamParameters(spacing=0.012, velocity=0.5, upper=UPPER)
-# of a hand: smoother than its way points, or through them
+# hand-drawn: smoother than the waypoints, or through them
 SMOOTHER, THROUGH = (
     StreamParameters(spacing=0.006, velocity=0.4, through=through, patience=0.2)
     for through in (False, True)
@@ -21,7 +21,7 @@ SMOOTHER, THROUGH = (
 
 
 def bend(count=61):
-    """Return way points about 0.02 m from each other, (count, 3)."""
+    """Return waypoints about 0.02 m from each other, (count, 3)."""
     s = np.linspace(0.0, 0.02 * (count - 1), count)
     return np.stack([0.8 + 0.2 * np.sin(4.0 * s), s, 1.0 + 0.1 * np.cos(5.0 * s)], axis=1)
 
@@ -38,25 +38,25 @@ def fixture_run():
 
 
 def whole_path(run):
-    """Return the spline through all control points of a run of one piece, theta being their own."""
-    d, columns = run.course.dimension, run.course.columns
+    """Return the spline of all control points of a run of one piece, over the same theta."""
+    d, columns = run.path.dimension, run.path.columns
     points = {}
-    for course in run.courses:
-        first = int(course[0])
-        own = course[3 : 3 + d * columns].reshape(columns, d)
-        # those of before the first way point do not count
-        points |= {first + k: own[k] for k in range(columns) if course[1] == 1.0}
+    for path in run.paths:
+        first = int(path[0])
+        own = path[3 : 3 + d * columns].reshape(columns, d)
+        # without those before the first waypoint
+        points |= {first + k: own[k] for k in range(columns) if path[1] == 1.0}
     numbers = sorted(points)
     assert numbers == list(range(numbers[0], numbers[-1] + 1))
-    degree = run.course.order + 2
+    degree = run.path.order + 2
     knots = np.arange(numbers[0] - degree, numbers[-1] + 2, dtype=float)
     return BSpline(knots, np.array([points[n] for n in numbers]), degree)
 
 
-def test_it_leads_by_all_way_points_and_ends_at_the_last(run):
-    w, begun = bend(), run.pieces == 1.0
-    off = [np.linalg.norm(run.sigma[begun] - point, axis=1).min() for point in w]
-    # 0.5 mm of way a tick
+def test_path_passes_all_waypoints_and_ends_at_the_last(run):
+    w, moving = bend(), run.pieces == 1.0
+    off = [np.linalg.norm(run.sigma[moving] - point, axis=1).min() for point in w]
+    # 0.5 mm per tick
     assert max(off) < 3e-4
     np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
     assert run.stream[-1, 0] == StreamStatus.WAITING
@@ -64,7 +64,7 @@ def test_it_leads_by_all_way_points_and_ends_at_the_last(run):
 
 
 @pytest.mark.slow
-def test_it_never_passes_what_it_knows_and_leaves_room_to_stop(run):
+def test_reference_never_passes_the_known_path_and_can_stop(run):
     assert run.overrun.max() <= 1e-12
     assert np.all(run.eta[:, 0] <= run.goal + 1e-12)
     assert run.eta[:, 1].max() > 0.9 * BEND.velocity
@@ -72,21 +72,21 @@ def test_it_never_passes_what_it_knows_and_leaves_room_to_stop(run):
 
 
 def test_control_points_never_change(run):
-    d, columns, seen = 3, run.course.columns, {}
-    for course in run.courses:
-        if course[1] != 1.0:
+    d, columns, known = 3, run.path.columns, {}
+    for path in run.paths:
+        if path[1] != 1.0:
             continue
-        own = course[3 : 3 + d * columns].reshape(columns, d)
+        own = path[3 : 3 + d * columns].reshape(columns, d)
         for k in range(columns):
-            first = seen.setdefault(int(course[0]) + k, own[k])
+            first = known.setdefault(int(path[0]) + k, own[k])
             assert np.array_equal(first, own[k])
 
 
 @pytest.mark.slow
 def test_arc_length_and_frame_are_those_of_the_whole_spline(run):
     spline, layout = whole_path(run), run.layout
-    begun = np.flatnonzero(run.pieces == 1.0)
-    first, last = run.points[begun[0]], run.points[-1]
+    moving = np.flatnonzero(run.pieces == 1.0)
+    first, last = run.points[moving[0]], run.points[-1]
     slope, bent = spline.derivative(1), spline.derivative(2)
     knots = np.arange(np.ceil(first[0]), last[0])
     length, _ = quad(
@@ -121,7 +121,7 @@ def test_derivatives_are_those_of_the_whole_spline(run):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2, 3])
-def test_laws_of_other_orders_get_the_same_end(order):
+def test_paths_for_other_relative_degrees_end_at_the_same_point(order):
     w, parameters = bend(20), {1: THROUGH, 2: BEND, 3: SMOOTHER}[order]
     poses = np.hstack([w, np.tile([1.0, 0.0, 0.0, 0.0], (20, 1))]) if order == 2 else w
     stream = make_stream(parameters, poses[0], order=order)
@@ -132,7 +132,7 @@ def test_laws_of_other_orders_get_the_same_end(order):
 
 
 @pytest.mark.slow
-def test_a_stream_that_runs_dry_is_followed_to_its_last_point_and_goes_on_later():
+def test_a_stream_with_a_pause_stops_at_its_last_point_and_continues_later():
     w = bend(40)
     times = even(39)
     times[20:] += 3.0
@@ -148,7 +148,7 @@ def test_a_stream_that_runs_dry_is_followed_to_its_last_point_and_goes_on_later(
 
 
 def zigzag():
-    """Return way points with corners of 120 deg and 180 deg, and the numbers of these."""
+    """Return waypoints with corners of 120 deg and 180 deg, and the numbers of the corners."""
     legs = [np.array([1.0, 0.0, 0.0]), np.array([-0.5, 0.8, 0.0]), np.array([0.5, -0.8, 0.0])]
     points, corners = [START], []
     for leg in legs:
@@ -158,7 +158,7 @@ def zigzag():
     return np.array(points), corners[:-1]
 
 
-def test_at_corners_it_rests_and_goes_on():
+def test_rests_at_corners_and_continues():
     w, corners = zigzag()
     stream = make_stream(BEND, w[0])
     run = stream.run(sent_at(stream.layout, w[1:], even(len(w) - 1)), 8000)
@@ -169,7 +169,7 @@ def test_at_corners_it_rests_and_goes_on():
         k = np.linalg.norm(run.sigma - w[corner], axis=1).argmin()
         np.testing.assert_allclose(run.sigma[k], w[corner], rtol=0, atol=1e-6)
         assert run.eta[k, 1] < 1e-4
-    # lines all along: nothing is rounded off
+    # straight lines: no corner is rounded
     for leg in np.split(w, [corners[0] + 1, corners[1] + 1]):
         assert all(np.linalg.norm(run.sigma - p, axis=1).min() < 3e-4 for p in leg)
 
@@ -184,12 +184,12 @@ def test_a_new_path_while_moving_is_blended():
     sender = WaypointSender(stream.layout)
     other = {}
 
-    def message(k, told):
+    def message(k, stream_row):
         if k < k_new and k % 30 == 0:
             sender.add(w[1 + k // 30])
         if k == k_new:
-            # off to the side of where the tool is, some way ahead
-            start = w[round(told[1])]
+            # beside the tool, some distance ahead
+            start = w[round(stream_row[1])]
             for j in range(25):
                 new = start + turn @ along * 0.02 * j + [0.03, 0.0, 0.0]
                 other[j] = new
@@ -203,7 +203,7 @@ def test_a_new_path_while_moving_is_blended():
     np.testing.assert_allclose(run.sigma[-1], other[24], rtol=0, atol=1e-4)
     moving = slice(k_new, k_new + 1500)
     assert run.eta[moving, 1].min() > 0.05
-    # the path on which the tool is does not change: what it did is one spline of class C^5
+    # the path under the tool does not change: the motion is on one spline of class C^5
     spline = whole_path_driven(run)
     for k in range(400, 5000, 100):
         found = run.points[k, run.layout.position].reshape(-1, 3)
@@ -212,32 +212,32 @@ def test_a_new_path_while_moving_is_blended():
 
 
 def whole_path_driven(run):
-    """Return the spline through the control points as the tool met them."""
-    d, columns, points = 3, run.course.columns, {}
-    for course, point in zip(run.courses, run.points, strict=True):
-        if course[1] == 1.0:
-            own = course[3 : 3 + d * columns].reshape(columns, d)
+    """Return the spline of the control points at the time when the tool passed them."""
+    d, columns, points = 3, run.path.columns, {}
+    for path, point in zip(run.paths, run.points, strict=True):
+        if path[1] == 1.0:
+            own = path[3 : 3 + d * columns].reshape(columns, d)
             span = int(np.floor(point[0]))
-            for n in range(span, span + run.course.spline.degree + 1):
-                points[n] = own[n - int(course[0])]
+            for n in range(span, span + run.path.spline.degree + 1):
+                points[n] = own[n - int(path[0])]
     numbers = sorted(points)
-    degree = run.course.spline.degree
+    degree = run.path.spline.degree
     knots = np.arange(numbers[0] - degree, numbers[-1] + 2, dtype=float)
     return BSpline(knots, np.array([points[n] for n in numbers]), degree)
 
 
-def test_way_points_that_were_missed_end_the_path():
+def test_missed_waypoints_end_the_path():
     w = bend(61)
     stream = make_stream(BEND, w[0])
-    told = sent_at(stream.layout, w[1:], even(60), end=False)
-    held = {}
+    sender = sent_at(stream.layout, w[1:], even(60), end=False)
+    newest = {}
 
     def message(k, stream):
-        now = told(k, stream)
-        # none for longer than messages go back
+        now = sender(k, stream)
+        # interrupted for longer than messages go back
         if not 800 <= k < 2800:
-            held["last"] = now.copy()
-        return held["last"]
+            newest["last"] = now.copy()
+        return newest["last"]
 
     run = stream.run(message, 5000)
     assert run.stream[-1, 0] == StreamStatus.MISSED
@@ -246,25 +246,25 @@ def test_way_points_that_were_missed_end_the_path():
 
 
 @pytest.mark.parametrize("new", [(), (5,)])
-def test_a_sender_that_counts_anew_is_noticed(new):
-    """What it tells is left out until a new path begins; overtaken messages are no new sender."""
+def test_a_sender_that_restarts_its_count_is_detected(new):
+    """Its waypoints are skipped until a new path begins; late messages are no new sender."""
     w = bend(61)
     stream = make_stream(BEND, w[0])
     first = sent_at(stream.layout, w[1:], even(60), end=False)
     second = sent_at(stream.layout, w[16:40], 1.0 + even(24), new=new)
-    held = []
+    history = []
 
     def message(k, stream):
-        held.append(first(k, stream))
+        history.append(first(k, stream))
         if k >= 1000:
             return second(k, stream)
-        # now and then one of 0.2 s before
-        return held[max(0, k - 200)] if k % 50 == 0 else held[-1]
+        # occasionally one that is 0.2 s old
+        return history[max(0, k - 200)] if k % 50 == 0 else history[-1]
 
     run = stream.run(message, 3500)
     status = run.stream[:, 0]
-    noticed = int(np.argmax(status == StreamStatus.BEGUN_ANEW))
-    assert 1040 < noticed < 1060
+    detected = int(np.argmax(status == StreamStatus.BEGUN_ANEW))
+    assert 1040 < detected < 1060
     assert run.overrun.max() <= 1e-12
     if new:
         np.testing.assert_allclose(run.sigma[-1], w[39], rtol=0, atol=1e-7)
@@ -278,24 +278,24 @@ def test_a_sender_that_counts_anew_is_noticed(new):
 
 @pytest.mark.slow(but="bad1")
 @pytest.mark.parametrize("bad", [[np.nan, 0.3, 1.0], [0.8, 9.0, 1.0]])
-def test_a_bad_way_point_ends_the_path_until_a_new_one_begins(bad):
+def test_an_invalid_waypoint_ends_the_path_until_a_new_one_begins(bad):
     w = bend(61)
     rows = w[1:].copy()
     rows[25] = bad
     rows[45] = w[26]
     stream = make_stream(BEND, w[0])
-    told = sent_at(stream.layout, rows, even(60), new=(45,))
-    run = stream.run(told, 7000)
+    messages = sent_at(stream.layout, rows, even(60), new=(45,))
+    run = stream.run(messages, 7000)
     assert (run.stream[:, 0] == StreamStatus.REFUSED).any()
-    # what comes in between is left out
+    # waypoints in between are skipped
     off = np.linalg.norm(run.sigma - w[25], axis=1)
     assert off.min() < 1e-6
     np.testing.assert_allclose(run.sigma[-1], w[-1], rtol=0, atol=1e-7)
     assert run.overrun.max() <= 1e-12
 
 
-def test_what_was_refused_is_remembered_at_rest():
-    """Further way points of the same path come after it has stopped, and change nothing."""
+def test_a_refusal_persists_at_rest():
+    """Further waypoints of the same path arrive after the stop, and have no effect."""
     w = bend(41)
     rows, times = w[1:].copy(), even(40)
     rows[25], times[30:] = [np.nan, 0.3, 1.0], times[30:] + 2.5
@@ -309,7 +309,7 @@ def test_what_was_refused_is_remembered_at_rest():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "count"), [(3, 40), *((k, 150) for k in range(4))])
-def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed, count):
+def test_random_drawings_give_regular_paths_that_are_never_passed(seed, count):
     random = np.random.default_rng(seed)
     parameters, order = (THROUGH, 1) if seed % 2 else (SMOOTHER, 3)
     heading, points = 0.0, [START]
@@ -332,7 +332,7 @@ def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed, count):
     curvature = np.linalg.norm(np.cross(slope, second), axis=1) / speed**3
     assert speed.min() > 0.1 * parameters.spacing
     assert curvature.max() < 1.15 / parameters.least_radius
-    # bends are gone through slowly
+    # low speed in bends
     across = curvature * run.eta[:, 1] ** 2
     assert across.max() < 1.3 * parameters.normal_acceleration
     assert run.stream[-1, 0] == StreamStatus.WAITING
@@ -340,7 +340,7 @@ def test_whatever_a_hand_scribbles_is_regular_and_never_passed(seed, count):
 
 
 @pytest.mark.slow
-def test_orientations_come_with_way_points():
+def test_waypoints_with_orientations():
     w = bend(40)
     angles = np.linspace(0.0, 1.2, 40)
     q = np.stack([np.cos(angles / 2), np.sin(angles / 2), 0 * angles, 0 * angles], axis=1)
@@ -357,11 +357,11 @@ def test_orientations_come_with_way_points():
     assert np.abs(np.diff(found, axis=0)).max() < 1e-2
 
 
-def test_senders_refuse_what_is_no_way_point():
+def test_senders_reject_invalid_waypoints():
     stream = make_stream(BEND, bend()[0])
     sender = WaypointSender(stream.layout, lower=[0.0, -1.0, 0.0], upper=[1.0, 1.0, 1.0])
-    with pytest.raises(InputError, match=r"way point 1: \[nan, 0.0, 0.0\]; must be 3 finite"):
+    with pytest.raises(InputError, match=r"waypoint 1: \[nan, 0.0, 0.0\]; must be 3 finite"):
         sender.add([np.nan, 0.0, 0.0])
-    with pytest.raises(InputError, match=r"way point 1: \[0.5, 2.0, 0.5\] m; must be from"):
+    with pytest.raises(InputError, match=r"waypoint 1: \[0.5, 2.0, 0.5\] m; must be from"):
         sender.add([0.5, 2.0, 0.5])
     assert sender.total == 0

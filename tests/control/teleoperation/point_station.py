@@ -12,13 +12,13 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.network import Network, Wiring
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.blocks.wiring_blocks import Constant, Linear, Sum
-from pfsc_drake.control.fixtures.fixture_guidance import LedTool
+from pfsc_drake.control.fixtures.command_dynamics import ServoDynamics
+from pfsc_drake.control.fixtures.fixture_guidance import GuidedTool
 from pfsc_drake.control.fixtures.fixture_parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
-from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
+from pfsc_drake.control.teleoperation.commanded_point import FixtureReaction
 from pfsc_drake.control.teleoperation.coupling_parameters import CouplingParameters, PortLimits
-from pfsc_drake.control.teleoperation.led_point import FixtureReaction
 from pfsc_drake.control.teleoperation.message import MESSAGE
 from pfsc_drake.control.teleoperation.port import RECORD, TeleoperationPort
 from pfsc_drake.geometry.shapes.plane import HalfSpace
@@ -32,19 +32,19 @@ _FOLLOWER_FORCE = 60.0  # N
 
 
 class StudyHand(Block):
-    """A spring and damper from the handle to a target, and a push, both told from outside.
+    """Operator model: a spring and damper from the handle to a target, and a push, both inputs.
 
     Ports:
-        state (input): Of the handle, shape (6,) [m, m/s].
+        state (input): State of the handle, shape (6,) [m, m/s].
         asked (input): Target [m], push [N], stiffness [N/m], damping [N s/m], shape (8,).
-        wrench (output): Held from the last tick on, shape (6,) [N, Nm].
+        wrench (output): Wrench of the last tick, shape (6,) [N, Nm].
 
     State:
-        wrench: What is put out.
+        wrench: Output wrench.
     """
 
     def __init__(self) -> None:
-        self.inputs = {"state": Port(6, "m, m/s"), "asked": Port(8, "m, N, N/m, N s/m")}
+        self.inputs = {"state": Port(6, "m, m/s"), "requested": Port(8, "m, N, N/m, N s/m")}
         self.outputs, self.states = {"wrench": Port(6, "N, Nm")}, {"wrench": 6}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
@@ -52,22 +52,22 @@ class StudyHand(Block):
         return {"wrench": x.wrench}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
-        spring = u.asked[6] * (u.asked[:3] - u.state[:3]) - u.asked[7] * u.state[3:]
-        return {"wrench": ca.vertcat(spring + u.asked[3:6], ca.DM.zeros(3))}
+        """Return the states at the next tick; omitted ones keep their values."""
+        spring = u.requested[6] * (u.requested[:3] - u.state[:3]) - u.requested[7] * u.state[3:]
+        return {"wrench": ca.vertcat(spring + u.requested[3:6], ca.DM.zeros(3))}
 
 
 class LaggedPoint(Block):
     """A point behind velocity servos with a lag and a delay, before a wall that is a spring.
 
     Ports:
-        velocity (input): That is asked for [m/s], shape (>= 6,): the last three count.
-        wall (input): Its place along x [m] and its stiffness [N/m], shape (2,).
+        velocity (input): Commanded velocity [m/s], shape (>= 6,): the last three count.
+        wall (input): Position along x [m] and stiffness [N/m] of the wall, shape (2,).
         joint_state (output): Position and velocity, twice, shape (12,) [m, m/s].
-        wrench (output): Of the wall on the point, shape (6,) [N, Nm].
+        wrench (output): Wrench of the wall on the point, shape (6,) [N, Nm].
 
     State:
-        position, velocity; waiting: Commands that are under way.
+        position, velocity; waiting: Commands in the delay.
     """
 
     def __init__(self) -> None:
@@ -86,27 +86,27 @@ class LaggedPoint(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """Return what is remembered at the next tick; what is left out stays."""
+        """Return the states at the next tick; omitted ones keep their values."""
         queue = ca.vertcat(u.velocity[3:], x.waiting)
-        asked, decay = queue[-3:], math.exp(-PERIOD / _LAG)
-        gap = x.velocity - asked
+        commanded, decay = queue[-3:], math.exp(-PERIOD / _LAG)
+        gap = x.velocity - commanded
         return {
-            "position": x.position + asked * PERIOD + gap * _LAG * (1.0 - decay),
-            "velocity": asked + gap * decay,
+            "position": x.position + commanded * PERIOD + gap * _LAG * (1.0 - decay),
+            "velocity": commanded + gap * decay,
             "waiting": queue[:-3],
         }
 
 
 @dataclass(frozen=True)
 class PointStation:
-    """What a point follows by.
+    """Parameters of a teleoperated point.
 
     Attributes:
         coupling: Coupling of both sides.
-        planes: What it may not cross, ``(point, normal)`` each.
-        leader: The device.
-        mass: Of the free motion [kg].
-        damping: Of the free motion [N s/m].
+        planes: Boundaries of the point, ``(point, normal)`` each.
+        leader: The leader device.
+        mass: Mass of the free motion [kg].
+        damping: Damping of the free motion [N s/m].
     """
 
     coupling: CouplingParameters
@@ -118,17 +118,17 @@ class PointStation:
 
 @dataclass(frozen=True)
 class Motion:
-    """What happened, by tick.
+    """Signals of a run by tick.
 
     Attributes:
-        handle: True position and velocity of the handle, shape (ticks, 6) [m, m/s].
-        hand: Force of the hand on it, shape (ticks, 3) [N].
-        motor: Force of the motors on it, shape (ticks, 3) [N].
-        point: Where the point is, shape (ticks, 3) [m].
+        handle: Actual position and velocity of the handle, shape (ticks, 6) [m, m/s].
+        hand: Force of the operator on the handle, shape (ticks, 3) [N].
+        motor: Force of the motors on the handle, shape (ticks, 3) [N].
+        point: Position of the point, shape (ticks, 3) [m].
         leader: Record of the leader's port, shape (ticks, size), see :data:`RECORD`.
-        follower: Record of the follower's.
+        follower: Record of the follower's port.
         wall: Force of the wall on the point, shape (ticks, 3) [N].
-        command: Velocity that was asked for, shape (ticks, 3) [m/s].
+        command: Commanded velocity, shape (ticks, 3) [m/s].
     """
 
     handle: np.ndarray
@@ -142,10 +142,10 @@ class Motion:
 
 
 class PointTeleoperation:
-    """Both sides as one function of what arrives and what the hand is asked.
+    """Both sides as one function of received messages and the operator's inputs.
 
     Args:
-        station: What there is.
+        station: Parameters of the station.
     """
 
     def __init__(self, station: PointStation) -> None:
@@ -153,37 +153,38 @@ class PointTeleoperation:
 
     def run(
         self,
-        asked: np.ndarray,
+        requested: np.ndarray,
         there: ChannelParameters,
         back: ChannelParameters,
         wall: tuple[float, float] = (1.0, 0.0),
     ) -> Motion:
-        """Return what happens.
+        """Return the signals of a run.
 
         Args:
-            asked: Of the hand at each tick, shape (ticks, 8), see :class:`StudyHand`.
+            requested: Inputs of the operator model by tick, shape (ticks, 8), see
+                :class:`StudyHand`.
             there: Channel from the leader to the follower.
-            back: The other way.
-            wall: Its place along x [m], and its stiffness [N/m].
+            back: Channel from the follower to the leader.
+            wall: Position along x [m] and stiffness [N/m] of the wall.
         """
         stepper = self._stepper
         ages = [message_ages(channel, PERIOD) for channel in (there, back)]
-        told = np.zeros((2, len(asked) + 1, MESSAGE))
+        messages = np.zeros((2, len(requested) + 1, MESSAGE))
         stepper.tick, none = 0, np.zeros(MESSAGE)
         names = ("handle", "hand", "motor", "joints", "leader", "follower", "wall", "reference")
         rows: dict[str, list[np.ndarray]] = {name: [] for name in names}
-        stepper.start(asked=asked[0], wall=wall, to_leader=none, to_follower=none)
-        given = stepper._step.arguments
-        given["wall"][:] = wall
+        stepper.start(requested=requested[0], wall=wall, to_leader=none, to_follower=none)
+        arguments = stepper._step.arguments
+        arguments["wall"][:] = wall
         results = stepper._step.results
-        for k, wish in enumerate(asked):
-            given["asked"][:] = wish
-            for name, way, age in zip(("to_follower", "to_leader"), told, ages, strict=True):
+        for k, inputs in enumerate(requested):
+            arguments["requested"][:] = inputs
+            for name, sent, age in zip(("to_follower", "to_leader"), messages, ages, strict=True):
                 old = k - age[k % len(age)]
-                given[name][:] = way[old] if old >= 0 else 0.0
-            given["t"][0] = k
+                arguments[name][:] = sent[old] if old >= 0 else 0.0
+            arguments["t"][0] = k
             stepper._step.evaluate()
-            told[0, k], told[1, k] = results["from_leader"], results["from_follower"]
+            messages[0, k], messages[1, k] = results["from_leader"], results["from_follower"]
             for name in names:
                 rows[name].append(results[name].copy())
             stepper._x[:] = results["x_next"]
@@ -226,7 +227,7 @@ def _network(station: PointStation) -> Network:
         blocks,
         {
             ("hand", "state"): ("device", "state"),
-            ("hand", "asked"): "asked",
+            ("hand", "requested"): "requested",
             ("device", "motor_force"): ("motor", "product"),
             ("device", "hand_wrench"): ("hand", "wrench"),
             ("clutch", "handle"): ("device", "position"),
@@ -270,9 +271,9 @@ def _guidance(station: PointStation, parameters: GuidanceParameters) -> ProgramG
     motion = ca.Function("motion", [q, v], [ca.vertcat(q, ca.DM.zeros(9), v, ca.DM.zeros(3))])
     planes = [HalfSpace(point, normal) for point, normal in station.planes]
     within = reaches(parameters, PERIOD, [0.0] * len(planes))
-    tool = LedTool(
+    tool = GuidedTool(
         motion,
-        ServoLead(_LAG, _DELAY, PERIOD),
+        ServoDynamics(_LAG, _DELAY, PERIOD),
         Admittance(station.mass, station.damping, PERIOD),
         len(planes),
         near_rows(planes, within),
@@ -281,6 +282,6 @@ def _guidance(station: PointStation, parameters: GuidanceParameters) -> ProgramG
 
 
 def of(record: np.ndarray, name: str) -> np.ndarray:
-    """Return what records say under a name, shape (ticks, size) or (ticks,)."""
+    """Return a signal of records by name, shape (ticks, size) or (ticks,)."""
     values = record[:, RECORD[name]]
     return values[:, 0] if values.shape[1] == 1 else values

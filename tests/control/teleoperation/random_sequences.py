@@ -1,4 +1,4 @@
-"""Hands that pull and push at random, and whether a coupling ever gives more than it had."""
+"""Random operator motions, and the energy balance of a coupling."""
 
 from dataclasses import dataclass
 
@@ -7,38 +7,38 @@ import numpy as np
 from pfsc_drake.physics.channel import ChannelParameters
 from tests.control.teleoperation.point_station import PERIOD, Motion, of
 
-# longest delay and jitter [s], most that is lost
+# largest delay and jitter [s], largest loss
 _DELAY, _JITTER, _LOSS = 0.5, 0.1, 0.5
 _FARTHEST, _STIFFEST = 0.15, 600.0  # m, N/m
 
 
 @dataclass(frozen=True)
 class Sequence:
-    """What is drawn for one run.
+    """Random inputs of one run.
 
     Attributes:
-        asked: Of the hand, shape (ticks, 8), see :class:`StudyHand`.
+        requested: Inputs of the operator model, shape (ticks, 8), see :class:`StudyHand`.
         there: Channel to the follower.
-        back: Channel from it.
-        wall: Place along x [m] and stiffness [N/m] of a wall.
+        back: Channel from the follower.
+        wall: Position along x [m] and stiffness [N/m] of a wall.
     """
 
-    asked: np.ndarray
+    requested: np.ndarray
     there: ChannelParameters
     back: ChannelParameters
     wall: tuple[float, float]
 
 
 def draw_sequence(seed: int, duration: float) -> Sequence:
-    """Return a hand that wants somewhere else now and then, pushes and trembles, and a channel.
+    """Return an operator motion with changing targets, pushes and tremor, and random channels.
 
     Args:
-        seed: Another one draws another.
-        duration: [s].
+        seed: Seed of the random numbers.
+        duration: Duration [s].
     """
     random = np.random.default_rng(seed)
     ticks = round(duration / PERIOD)
-    time, asked = np.arange(ticks) * PERIOD, np.zeros((ticks, 8))
+    time, requested = np.arange(ticks) * PERIOD, np.zeros((ticks, 8))
     changes = np.cumsum(random.uniform(0.2, 1.0, ticks // 200 + 2))
     leg = np.searchsorted(changes, time)
     targets = random.uniform(-_FARTHEST, _FARTHEST, (len(changes) + 1, 3))
@@ -46,10 +46,10 @@ def draw_sequence(seed: int, duration: float) -> Sequence:
     tremor = random.uniform(0.0, 2.0) * np.sin(
         2.0 * np.pi * random.uniform(6.0, 12.0, 3) * time[:, None] + random.uniform(0, 6.28, 3)
     )
-    asked[:, :3] = _smoothed(targets[leg], 0.1)
-    asked[:, 3:6] = _smoothed(pushes[leg], 0.05) + tremor
-    asked[:, 6] = random.uniform(0.0, _STIFFEST)
-    asked[:, 7] = random.uniform(0.0, 30.0)
+    requested[:, :3] = _smoothed(targets[leg], 0.1)
+    requested[:, 3:6] = _smoothed(pushes[leg], 0.05) + tremor
+    requested[:, 6] = random.uniform(0.0, _STIFFEST)
+    requested[:, 7] = random.uniform(0.0, 30.0)
     channels = [
         ChannelParameters(
             random.uniform(0.0, _DELAY),
@@ -60,7 +60,7 @@ def draw_sequence(seed: int, duration: float) -> Sequence:
         for _ in range(2)
     ]
     wall = float(random.uniform(0.0, 0.1)), float(random.choice([0.0, 500.0, 2000.0]))
-    return Sequence(asked, channels[0], channels[1], wall)
+    return Sequence(requested, channels[0], channels[1], wall)
 
 
 def _smoothed(values: np.ndarray, constant: float) -> np.ndarray:
@@ -74,14 +74,14 @@ def _smoothed(values: np.ndarray, constant: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Energy:
-    """What a run's energy was at worst.
+    """Extreme energies of a run.
 
     Attributes:
-        coupling: Work of both sides together above minus what their tanks held at first [J].
-        hand: Work of hand and wall, the same [J].
-        tank: Least in a tank [J].
-        deepest: How far the point was behind a plane [m].
-        fastest: Of the handle [m/s].
+        coupling: Initial content of both tanks minus the largest work of both sides [J].
+        hand: The same for the work of operator and wall [J].
+        tank: Least content of a tank [J].
+        deepest: Largest penetration of a plane [m].
+        fastest: Largest speed of the handle [m/s].
     """
 
     coupling: float
@@ -92,14 +92,14 @@ class Energy:
 
 
 def energy_of(motion: Motion, planes: list[tuple[list[float], list[float]]]) -> Energy:
-    """Return what a run's energy was at worst.
+    """Return the extreme energies of a run.
 
     Args:
         motion: The run, with scales of one.
-        planes: What the point may not cross, ``(point, normal)`` each.
+        planes: Boundaries of the point, ``(point, normal)`` each.
     """
     tanks = np.stack([of(record, "tank") for record in (motion.leader, motion.follower)])
-    # within the first tick nothing is sent and nothing done
+    # no energy is sent and no work done in the first tick
     stored = float(tanks[:, 0].sum())
     done = np.zeros(len(motion.hand) - 1)
     for record in (motion.leader, motion.follower):

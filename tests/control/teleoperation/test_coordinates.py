@@ -1,4 +1,4 @@
-"""A side with six axes: turns as coordinates, moments, and one account of energy over all."""
+"""A side with six axes: rotations as coordinates, moments, and one energy tank."""
 
 import math
 
@@ -33,18 +33,18 @@ def make(side="leader", late=0, force=1e3, moment=1e2, connected=(), **coupling)
 
 
 def message(count=0.0, signal=(0.0,) * 6, felt=(0.0,) * 6, energy=0.0):
-    told = np.zeros(MESSAGE)
+    row = np.zeros(MESSAGE)
     for name, value in zip(FIELDS, (count, signal, felt, energy, 0.0), strict=True):
-        told[FIELDS[name]] = value
-    return told
+        row[FIELDS[name]] = value
+    return row
 
 
-def step(port, p, R, told, **more):
-    return port.step(position=p, orientation=R.as_matrix().ravel(), message=told, **more)
+def step(port, p, R, newest, **more):
+    return port.step(position=p, orientation=R.as_matrix().ravel(), message=newest, **more)
 
 
 def test_each_axis_has_its_own_waves():
-    """Turning about a fixed axis, along which and across which waves arrive."""
+    """Rotation about a fixed axis, with waves along and across it."""
     port = make(passive=False)
     a = np.array([0.3, -0.2, 0.1, 0.2, -0.1, 0.3])
     v, w = np.array([0.05, 0.02, -0.1]), np.array([0.0, 0.0, 0.7])
@@ -65,13 +65,13 @@ def test_each_axis_has_its_own_waves():
 
 
 def random_port(seed, ticks=300, arriving=2e-3, **options):
-    """Poses and steps of a port that is moved and turned at random, slower than its limits."""
+    """Poses and steps of a port that moves and rotates at random, below its limits."""
     random, p, R = np.random.default_rng(seed), P_0.copy(), R_0
     port = make(force=30.0, moment=3.0, connected=("felt",), **options)
     twist, signal, energy, rows = np.zeros(6), np.zeros(6), 0.0, []
     for k in range(ticks):
-        told = message(k, signal, random.normal(0, [20] * 3 + [4] * 3), energy)
-        rows.append((p, R, step(port, p, R, told, felt=random.normal(0, 2, 6))))
+        newest = message(k, signal, random.normal(0, [20] * 3 + [4] * 3), energy)
+        rows.append((p, R, step(port, p, R, newest, felt=random.normal(0, 2, 6))))
         twist = 0.95 * twist + random.normal(0, [0.1] * 3 + [0.4] * 3)
         for part, most in ((twist[:3], 0.99), (twist[3:], 3.9)):
             part *= min(1.0, most / max(np.linalg.norm(part), 1e-9))
@@ -90,7 +90,7 @@ COUNTS = [2, pytest.param(50, marks=pytest.mark.slow)]
 @pytest.mark.parametrize("late", [0, 1])
 @pytest.mark.parametrize("coupling", ["waves", "position_force", "four_channel"])
 def test_one_tank_pays_for_forces_and_moments(coupling, late, count):
-    """Work recounted from the outputs and from the poses alone."""
+    """Work from the outputs and the poses alone."""
     share = 1.0
     for seed in range(count):
         rows = random_port(seed, coupling=coupling, late=late, side="follower")
@@ -100,24 +100,24 @@ def test_one_tank_pays_for_forces_and_moments(coupling, late, count):
             record[:, ROWS[name]][:, 0] for name in ("tank", "sent", "received")
         )
         acting = np.hstack([record[:, ROWS["force"]], record[:, ROWS["moment"]]])
-        asked = np.array([row[2]["force"] for row in rows])
-        np.testing.assert_array_equal(acting[late:], asked[: len(asked) - late])
+        commanded = np.array([row[2]["force"] for row in rows])
+        np.testing.assert_array_equal(acting[late:], commanded[: len(commanded) - late])
         turned = (R[1:] * R[:-1].inv()).as_rotvec()
         work = np.sum(acting[:-1] * np.hstack([np.diff(p, axis=0), turned]), axis=1)
         before = tank[:-1] - work + np.diff(received)
         expected = np.minimum(before, CAPACITY) - np.diff(sent)
         np.testing.assert_allclose(tank[1:], expected, atol=1e-12)
         assert tank.min() >= 0.0
-        given = np.cumsum(work) + sent[1:] - received[1:]
-        assert given.max() <= INITIAL + 1e-12
+        output = np.cumsum(work) + sent[1:] - received[1:]
+        assert output.max() <= INITIAL + 1e-12
         assert np.linalg.norm(acting[:, :3], axis=1).max() <= 30.0 + 1e-12
         assert np.linalg.norm(acting[:, 3:], axis=1).max() <= 3.0 + 1e-12
         share = min(share, record[:, ROWS["share"]].min())
     assert share < 0.9  # it was short of energy, or at its limits
 
 
-def test_a_moment_leaves_the_energy_that_it_could_take():
-    """In a low tank both are as large as lasts for the largest speeds, in their proportion."""
+def test_moment_is_limited_by_the_energy_in_the_tank():
+    """With a low tank, force and moment suffice for the largest speeds, in their proportion."""
     port = make(coupling="position_force", force=200.0, moment=20.0)
     port.start(position=P_0, orientation=R_0.as_matrix().ravel(), message=np.zeros(MESSAGE))
     port.set_state("tank", 0.02)
@@ -128,11 +128,11 @@ def test_a_moment_leaves_the_energy_that_it_could_take():
 def test_other_couplings_draw_turns_together():
     port = make(coupling="four_channel", passive=False, force_share=0.5, moment=1e3)
     step(port, P_0, R_0, message())
-    told = (0, 0, 0, 0.1, 0, 0), (0, 0, 0, 0, 2.0, 0)
-    row = step(port, P_0, R_0, message(1, *told))
+    signals = (0, 0, 0, 0.1, 0, 0), (0, 0, 0, 0, 2.0, 0)
+    row = step(port, P_0, R_0, message(1, *signals))
     drawn = 30.0 * 0.1 + 1.5 * 0.1 / T
     np.testing.assert_allclose(row["force"], [0, 0, 0, drawn, 1.0, 0], atol=1e-9)
-    row = step(port, P_0, R_0, message(2, *told))
+    row = step(port, P_0, R_0, message(2, *signals))
     np.testing.assert_allclose(row["force"], [0, 0, 0, 30.0 * 0.1, 1.0, 0], atol=1e-9)
 
 
@@ -141,9 +141,9 @@ def test_a_moment_does_the_work_of_the_force_on_the_vector():
     port, turn = make(coupling="four_channel", passive=False, moment=1e3), [0.9, -0.4, 0.6]
     step(port, P_0, R_0, message())
     R = Rotation.from_rotvec(turn)
-    told = message(1, (0, 0, 0, 1.0, 0.3, -0.2))
+    newest = message(1, (0, 0, 0, 1.0, 0.3, -0.2))
     for _ in range(3):
-        row = step(port, P_0, R * R_0, told)
+        row = step(port, P_0, R * R_0, newest)
     spring = 30.0 * (np.array([1.0, 0.3, -0.2]) - turn)
     for w in np.eye(3):
         ends = [(Rotation.from_rotvec(h * w) * R).as_rotvec() for h in (-1e-5, 1e-5)]
@@ -155,7 +155,7 @@ def test_a_reserve_is_for_forces_and_moments():
     assert PortLimits(30.0, 2.0, 1, T, 3.0, 4.0).reserve == pytest.approx(2.0 * T * (60.0 + 12.0))
 
 
-def test_where_energy_lacks_turns_are_damped_in_the_ratio_of_impedances():
+def test_rotations_are_damped_in_the_ratio_of_impedances():
     port = make(coupling="position_force", tank=PortTankParameters(initial=0.4, refill=30.0))
     port.start(position=P_0, orientation=R_0.as_matrix().ravel(), message=np.zeros(MESSAGE))
     port.set_state("tank", 0.1)
@@ -165,14 +165,14 @@ def test_where_energy_lacks_turns_are_damped_in_the_ratio_of_impedances():
     np.testing.assert_allclose(row["force"], [0, 0, 0, 0, moment, 0], atol=1e-9)
 
 
-def test_turns_go_on_beyond_pi():
+def test_rotations_continue_beyond_pi():
     port, axis = make(passive=False), np.array([0.0, 0.6, 0.8])
     for angle in np.linspace(0.0, 4.5, 60):
         row = step(port, P_0, Rotation.from_rotvec(angle * axis) * R_0, message())
         np.testing.assert_allclose(row["record"][ROWS["turn"]], angle * axis, atol=1e-9)
 
 
-def test_what_is_no_number_is_not_believed():
+def test_nan_is_ignored():
     port = make()
     step(port, P_0, R_0, message())
     row = port.step(position=P_0, orientation=[np.nan] * 9, message=message())
@@ -188,6 +188,6 @@ def test_moments_are_scaled_so_that_work_is():
 
 
 @pytest.mark.parametrize("wrong", [{"impedance": 0.0}, {"scale": -1.0}, {"damping": np.inf}])
-def test_wrong_rotations_are_refused(wrong):
+def test_wrong_rotations_are_rejected(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
         RotationParameters(**wrong)

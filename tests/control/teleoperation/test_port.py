@@ -1,4 +1,4 @@
-"""One side of a teleoperation: waves, other couplings, and energy that is never given away."""
+"""One side of a teleoperation: waves, other couplings, and passivity."""
 
 import math
 
@@ -29,24 +29,24 @@ def make(side="leader", late=0, connected=(), force=1e3, speed=1.0, **coupling):
 
 
 def message(count=0.0, signal=(), felt=(), energy=0.0):
-    told = np.zeros(MESSAGE)
-    told[FIELDS["count"]], told[FIELDS["energy"]] = count, energy
+    row = np.zeros(MESSAGE)
+    row[FIELDS["count"]], row[FIELDS["energy"]] = count, energy
     for name, values in (("signal", signal), ("felt", felt)):
-        told[FIELDS[name]][: len(values)] = values
-    return told
+        row[FIELDS[name]][: len(values)] = values
+    return row
 
 
-def linear(told, name):
+def linear(row, name):
     """Return the first three of a message's field."""
-    return told[FIELDS[name]][:3]
+    return row[FIELDS[name]][:3]
 
 
-def told(step, name):
+def record_of(step, name):
     return step["record"][RECORD[name]]
 
 
 def random_port(seed, ticks=400, arriving=1e-3, **options):
-    """Steps of a port that is moved at random, slower than its limit, and hears what it may."""
+    """Steps of a port that moves at random below its speed limit, with random messages."""
     random, x = np.random.default_rng(seed), START.copy()
     port = make(**({"force": 30.0, "connected": ("felt",)} | options))
     rows, velocity, signal, energy = [], np.zeros(3), np.zeros(3), 0.0
@@ -66,8 +66,8 @@ def random_port(seed, ticks=400, arriving=1e-3, **options):
     return rows
 
 
-def test_a_wave_becomes_a_force_and_what_is_left_of_it_goes_back():
-    """With a the wave that arrives and v the velocity: F = sqrt(2b) a - b v, o = sqrt(2b) v - a."""
+def test_a_wave_becomes_a_force_and_a_reflected_wave():
+    """With a the received wave and v the velocity: F = sqrt(2b) a - b v, o = sqrt(2b) v - a."""
     port = make(passive=False)
     a, v = np.array([0.3, -0.2, 0.1]), np.array([0.05, 0.02, -0.1])
     before = None
@@ -81,8 +81,8 @@ def test_a_wave_becomes_a_force_and_what_is_left_of_it_goes_back():
 
 
 @pytest.mark.parametrize("late", [0, 1])
-def test_steady_waves_leave_the_tank_as_it_is(late):
-    """The energy of what arrives is that of what goes back and the work: a^2/2 - F v = o^2/2."""
+def test_steady_waves_do_not_change_the_tank(late):
+    """The received energy equals the reflected energy plus work: a^2/2 - F v = o^2/2."""
     tank = PortTankParameters(refill=0.0)
     port = make(late=late, tank=tank, force=30.0)
     a, v = np.array([0.3, -0.2, 0.1]), np.array([0.05, 0.02, -0.1])
@@ -92,55 +92,55 @@ def test_steady_waves_leave_the_tank_as_it_is(late):
         row = port.step(
             position=START + k * T * v, message=message(k, (k + 1) * T * a, (0,) * 3, energy)
         )
-        tanks.append(told(row, "tank")[0])
+        tanks.append(record_of(row, "tank")[0])
     np.testing.assert_allclose(np.diff(tanks[4:]), 0.0, atol=1e-13)
 
 
 @pytest.mark.slow(but=["waves-0", "position_force-1", "four_channel-0"])
 @pytest.mark.parametrize("late", [0, 1])
 @pytest.mark.parametrize("coupling", ["waves", "position_force", "four_channel"])
-def test_the_tank_keeps_its_law_and_is_never_overdrawn(coupling, late):
-    """Work recounted from the outputs alone: force held over the displacement of its tick."""
+def test_energy_balance_of_the_tank_and_no_negative_content(coupling, late):
+    """Work from the outputs alone: constant force over the displacement of its tick."""
     share = 1.0
     for seed in range(4):
         rows = random_port(seed, coupling=coupling, late=late, side="follower")
-        x = np.array([place for place, _ in rows])
+        x = np.array([position for position, _ in rows])
         force, sent, received, tank = (
-            np.array([told(row, name) for _, row in rows])
+            np.array([record_of(row, name) for _, row in rows])
             for name in ("force", "sent", "received", "tank")
         )
-        asked = np.array([row["force"] for _, row in rows])
-        np.testing.assert_array_equal(force[late:], asked[: len(asked) - late])
+        commanded = np.array([row["force"] for _, row in rows])
+        np.testing.assert_array_equal(force[late:], commanded[: len(commanded) - late])
         work = np.sum(force[:-1] * np.diff(x, axis=0), axis=1)
         before = tank[:-1, 0] - work + np.diff(received[:, 0])
         expected = np.minimum(before, CAPACITY) - np.diff(sent[:, 0])
         np.testing.assert_allclose(tank[1:, 0], expected, atol=1e-13)
         assert tank.min() >= 0.0
-        given = np.cumsum(work) + sent[1:, 0] - received[1:, 0]
-        assert given.max() <= 0.2 + 1e-12
-        share = min(share, *(told(row, "share")[0] for _, row in rows))
+        output = np.cumsum(work) + sent[1:, 0] - received[1:, 0]
+        assert output.max() <= 0.2 + 1e-12
+        share = min(share, *(record_of(row, "share")[0] for _, row in rows))
     assert share < 0.9  # it was short of energy
 
 
-def test_an_unguarded_port_gives_what_it_has_not_got():
+def test_a_port_that_is_not_passive_overdraws_its_tank():
     rows = random_port(1, 2000, 1e-9, coupling="four_channel", passive=False)
-    assert min(told(row, "tank")[0] for _, row in rows) < 0.0
+    assert min(record_of(row, "tank")[0] for _, row in rows) < 0.0
 
 
-def test_a_force_leaves_the_energy_that_it_could_take():
-    """In an empty tank there is none, in a low one as much as lasts for the largest speed."""
+def test_force_is_limited_by_the_energy_in_the_tank():
+    """No force with an empty tank; with a low one as much as suffices for the largest speed."""
     port = make(coupling="position_force", tank=PortTankParameters(initial=0.1), force=200.0)
     port.start(position=START, message=np.zeros(MESSAGE))
     port.set_state("tank", 0.02)
     row = port.step(position=START, message=message(1, felt=(-100.0, 0.0, 0.0)))
     np.testing.assert_allclose(row["force"], [20.0, 0.0, 0.0], rtol=1e-12)
-    assert told(row, "share")[0] == pytest.approx(0.2)
+    assert record_of(row, "share")[0] == pytest.approx(0.2)
     port.set_state("tank", 0.0)
     row = port.step(position=START, message=message(2, felt=(-100.0, 0.0, 0.0)))
     np.testing.assert_array_equal(row["force"], 0.0)
 
 
-def test_where_energy_lacks_the_port_damps():
+def test_port_damps_where_energy_is_missing():
     port = make(coupling="position_force", tank=PortTankParameters(initial=0.4, refill=30.0))
     port.start(position=START, message=np.zeros(MESSAGE))
     port.set_state("tank", 0.1)
@@ -148,9 +148,9 @@ def test_where_energy_lacks_the_port_damps():
     np.testing.assert_allclose(row["force"], [-0.75 * 30.0 * 0.1, 0, 0], rtol=1e-12)
 
 
-def test_position_and_force_couplings_are_as_they_say():
+def test_position_and_force_couplings():
     stiff = {"stiffness": 300.0, "damping": 20.0, "passive": False}
-    heard, rate, felt = (
+    arrival, rate, felt = (
         np.array([0.01, 0.0, 0.0]),
         np.array([0.2, 0, 0]),
         np.array([3.0, 1.0, -2.0]),
@@ -162,13 +162,13 @@ def test_position_and_force_couplings_are_as_they_say():
         for k in range(3):
             row = port.step(
                 position=START + x + (k - 2) * T * v,
-                message=message(k + 1, heard + (k - 2) * T * rate, felt),
+                message=message(k + 1, arrival + (k - 2) * T * rate, felt),
                 felt=[7.0, 8.0, 9.0],
             )
         return row
 
-    # x counts from where the first look was
-    spring = 300.0 * (heard - 2 * T * v) + 20.0 * (rate - v)
+    # x is relative to the first position
+    spring = 300.0 * (arrival - 2 * T * v) + 20.0 * (rate - v)
     leader = last(side="leader", coupling="position_force")
     np.testing.assert_allclose(leader["force"], -felt, rtol=1e-12)
     four = last(side="leader", coupling="four_channel", force_share=0.5)
@@ -179,22 +179,22 @@ def test_position_and_force_couplings_are_as_they_say():
     np.testing.assert_allclose(linear(four["message"], "felt"), [7.0, 8.0, 9.0])
 
 
-def test_what_arrives_is_taken_over_by_two_lags():
+def test_received_signal_passes_two_lags():
     """tau^2 A'' + 2 tau A' + A = A_arrived, integrated independently."""
-    tau, aim = 0.02, 0.7
+    tau, target = 0.02, 0.7
     port = make(smoothing=tau, passive=False)
-    heard = []
+    arrival = []
     for k in range(60):
-        port.step(position=START, message=message(k + 1, (aim, 0, 0)))
-        heard.append(port.states["heard"][0])
+        port.step(position=START, message=message(k + 1, (target, 0, 0)))
+        arrival.append(port.states["arrival"][0])
     truth = solve_ivp(
-        lambda t, y: [y[1], (aim - y[0] - 2 * tau * y[1]) / tau**2],
+        lambda t, y: [y[1], (target - y[0] - 2 * tau * y[1]) / tau**2],
         (0.0, 0.06), [0.0, 0.0], t_eval=T * np.arange(1, 61), rtol=1e-10, atol=1e-12,
     )  # fmt: skip
-    np.testing.assert_allclose(heard, truth.y[0], atol=1e-8)
+    np.testing.assert_allclose(arrival, truth.y[0], atol=1e-8)
 
 
-def test_a_wave_that_cannot_be_paid_is_sent_later():
+def test_a_wave_without_energy_is_sent_later():
     """A step of the position while the tank is at its reserve; later a little energy comes."""
     port, step = make(force=30.0), np.array([2e-3, 0.0, 0.0])
     port.start(position=START, message=np.zeros(MESSAGE))
@@ -207,27 +207,29 @@ def test_a_wave_that_cannot_be_paid_is_sent_later():
     whole = math.sqrt(2 * B) * step[0]
     assert sent[1] < 0.1 * whole
     assert sent[-1] == pytest.approx(whole, rel=1e-3)
-    assert told(row, "tank")[0] >= 0.0
+    assert record_of(row, "tank")[0] >= 0.0
     assert (np.diff(sent) >= 0.0).all()
 
 
 @pytest.mark.parametrize("lack", [0.0, 0.05, 0.4])
-def test_a_side_with_more_than_its_own_helps_one_that_lacks(lack):
-    """By a share of what it has more, as large as the lack is of the initial content."""
+def test_a_side_with_excess_energy_supports_one_that_lacks(lack):
+    """By a share of its excess, in the ratio of the lack to the initial content."""
     port = make(tank=PortTankParameters(initial=0.1, share=30.0), force=30.0)
     port.start(position=START, message=np.zeros(MESSAGE))
     port.set_state("tank", 0.7)
-    heard = message(1)
-    heard[FIELDS["lack"]] = lack
-    row = port.step(position=START, message=heard)
+    newest = message(1)
+    newest[FIELDS["lack"]] = lack
+    row = port.step(position=START, message=newest)
     expected = 30.0 * T * min(1.0, lack / 0.1) * 0.6
-    assert told(row, "sent")[0] == pytest.approx(expected, abs=1e-15)
-    assert told(row, "tank")[0] == pytest.approx(0.7 - expected, rel=1e-12)
+    assert record_of(row, "sent")[0] == pytest.approx(expected, abs=1e-15)
+    assert record_of(row, "tank")[0] == pytest.approx(0.7 - expected, rel=1e-12)
     port.set_state("tank", 0.1)
-    assert told(port.step(position=START, message=heard), "sent")[0] == told(row, "sent")[0]
+    assert (
+        record_of(port.step(position=START, message=newest), "sent")[0] == record_of(row, "sent")[0]
+    )
 
 
-def test_a_side_tells_its_lack_and_what_it_owes():
+def test_a_side_reports_its_lack_and_deferred_motion():
     tank = PortTankParameters(initial=0.1)
     port, step = make(tank=tank, force=30.0), np.array([2e-3, 0.0, 0.0])
     port.start(position=START, message=np.zeros(MESSAGE))
@@ -236,20 +238,20 @@ def test_a_side_tells_its_lack_and_what_it_owes():
     assert row["message"][FIELDS["lack"]][0] == pytest.approx(0.07)
     row = port.step(position=START + step, message=np.zeros(MESSAGE))
     sent = row["message"][FIELDS["signal"]][0] / math.sqrt(2 * B)
-    assert told(row, "owed")[0] == pytest.approx(step[0] - sent, rel=1e-9)
-    assert told(row, "owed")[0] > 1.9e-3
+    assert record_of(row, "owed")[0] == pytest.approx(step[0] - sent, rel=1e-9)
+    assert record_of(row, "owed")[0] > 1.9e-3
 
 
-def test_an_open_grip_neither_pushes_nor_counts():
+def test_an_open_grip_gives_no_force_and_no_work():
     port = make(connected=("grip",), passive=True)
     for k in range(4):
-        place = START + np.array([k * 1e-3, 0, 0])
-        row = port.step(position=place, message=message(k + 1, (0.1, 0, 0)), grip=[0.0])
+        position = START + np.array([k * 1e-3, 0, 0])
+        row = port.step(position=position, message=message(k + 1, (0.1, 0, 0)), grip=[0.0])
     np.testing.assert_array_equal(row["force"], 0.0)
-    assert told(row, "force").max() == 0.0
+    assert record_of(row, "force").max() == 0.0
 
 
-def test_what_is_no_number_is_not_believed():
+def test_nan_is_ignored():
     port = make()
     port.step(position=START, message=np.zeros(MESSAGE))
     row = port.step(position=[np.nan] * 3, message=np.zeros(MESSAGE))
@@ -266,12 +268,12 @@ def test_what_is_no_number_is_not_believed():
         ({"force_share": 1.5}, "force_share"),
     ],
 )
-def test_wrong_couplings_are_refused(wrong, key):
+def test_wrong_couplings_are_rejected(wrong, key):
     with pytest.raises(InputError, match=key):
         CouplingParameters(**wrong)
 
 
-def test_wrong_limits_and_tanks_are_refused():
+def test_wrong_limits_and_tanks_are_rejected():
     with pytest.raises(InputError, match="ticks_late"):
         PortLimits(1.0, 1.0, -1, T)
     with pytest.raises(InputError, match="initial"):

@@ -32,7 +32,7 @@ def view(load_scenario):
     station = build_station(settings, SCENARIOS)
     scene = Scene()
     half = station.part.coordinates.num_states // 2
-    point = station.task.evaluate(np.array([0.98, 0.0, 0.9]), station.initial_place)
+    point = station.task.evaluate(np.array([0.98, 0.0, 0.9]), station.initial_projection)
 
     def frame(place, force=(0.0, 0.0, 0.0), target=None):
         pose = np.concatenate([place, np.eye(3).ravel()])

@@ -1,4 +1,4 @@
-"""Meshes of strangers: what they name is not read, and what is left is geometry."""
+"""Meshes reduced to their geometry: no other file is read."""
 
 import base64
 import json

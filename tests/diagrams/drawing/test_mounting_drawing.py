@@ -7,8 +7,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from diagrams.drawing.mounting_look import (
-    MountingLook,
+from diagrams.drawing.mounting_drawing import (
+    MountingDrawing,
     ring_surface,
 )
 from diagrams.environment.mounting import Mounting
@@ -32,7 +32,7 @@ def test_a_ring_is_as_large_as_its_bore():
 
 
 def test_everything_is_drawn_where_it_is():
-    look = MountingLook(Mounting(PlateParameters(), X_WM, X_WF))
+    look = MountingDrawing(Mounting(PlateParameters(), X_WM, X_WF))
     middle = look.bores.vertices.reshape(4, -1, 3).mean(axis=(0, 1))
     np.testing.assert_allclose(middle[:2], X_WF.translation()[:2], atol=1e-9)
     names = {part.name for part in look.fixed}

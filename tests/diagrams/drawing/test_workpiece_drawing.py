@@ -38,7 +38,7 @@ def resting(station, y_t, R_e):
     pose = np.concatenate([y_t, np.ravel(R_e)])
     # six axes, or three slides
     q = station.initial_state[: station.robot.dimension]
-    point = station.path.evaluator(2)(y_t.tolist(), station.initial_place[0])
+    point = station.path.evaluator(2)(y_t.tolist(), station.initial_projection[0])
     times = PERIOD * np.arange(3)
     return RecordedMotion(times, *(np.tile(x, (3, 1)) for x in (q, pose, point)))
 
@@ -90,7 +90,7 @@ def test_what_is_drawn_is_what_is_touched(arm_in_a_notch):
     notch = arm_in_a_notch.notch
     notch.ball.distance = 0.1
     path = build_station_path(arm_in_a_notch)
-    look = NotchedWorkpiece(path, notch).look(-9.81 * UP)
+    look = NotchedWorkpiece(path, notch).drawing(-9.81 * UP)
     vertices, triangles = notch_surface(path, notch, UP)
     np.testing.assert_array_equal(look.surface.vertices, vertices)
     np.testing.assert_array_equal(look.surface.triangles, triangles)

@@ -1,4 +1,4 @@
-"""Everything that acts on the robot, at its tool and on its links."""
+"""Forces on the robot, at its tool and on its links."""
 
 from pathlib import Path
 
@@ -100,8 +100,8 @@ def test_a_law_that_knows_of_a_push_stays_on_the_path(six_axes, source):
     assert off[1] < 0.1 * off[0]
     assert log["push_force"].labels[::3] == ["link_3 x", "link_4 x"]
     assert np.abs(log["push_force"].values[:, 3:]).max() > 10.0
-    told = station.controllers[0].HasSubsystemNamed("external_torque")
-    assert told == (source == "known")
+    has_input = station.controllers[0].HasSubsystemNamed("external_torque")
+    assert has_input == (source == "known")
 
 
 def test_pushes_reach_a_plant_with_coupled_rotors(six_axes):
@@ -124,11 +124,11 @@ def test_pushes_reach_a_plant_with_coupled_rotors(six_axes):
     assert all(np.abs(part).max() > 1.0 for part in parts)
 
 
-def test_forces_on_links_are_in_manifold_axes_if_wanted(three_axes):
+def test_forces_on_links_are_in_manifold_axes_if_requested(three_axes):
     pulse = ForcePulse(0.0, 0.1, [0.0, 50.0, 0.0], ramp=0.02, frame="manifold", link="link_2")
     three_axes.forces = [pulse]
     station, log = run(three_axes, 0.06)
-    y_t, theta = log["y_t"].values[0].tolist(), station.initial_place[0]
+    y_t, theta = log["y_t"].values[0].tolist(), station.initial_projection[0]
     axes = station.task.manifold.axes(np.array(station.path.evaluator(2)(y_t, theta))).full()
     assert log["push_force"].values[-1] == pytest.approx(axes @ [0.0, 50.0, 0.0], abs=0.1)
 
@@ -165,8 +165,8 @@ def test_a_law_that_does_not_know_of_pushes_warns(six_axes):
 
 @pytest.mark.slow(but="known")
 @pytest.mark.parametrize("source", ["known", "observed"])
-def test_a_posture_is_told_of_pushes(six_axes, source):
-    """Whatever the law itself is told."""
+def test_the_posture_receives_pushes(six_axes, source):
+    """With every source of the law's external torque."""
     six_axes.forces = [PULSE]
     six_axes.controller.posture.yields = source
     six_axes.controller.posture.observer_rate = 300.0

@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.environment.channel_end import ChannelEnd
 from pfsc_drake.blocks.wiring_blocks import Constant
 from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEndpoint
 from pfsc_drake.systems.block_system import BlockSystem
 
 
@@ -24,22 +24,24 @@ class Wall:
 
 
 def message(count, felt):
-    told = np.zeros(MESSAGE)
-    told[0], told[FIELDS["felt"]] = count, [*felt, 0, 0, 0]
-    return told
+    fields = np.zeros(MESSAGE)
+    fields[0], fields[FIELDS["felt"]] = count, [*felt, 0, 0, 0]
+    return fields
 
 
-def station(lcm, side, told, wall, **options):
+def station(lcm, side, message, wall, **options):
     builder = DiagramBuilder()
-    end = ChannelEnd(TeleoperationEnd(lcm, side), 1e-3, lambda: wall.now, wall.sleep, **options)
+    end = ChannelEnd(
+        TeleoperationEndpoint(lcm, side), 1e-3, lambda: wall.now, wall.sleep, **options
+    )
     builder.AddNamedSystem("end", end)
-    source = builder.AddSystem(BlockSystem(Constant(told), 1e-3))
+    source = builder.AddSystem(BlockSystem(Constant(message), 1e-3))
     builder.Connect(source.get_output_port(), end.GetInputPort("sent"))
     builder.ExportOutput(end.GetOutputPort("arrived"), "arrived")
     return Simulator(builder.Build())
 
 
-def test_each_side_has_what_the_other_told_at_a_tick_before():
+def test_each_side_has_the_others_message_of_the_tick_before():
     lcm, wall = DrakeLcm("memq://"), Wall()
     leader = station(lcm, "leader", message(1.0, [4, 5, 6]), wall)
     follower = station(lcm, "follower", message(3.0, [7, 8, 9]), wall)

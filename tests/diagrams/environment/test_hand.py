@@ -1,4 +1,4 @@
-"""A hand in a station: where it pulls, what it sees, how it adds up with scripted forces."""
+"""A hand in a station: its force, its delay, and its sum with scripted forces."""
 
 from pathlib import Path
 
@@ -72,7 +72,7 @@ def test_a_stiff_robot_is_pulled_by_the_whole_spring(settings):
 
 
 @pytest.mark.slow
-def test_springs_of_hand_and_tool_share_the_way(settings):
+def test_springs_of_hand_and_tool_share_the_displacement(settings):
     """At rest k xi = K (xi_d - xi); along the path the tool arrives, for nothing holds it."""
     k, K = 1500.0, 500.0
     soft = CoordinateImpedance(Profile(2.0), Profile(60.0), Profile(0.0))
@@ -169,10 +169,10 @@ def test_an_open_path_may_be_held_at_its_very_ends(settings):
 
 @pytest.mark.slow
 def test_a_closed_path_counts_on(settings):
-    """A target one lap later is the same place."""
+    """A target one revolution later is the same point."""
     wrenches = []
-    lap = make_task(settings, SCENARIOS).path.length
-    for eta in (0.98, 0.98 + lap):
+    revolution = make_task(settings, SCENARIOS).path.length
+    for eta in (0.98, 0.98 + revolution):
         settings.hand = steady_hand([eta, 0.0, 0.01], frame="manifold", grip_ramp=0.005)
         wrenches.append(run(settings, 0.02)[1]["wrench_ext"].values)
     assert np.abs(wrenches[0][-1]).max() > 1.0
@@ -182,9 +182,9 @@ def test_a_closed_path_counts_on(settings):
 @pytest.mark.parametrize(
     ("data", "part"),
     [
-        ({"stiffness": 0.0}, r"'hand'.*stiffness = 0\.0; allowed: above 0"),
-        ({"frame": "tool"}, r"'hand'.*frame = tool; allowed: world, manifold"),
-        ({"waypoints": []}, r"'hand'.*waypoints = \[\]; allowed: one or more"),
+        ({"stiffness": 0.0}, r"hand\.stiffness = 0\.0; allowed: above 0"),
+        ({"frame": "tool"}, r"hand\.frame = tool; allowed: world, manifold"),
+        ({"waypoints": []}, r"hand\.waypoints = \[\]; allowed: one or more"),
         ({"waypoints": [{"time": 0.0, "position": [1.0]}]}, "allowed: 3 finite numbers"),
         ({"strength": 1.0}, r"unknown key 'hand\.strength'"),
     ],
@@ -197,7 +197,7 @@ def test_values_out_of_range(data, part):
 
 @pytest.mark.slow
 def test_the_shipped_operator(load_scenario):
-    """The first two seconds: led along the path, gently."""
+    """The first two seconds: guided gently along the path."""
     settings = load_scenario("operator_hand_6r")
     settings.simulation.fused = True
     _, log = run(settings, 2.0)

@@ -1,4 +1,4 @@
-"""A station whose tool is led from afar: what it needs, where it goes, what it keeps."""
+"""A teleoperated station: parameters, motion, energy."""
 
 from pathlib import Path
 
@@ -204,7 +204,7 @@ def test_wrong_teleoperations_are_refused(wrong, key):
         TeleoperationParameters(**wrong)
 
 
-def test_a_robot_elsewhere_is_led_over_a_bus():
+def test_a_robot_in_another_process_is_commanded_over_a_bus():
     settings = shipped_scenario("teleop_region")
     with pytest.raises(InputError, match=r"teleoperation.lcm = ''"):
         driven(settings)

@@ -1,4 +1,4 @@
-"""Mounting plates: where they come from, where they go, and all of that as bodies in a plant."""
+"""Mounting plates: poses in magazine and frame, and bodies in a plant."""
 
 import numpy as np
 import pytest
@@ -130,7 +130,7 @@ def test_random_misplacements_fill_two_balls():
         ("plate.frame.at=1.2", "plate.frame.at = 1.2; allowed: 0 to 1.08103 m"),
         ("plate.magazine.at=-0.1", "at = -0.1; allowed: zero or a positive number"),
         ("plate.frame.random.shift=0.1", "shift = 0.1"),
-        ("plate.pins.positions=[[0.1, 0.06], [0.2, 0.06]]", "a place on the plate"),
+        ("plate.pins.positions=[[0.1, 0.06], [0.2, 0.06]]", "a point on the plate"),
         ("plate.pins.positions=[[0.1, 0.06], [0.08, 0.06]]", "apart"),
         ("plate.pins.length=3.0e-3", "length = 0.003; allowed: more than the radius"),
         ("plate.rests=[[0.1, 0.06], [0.1, -0.06], [-0.1, 0]]", "from every pin"),

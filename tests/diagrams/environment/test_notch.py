@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.environment.workpieces import notch_surface, place_in_notch
+from diagrams.environment.workpieces import notch_surface, position_in_notch
 from diagrams.scenario import Scenario
 from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
@@ -84,11 +84,11 @@ def test_places_in_the_notch(settings, station):
     left = np.cross(UP, slope) / np.linalg.norm(np.cross(UP, slope))
     above = np.cross(slope, left) / np.linalg.norm(slope)
     seat = taught + notch.displacement
-    places = place_in_notch(path, notch, np.array([seat, seat + 1e-3 * left]), theta, UP)
+    places = position_in_notch(path, notch, np.array([seat, seat + 1e-3 * left]), theta, UP)
     below = notch.clearance * above @ UP  # the axis is above, not normal to the path
     np.testing.assert_allclose(places, [[0.0, -below], [1e-3, -below]], atol=1e-5)
     # from the start on, whose parameter the station knows
-    taught, slope = path.position.derivatives(np.array([station.initial_place[0]]), 1)[0]
+    taught, slope = path.position.derivatives(np.array([station.initial_projection[0]]), 1)[0]
     left = np.cross(UP, slope) / np.linalg.norm(np.cross(UP, slope))
     here = taught + notch.displacement + notch.clearance * UP + 1e-3 * left
     further = station.further_lengths(here[None])["notch_position"]
@@ -101,7 +101,9 @@ def test_starts_in_the_middle_of_the_notch_and_touches_nothing(settings, station
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
     y_t = station.robot.tool_position(station.initial_state[:3])
-    place = place_in_notch(station.path, settings.notch, y_t[None], station.initial_place[0], UP)
+    place = position_in_notch(
+        station.path, settings.notch, y_t[None], station.initial_projection[0], UP
+    )
     np.testing.assert_allclose(place, 0.0, atol=1e-9)
     contact = station.diagram.GetSubsystemByName("contact_wrench")
     wrench = contact.GetOutputPort("wrench").Eval(contact.GetMyContextFromRoot(root))
@@ -151,14 +153,14 @@ def test_the_gripper_hangs_from_the_plate_down_to_the_ball(settings, station):
 @pytest.mark.parametrize(
     ("change", "parts"),
     [
-        ("notch.radius=0.02", ["'notch': radius = 0.02", "more than ball.radius"]),
-        ("notch.depth=0.01", ["'notch': depth = 0.01"]),
-        ("notch.width=0.03", ["'notch': width = 0.03"]),
-        ("notch.displacement=[0, 0]", ["'notch': displacement", "3 finite numbers"]),
+        ("notch.radius=0.02", ["notch.radius = 0.02", "more than ball.radius"]),
+        ("notch.depth=0.01", ["notch.depth = 0.01"]),
+        ("notch.width=0.03", ["notch.width = 0.03"]),
+        ("notch.displacement=[0, 0]", ["notch.displacement", "3 finite numbers"]),
         ("notch.time_step=7e-4", ["notch.time_step", "whole fraction", "0.001"]),
-        ("notch.time_step=0.01", ["'notch': time_step = 0.01"]),
-        ("notch.ball.modulus=-1", ["'notch.ball': modulus = -1"]),
-        ("notch.ball.friction=-0.1", ["'notch.ball': friction = -0.1"]),
+        ("notch.time_step=0.01", ["notch.time_step = 0.01"]),
+        ("notch.ball.modulus=-1", ["notch.ball.modulus = -1"]),
+        ("notch.ball.friction=-0.1", ["notch.ball.friction = -0.1"]),
         ("notch.displacement=[0, 0, 0.2]", ["start: [", "outside the workspace"]),
         ("sensor.joint=elsewhere", ["sensor.joint", "elsewhere"]),
     ],

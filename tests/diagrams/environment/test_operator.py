@@ -1,4 +1,4 @@
-"""A person in a station: what acts on the tool, what yields, and switches for regions."""
+"""A person in a station: forces on the tool, compliance, switches for regions."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"
 
 @pytest.fixture
 def settings(load_exact_scenario):
-    """A circle, led by a person, with exact sensors and model."""
+    """A circle, guided by a person, with exact sensors and model."""
     settings = load_exact_scenario("vf_soft_circle")
     settings.hand, settings.sensor.noise = None, np.zeros(6)
     settings.operator = OperatorParameters()

@@ -1,4 +1,4 @@
-"""What a person did, as a file."""
+"""Files of recorded controls."""
 
 import numpy as np
 import pytest

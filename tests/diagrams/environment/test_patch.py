@@ -1,4 +1,4 @@
-"""A workpiece under a surface: where it stands, what touches it, and what is refused."""
+"""A workpiece under a surface: pose, contact geometry, refusals."""
 
 import dataclasses
 
@@ -44,13 +44,15 @@ def test_its_normal_turns_with_it(station):
 def contacts(station, depth):
     """Return how many surfaces touch, the tool point being so deep in the workpiece [m]."""
     start = station.task.start(np.zeros(3))
-    normal = station.workpiece.normal(station.task.place.axes(station.task.point(start)).full())
+    normal = station.workpiece.normal(
+        station.task.projected_manifold.axes(station.task.point(start)).full()
+    )
     vertices, _ = station.workpiece.mesh()
     foot = vertices[np.argmin(np.linalg.norm(vertices - start.target.y_t, axis=1))]
     target = dataclasses.replace(start.target, y_t=foot - depth * normal)
     q_J = station.part.posture(target, load().start)
     root = station.diagram.CreateDefaultContext()
-    station.place_robot(root, station.part.state_at_rest(q_J))
+    station.set_robot_state(root, station.part.state_at_rest(q_J))
     plant = station.part.plant
     query = plant.get_geometry_query_input_port().Eval(plant.GetMyContextFromRoot(root))
     triangles = HydroelasticContactRepresentation.kTriangle
@@ -66,10 +68,10 @@ def test_the_ball_touches_where_the_tool_point_is_on_the_workpiece(station):
 @pytest.mark.parametrize(
     ("change", "parts"),
     [
-        ("workpiece.shift=[0, 0]", ["'workpiece': shift", "3 finite numbers"]),
+        ("workpiece.shift=[0, 0]", ["workpiece.shift", "3 finite numbers"]),
         ("workpiece.turn_zyx_deg=[0, 60, 0]", ["turn_zyx_deg", "45"]),
         ("workpiece.time_step=7e-4", ["workpiece.time_step", "whole fraction"]),
-        ("workpiece.spacing=0", ["'workpiece': spacing"]),
+        ("workpiece.spacing=0", ["workpiece.spacing"]),
         ("start.offset=[0.001, 0]", ["start", "mm inside of the workpiece", "start.offset[0]"]),
         pytest.param(
             "start.offset=[-0.01, 0]",

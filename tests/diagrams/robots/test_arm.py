@@ -128,7 +128,7 @@ def test_robots_that_cannot_be_coupled(settings, model, rotors, part):
 
 
 @pytest.mark.slow
-def test_the_sensor_of_the_full_model_reads_what_a_joint_bears(settings, tmp_path):
+def test_the_sensor_of_the_full_model_reads_the_load_of_a_joint(settings, tmp_path):
     """With rotors on the base both plants move alike; one tells its reactions, the other not."""
     settings.controller.external_torque.source = "measured"
     settings.forces = [ForcePulse(0.05, 0.2, np.array([30.0, -40.0, 50.0]), ramp=0.02)]

@@ -1,4 +1,4 @@
-"""The DELTA station: what is connected to what, where it starts, and what it refuses."""
+"""The DELTA station: connections, start, refusals."""
 
 import numpy as np
 import pytest
@@ -94,7 +94,7 @@ def test_a_push_deflects_as_the_gains_say():
     J, masses = station.robot.jacobian_at(q), station.robot.parameters.masses
     D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
     acceleration = J @ np.linalg.solve(D, J.T @ force)
-    theta = np.array([station.initial_place[0]])
+    theta = np.array([station.initial_projection[0]])
     tangent = station.path.position.derivatives(theta, 1)[0, 1]
     tangent /= np.linalg.norm(tangent)
     along = tangent * (tangent @ acceleration)
@@ -120,7 +120,7 @@ def test_starts_at_rest_beside_the_path():
     distance = np.linalg.norm(station.path.position.derivatives(theta, 0)[:, 0] - y_t, axis=1)
     nearest = int(np.argmin(distance))
     assert distance[nearest] == pytest.approx(0.010, abs=1e-7)
-    assert station.initial_place[0] == pytest.approx(theta[nearest], abs=theta[1] - theta[0])
+    assert station.initial_projection[0] == pytest.approx(theta[nearest], abs=theta[1] - theta[0])
 
 
 def test_the_first_force_is_weight_and_proportional_part():
@@ -133,7 +133,7 @@ def test_the_first_force_is_weight_and_proportional_part():
     tau = station.controller.drive(station.blocks, root)
     q = station.initial_state[:3]
     y_t = station.robot.tool_position(q)
-    theta = np.array([station.initial_place[0]])
+    theta = np.array([station.initial_projection[0]])
     offset = y_t - station.path.position.derivatives(theta, 0)[0, 0]
     J, masses = station.robot.jacobian_at(q), station.robot.parameters.masses
     D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
@@ -153,7 +153,7 @@ def test_the_first_force_is_weight_and_proportional_part():
         ("hold_back={force: -5}", ["hold_back.force", "-5"]),
         ("robot.rotor_coupling=comau_racer_1_4", ["robot.rotor_coupling", "none for a DELTA"]),
         ("robot.joint_damping=[1, 1, 1]", ["robot.joint_damping", "none for a DELTA"]),
-        ("friction={f_c: [1, 1]}", ["friction.f_c", "3 joints"]),
+        ("friction={f_c: [1, 1]}", ["friction.f_c = [1.0, 1.0]; allowed: 3 values, one per joint"]),
         ("controller.law=velocity_servo", ["controller.law", "velocity_servo", "rigid"]),
         ("controller.law=elastic", ["controller.law", "elastic", "rigid"]),
         ("robot.plant=lagrange", ["plant = lagrange", "multibody, analytic"]),
@@ -247,7 +247,7 @@ def test_replay_draws_robot_and_path_upside_down():
     evaluator, q = station.path.evaluator(2), station.initial_state[:3]
     y_t = station.robot.tool_position(q)
     pose = np.concatenate([y_t, np.eye(3).ravel()])
-    point = evaluator(y_t.tolist(), station.initial_place[0])
+    point = evaluator(y_t.tolist(), station.initial_projection[0])
     motion = RecordedMotion(
         PERIOD * np.arange(3), np.tile(q, (3, 1)), np.tile(pose, (3, 1)), np.tile(point, (3, 1))
     )

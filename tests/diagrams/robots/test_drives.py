@@ -139,11 +139,11 @@ def test_torques_act_late_and_through_a_low_pass(settings):
         simulator.AdvanceTo((k + 0.5) * TICK)
         acting.append(station.blocks.output(root, "hold.held"))
     _, signals = station.log.read(root)
-    told = signals["law"][:, station.law.layout.drive]
-    assert np.abs(np.diff(told[-20:], axis=0)).max() > 0.1
+    commands = signals["law"][:, station.law.layout.drive]
+    assert np.abs(np.diff(commands[-20:], axis=0)).max() > 0.1
     w = 2.0 * np.pi * 50.0 * TICK
-    passed = [told[0]]
-    for torque in told[1:]:
+    passed = [commands[0]]
+    for torque in commands[1:]:
         passed.append(passed[-1] + w / (1.0 + w) * (torque - passed[-1]))
     np.testing.assert_allclose(acting[:2], [weight, weight], rtol=1e-9)
     np.testing.assert_allclose(acting[2:], passed[:58], rtol=1e-9)
@@ -320,7 +320,7 @@ def test_friction_of_the_robot_itself(settings):
 @pytest.mark.parametrize(
     ("changes", "part"),
     [
-        ({"friction.f_c": [1.0]}, r"friction\.f_c: 1 values; the robot has 3"),
+        ({"friction.f_c": [1.0]}, r"friction\.f_c = \[1\.0\]; allowed: 3 values"),
         ({"friction.file": "unknown"}, "unknown.*comau_racer_1_4"),
         ({"friction.f_v": [1.0] * 3, "simulation.integrator": "explicit_euler"}, "integrator"),
         ({"controller.law": "velocity_servo", "servo.bandwidth": 2000.0}, "bandwidth.*1000"),

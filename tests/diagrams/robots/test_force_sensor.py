@@ -1,4 +1,4 @@
-"""The force/torque sensor of a station: its delay, and what is said of it beforehand."""
+"""The force/torque sensor of a station: delay and warnings."""
 
 import numpy as np
 import pytest
@@ -31,11 +31,11 @@ def test_the_controller_has_a_reading_exactly_its_delay_later(load_exact_scenari
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    readings, told = [], []
+    readings, delayed = [], []
     for tick in range(10):
         if tick > 0:  # each time before the update of the tick
             simulator.AdvanceTo(tick * station.controller.period)
         readings.append(station.blocks.output(root, "force_torque_sensor.measured_wrench"))
-        told.append(station.blocks.output(root, "force_sensor_delay.held"))
+        delayed.append(station.blocks.output(root, "force_sensor_delay.held"))
     assert np.ptp(readings, axis=0).min() > 0.0
-    np.testing.assert_array_equal(told[ticks:], readings[:-ticks])
+    np.testing.assert_array_equal(delayed[ticks:], readings[:-ticks])

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.robots.arm_model import believe_arm, read_arm
-from diagrams.robots.belief import WORKPIECE, BeliefSource
+from diagrams.robots.arm_model import nominal_arm, read_arm
+from diagrams.robots.nominal_model import WORKPIECE, NominalModelSource
 from diagrams.scenario import (
-    HeldWorkpieceParameters,
+    HolderWorkpiece,
     ModelErrorParameters,
     RobotParameters,
     SolidParameters,
@@ -29,7 +29,7 @@ MOVED = np.eye(24)[6:12]
 
 
 def test_the_inertia_of_a_box_and_a_rod():
-    M = HeldWorkpieceParameters(solids=[BOX, ROD]).inertia
+    M = HolderWorkpiece(solids=[BOX, ROD]).inertia
     x, y, z = BOX.box
     box = BOX.mass / 12.0 * np.diag([y**2 + z**2, x**2 + z**2, x**2 + y**2])
     r, length = ROD.cylinder
@@ -46,16 +46,16 @@ def test_the_inertia_of_a_box_and_a_rod():
 
 @pytest.fixture(name="source")
 def fixture_source():
-    workpiece = HeldWorkpieceParameters(
+    workpiece = HolderWorkpiece(
         pose=PoseParameters(position=[0.0, 0.02, 0.1], zyx_deg=[0.0, 30.0, 0.0]), solids=[BOX, ROD]
     )
     robot = RobotParameters(model="comau_racer_1_4_elastic", tool_frame="tool_point")
     error = ModelErrorParameters(tool_mass=-0.2)
-    return BeliefSource(robot, "", error, Path()).holding(workpiece)
+    return NominalModelSource(robot, "", error, Path()).holding(workpiece)
 
 
 def test_the_workpiece_is_the_tool_of_the_robot_that_holds_it(source):
-    arm = read_arm(source.robot, Path(), before_finalizing=source.carried)
+    arm = read_arm(source.robot, Path(), before_finalizing=source.add_payload)
     plant, context = arm.plant, arm.plant.CreateDefaultContext()
     grip = plant.GetFrameByName("tool_point")
     X_GC = plant.CalcRelativeTransform(context, grip, arm.tool)
@@ -74,16 +74,18 @@ def test_the_workpiece_is_the_tool_of_the_robot_that_holds_it(source):
     assert np.allclose(gravity_function(arm.chain)(q).full().ravel(), weight, rtol=0, atol=1e-9)
 
 
-def test_its_mass_is_believed_with_an_error(source):
-    arm = read_arm(source.robot, Path(), before_finalizing=source.carried)
-    belief, _ = believe_arm(arm, source)
-    assert belief.robot.gather("mass")[-1] == pytest.approx(arm.chain.gather("mass")[-1] - 0.2)
+def test_its_mass_has_the_error_of_the_nominal_model(source):
+    arm = read_arm(source.robot, Path(), before_finalizing=source.add_payload)
+    nominal_model, _ = nominal_arm(arm, source)
+    assert nominal_model.robot.gather("mass")[-1] == pytest.approx(
+        arm.chain.gather("mass")[-1] - 0.2
+    )
 
 
-def test_it_is_held_once(source):
+def test_it_is_added_once(source):
     with pytest.raises(InputError, match=f"has a link '{WORKPIECE}'"):
         read_arm(
             source.robot,
             Path(),
-            before_finalizing=lambda plant: [source.carried(plant) for _ in range(2)],
+            before_finalizing=lambda plant: [source.add_payload(plant) for _ in range(2)],
         )

@@ -73,7 +73,7 @@ def test_a_law_on_the_motors_wants_no_links(load_scenario):
 
 
 def drawn(load_scenario, sides, state, seed, errors=1.0):
-    """Return the log of 0.4 s of which errors were drawn as the controller has them told.
+    """Return the log of 0.4 s with random errors of the controller's error model.
 
     Args:
         load_scenario: Loads a shipped scenario.
@@ -132,6 +132,6 @@ def test_deviations_promise_what_is_kept(load_scenario, sides, state):
     assert within(drawn(load_scenario, sides, state, 0, errors=3.0))[0] < 0.8
 
 
-def test_who_measures_the_links_is_told_no_deviation(load_scenario):
+def test_measured_links_have_no_deviation(load_scenario):
     station = build_station(load_scenario("pfc_elastic_3r"), FOLDER)
     assert not [name for name in station.log.rows if "deviation" in name or "found" in name]

@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.robots.arm import add_arm
 from diagrams.station_options import StationOptions
-from experiments.studies.margins.analysis import _believable
+from experiments.studies.margins.analysis import _feasible_errors
 from experiments.studies.margins.box import ErrorBox
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
@@ -47,41 +47,41 @@ def fixture_settings(load_scenario, massless):
 
 
 def test_the_sensor_sits_at_the_flange_by_default(load_scenario, settings):
-    arm = add_arm(DiagramBuilder(), StationOptions(settings, Path()).belief_source).true
+    arm = add_arm(DiagramBuilder(), StationOptions(settings, Path()).nominal_model_source).actual
     assert arm.sensor_joint("").name() == "link_6-flange"
     assert arm.sensor_joint("flange-tool0").name() == "flange-tool0"
     assert arm.tool_load("").mass == 0.0
     for name in ("comau_racer_1_4", "comau_racer_1_4_elastic", "franka_emika_panda", "scara_600"):
         settings.robot.model = name
         assert add_arm(
-            DiagramBuilder(), StationOptions(settings, Path()).belief_source
-        ).true.sensor_joint("").name() == ("weld_tool")
+            DiagramBuilder(), StationOptions(settings, Path()).nominal_model_source
+        ).actual.sensor_joint("").name() == ("weld_tool")
     settings.robot.tool_frame = "link_4"
     settings.robot.model = "scara_600"
-    arm = add_arm(DiagramBuilder(), StationOptions(settings, Path()).belief_source).true
+    arm = add_arm(DiagramBuilder(), StationOptions(settings, Path()).nominal_model_source).actual
     with pytest.raises(InputError, match=r"sensor.joint: the tool frame 'link_4' belongs to the"):
         arm.sensor_joint("")
 
 
-def test_a_box_of_errors_leaves_out_what_no_robot_could_be(settings):
-    """Said before anything is linearized: nothing can be taken off a tool without mass."""
-    part = add_arm(DiagramBuilder(), StationOptions(settings, Path()).belief_source)
+def test_a_box_of_errors_omits_impossible_models(settings):
+    """Before the linearization: the mass of a tool without mass cannot be reduced."""
+    part = add_arm(DiagramBuilder(), StationOptions(settings, Path()).nominal_model_source)
     remarks = []
-    singles, together = _believable(ErrorBox(), settings, part, Path(), remarks)
+    singles, together = _feasible_errors(ErrorBox(), settings, part, Path(), remarks)
     assert [str(error) for _, error in singles] == [
-        "masses believed 5 % too low",
-        "masses believed 5 % too high",
-        "tool believed 0.1 kg too heavy",
+        "nominal masses 5 % too low",
+        "nominal masses 5 % too high",
+        "nominal tool 0.1 kg too heavy",
     ]
     assert [str(error) for error in together] == [
-        "believed masses -5 %, tool +0.1 kg",
-        "believed masses +5 %, tool +0.1 kg",
+        "nominal masses -5 %, tool +0.1 kg",
+        "nominal masses +5 %, tool +0.1 kg",
     ]
     (remark,) = remarks
-    assert "tool believed 0.1 kg too light: left out" in remark and "has no mass" in remark
+    assert "nominal tool 0.1 kg too light: omitted" in remark and "has no mass" in remark
     settings.model_error.tool_mass = -0.1
     with pytest.raises(InputError, match=r"model_error.tool_mass = -0.1 kg; allowed: 0 kg or more"):
-        part.check_belief(StationOptions(settings, Path()).belief_source, "")
+        part.check_nominal_model(StationOptions(settings, Path()).nominal_model_source, "")
     settings.robot.model = "comau_racer_1_4"
-    whole = add_arm(DiagramBuilder(), StationOptions(settings, Path()).belief_source)
-    assert len(_believable(ErrorBox(), settings, whole, Path(), remarks)[1]) == 4
+    whole = add_arm(DiagramBuilder(), StationOptions(settings, Path()).nominal_model_source)
+    assert len(_feasible_errors(ErrorBox(), settings, whole, Path(), remarks)[1]) == 4

@@ -1,4 +1,4 @@
-"""What a controller of a robot elsewhere is told, and that it is a network like any other."""
+"""Inputs of a controller whose robot is in another process, and its network."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def elastic(state, sides):
 
 @pytest.mark.slow(but="motors")
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "inputs"),
     [
         (shipped_scenario("pfc_panda_7r"), {"joint_state": 28, "stop_request": 1}),
         (
@@ -33,13 +33,13 @@ def elastic(state, sides):
     ],
     ids=["rigid", "torques", "motors", "forces"],
 )
-def test_what_a_controller_is_told(settings, told):
+def test_inputs_of_a_controller(settings, inputs):
     settings, folder = driven(settings)[0], find_scenario("pfc_panda_7r").parent
     settings.simulation.fused = False
     station = build_station(settings, folder, remote=True)
     part = controller_part(station)
     found = {name: port.size for name, port in part.network.inputs.items()}
-    assert found == told | {"override": 1}
+    assert found == inputs | {"override": 1}
     sources = {
         (target.get_name(), target.get_input_port(i).get_name()): source
         for (target, i), (source, _) in station.diagram.connection_map().items()

@@ -53,9 +53,9 @@ def _run(file, *changes):
 @pytest.mark.slow
 def test_it_follows_a_path_and_tells_no_torques(scenario, capsys):
     status, out = _run(scenario)
-    told = capsys.readouterr()
-    assert status == 0, told.err
-    assert "without mass" in told.out + told.err
+    printed = capsys.readouterr()
+    assert status == 0, printed.err
+    assert "without mass" in printed.out + printed.err
     metrics = (out / "metrics.json").read_text()
     assert "max_path_deviation" in metrics
     assert "torque" not in metrics
@@ -96,7 +96,7 @@ def test_margins_need_masses(scenario, capsys):
     assert "robot.model = arm.urdf; allowed: a model with masses" in capsys.readouterr().err
 
 
-def test_a_believed_model_has_masses_as_the_robot_has(scenario, capsys):
+def test_a_nominal_model_has_masses_if_the_robot_has(scenario, capsys):
     text = (scenario.parent / "arm.urdf").read_text()
     mass = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" '
     mass += 'ixy="0" ixz="0" iyz="0"/></inertial>'

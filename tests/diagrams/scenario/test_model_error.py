@@ -1,4 +1,4 @@
-"""What a scenario says is believed wrongly."""
+"""Model errors of a scenario."""
 
 import numpy as np
 import pytest
@@ -99,7 +99,7 @@ def test_draws_that_leave_nothing():
         ({"link_length": 0.001}, ["link_length = 0.001 is a factor"]),
     ],
 )
-def test_what_was_perhaps_meant_as_an_error_is_said(data, parts):
+def test_factors_that_may_be_meant_as_errors(data, parts):
     (warning,) = _load(**data).warnings
     assert all(part in warning for part in parts)
 

@@ -1,4 +1,4 @@
-"""Recorded inputs happen at the same times, whatever the sampling time of the repetition."""
+"""Recorded inputs act at the same times with any sampling time."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a scenario says of regions."""
+"""Regions of a scenario."""
 
 import pytest
 
@@ -94,11 +94,11 @@ def test_what_has_an_inside(shape, has_inside):
         ({"stiffness": 0.0}, "stiffness = 0.0; allowed: 1 to 1e\\+06 N/m, or null"),
         (
             {"motion": {TAG_KEY: "!Shift", "direction": [0, 0, 0]}},
-            r"'motion': direction = \[0.0, 0.0, 0.0\]; allowed: 3 numbers, not all zero",
+            r"motion\.direction = \[0.0, 0.0, 0.0\]; allowed: 3 numbers, not all zero",
         ),
         (
             {"motion": {TAG_KEY: "!Shift", "way": {"points": [0, 0.1]}}},
-            r"'motion.way': points = \[0.0, 0.1\]; allowed: the last as the first, with repeat",
+            r"motion\.way\.points = \[0.0, 0.1\]; allowed: the last as the first, with repeat",
         ),
         (
             {"motion": {TAG_KEY: "!Shift", "way": {"points": [0, 20, 0]}}},

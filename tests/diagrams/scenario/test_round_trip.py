@@ -1,4 +1,4 @@
-"""A scenario that is written and read again is the same, whatever it says."""
+"""A scenario that is written and read again is the same."""
 
 import dataclasses
 import types

@@ -1,4 +1,4 @@
-"""The schema of a scenario file, and what is left of one where the robot stands elsewhere."""
+"""Schema of a scenario file, and its reduction for a robot in another process."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Compliance of a path following station: sensor, taring, filter, and what is refused."""
+"""Compliance of a path following station: sensor, taring, filter, refusals."""
 
 from pathlib import Path
 

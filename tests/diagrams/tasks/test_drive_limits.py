@@ -1,4 +1,4 @@
-"""References that wait for the drives: what is expected comes, and what fits is left alone."""
+"""References slowed for the drives: commanded and predicted motion, unchanged references."""
 
 import re
 from pathlib import Path
@@ -50,7 +50,7 @@ def run(settings, duration=0.0):
     station.set_start(simulator.get_mutable_context())
     simulator.AdvanceTo(duration or station.reference_duration)
     times, raw = station.log.read(simulator.get_context())
-    across = indices(station.task.place.coordinates, Kind.TRANSVERSAL)
+    across = indices(station.task.projected_manifold.coordinates, Kind.TRANSVERSAL)
     xi = raw["law"][:, station.law.layout.manifold_state][:, across]
     return station, times, raw["law"], np.linalg.norm(xi, axis=1).max()
 
@@ -59,8 +59,8 @@ def test_a_reference_that_is_too_fast_waits(settings):
     """Torques of the simulated plant are those expected, within the reserve, on the path."""
     station, times, law, deviation = run(settings())
     plan, layout = station.task.drive_plan, station.law.layout
-    assert plan.is_slowed and len(plan.said) == 1
-    assert "slowed to" in plan.said[0] and "of axis" in plan.said[0]
+    assert plan.is_slowed and len(plan.messages) == 1
+    assert "slowed to" in plan.messages[0] and "of axis" in plan.messages[0]
     assert deviation < 5e-5
     torque, limits = law[:, layout.drive], station.law.limits
     share = np.abs(torque / limits).max()
@@ -88,7 +88,7 @@ def test_a_reference_that_is_too_fast_waits(settings):
 def test_told_only_it_leaves_the_path(settings):
     station, _, law, deviation = run(settings(limits="warn"), 0.6)
     assert not station.task.drive_plan.is_slowed
-    assert "limits: respect would slow it down" in station.task.drive_plan.said[0]
+    assert "limits: respect would slow it down" in station.task.drive_plan.messages[0]
     assert law[:, station.law.layout.status][:, 2].any() and deviation > 1e-4
 
 
@@ -99,7 +99,7 @@ def test_a_reference_that_fits_is_left_as_it_is(settings):
     asked = make_task(given, Path()).motion
     assert np.array_equal(station.task.motion.coefficients, asked.coefficients)
     assert np.array_equal(station.task.motion.breakpoints, asked.breakpoints)
-    assert not station.task.drive_plan.is_slowed and station.task.drive_plan.said == []
+    assert not station.task.drive_plan.is_slowed and station.task.drive_plan.messages == []
 
 
 def quick(name, load_exact_scenario):
@@ -121,10 +121,11 @@ def test_other_robots_laws_and_surfaces_wait_too(name, load_exact_scenario):
     plan, n = station.task.drive_plan, station.robot.dimension
     assert plan.is_slowed
     asked, planned = (
-        np.max(np.abs(demand[:, :n]) / plan.limits[:n]) for demand in (plan.asked, plan.demand)
+        np.max(np.abs(demand[:, :n]) / plan.limits[:n])
+        for demand in (plan.requested_demand, plan.demand)
     )
     assert planned < min(asked, 0.75)
-    waited = np.trapezoid(1.0 - plan.pace, plan.times)
+    waited = np.trapezoid(1.0 - plan.speed_scaling, plan.times)
     assert plan.waiting_time == pytest.approx(waited) and waited > 0.0
 
 
@@ -137,10 +138,11 @@ def test_velocity_servos_keep_a_reserve_of_speed(settings):
     given.controller.gains = {"velocity_servo": LawGains(eta=poles, xi=poles, phi=poles)}
     plan = build_station(given, Path()).task.drive_plan
     asked, planned = (
-        np.max(np.abs(demand[:, 3:]) / plan.limits[3:]) for demand in (plan.asked, plan.demand)
+        np.max(np.abs(demand[:, 3:]) / plan.limits[3:])
+        for demand in (plan.requested_demand, plan.demand)
     )
     assert asked > 0.75 and 0.5 < planned <= 0.7
-    assert "% of the speed of axis" in plan.said[0]
+    assert "% of the speed of axis" in plan.messages[0]
 
 
 @pytest.mark.slow
@@ -148,7 +150,7 @@ def test_what_seems_too_much_at_a_glance_is_looked_at_closely(load_exact_scenari
     """Seven axes at 93 % of a joint's speed, which the coarse grid of a glance overstates."""
     settings = load_exact_scenario("pfc_elastic_7r")
     station = build_station(settings, find_scenario("pfc_elastic_7r").parent)
-    assert not station.task.drive_plan.said
+    assert not station.task.drive_plan.messages
     asked = make_task(settings, find_scenario("pfc_elastic_7r").parent).motion
     np.testing.assert_array_equal(station.task.motion.breakpoints, asked.breakpoints)
 
@@ -189,7 +191,7 @@ def test_a_wrist_that_becomes_singular_on_the_way_is_named_with_its_place(turnin
     faults = raw["law"][:, station.law.layout.status][:, 0]
     i = int(np.argmax(faults != 0.0))
     assert faults[i] in (Fault.SINGULAR, Fault.JOINT_SPEED)  # joints become fast just before
-    eta = raw["manifold_point"][i, station.task.place.layout.eta][0]
+    eta = raw["manifold_point"][i, station.task.projected_manifold.layout.eta][0]
     assert eta - 1e-3 < float(place[1]) < eta + 6e-3
 
 
@@ -220,7 +222,7 @@ def test_weight_above_the_reserve_is_said_and_not_waited_for(settings):
         weak = settings(**slow)
         weak.controller.effort_scale = demand[axis] / share
         plan = build_station(weak, Path()).task.drive_plan
-        said = next(line for line in plan.said if line.startswith("holding still takes"))
+        said = next(line for line in plan.messages if line.startswith("holding still takes"))
         found = re.search(r"takes (\d+) % of the torque of axis (\d) at .* leaves 70 %", said)
         assert found and words in said and int(found[2]) == axis + 1
         assert 0.8 * share < int(found[1]) / 100.0 < share

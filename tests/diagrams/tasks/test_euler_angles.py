@@ -49,10 +49,10 @@ def test_along_a_path(load_scenario, manifold):
     settings.reference.hold_back = None
     folder, said = find_scenario("pfc_compliant_6r").parent, settings.path.orientation
     plain = make_task(settings, folder)
-    assert plain.manifold.tool.euler is plain.place.tool.euler is None
+    assert plain.manifold.tool.euler is plain.projected_manifold.tool.euler is None
     said.jacobian = "analytic"
     task = make_task(settings, folder)
-    assert task.manifold.tool.euler == task.place.tool.euler == "zyx"
+    assert task.manifold.tool.euler == task.projected_manifold.tool.euler == "zyx"
     assert task.warnings == plain.warnings
     said.convention = "zyz"
     (sentence,) = set(make_task(settings, folder).warnings) - set(plain.warnings)

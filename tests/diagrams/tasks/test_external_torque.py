@@ -1,4 +1,4 @@
-"""What the law of a station is told about forces on the tool."""
+"""External torques in the law of a station with forces on the tool."""
 
 from pathlib import Path
 

@@ -60,7 +60,7 @@ def test_limits_are_met_on_the_path(name, way, leads, fastest):
     simulator.AdvanceTo(station.reference_duration)
     times, raw = station.log.read(simulator.get_context())
     law, layout, plan = raw["law"], station.law.layout, station.task.drive_plan
-    across = indices(station.task.place.coordinates, Kind.TRANSVERSAL)
+    across = indices(station.task.projected_manifold.coordinates, Kind.TRANSVERSAL)
     assert np.linalg.norm(law[:, layout.manifold_state][:, across], axis=1).max() < 1e-5
     torque, limits = law[:, layout.drive], plan.limits[: station.robot.dimension]
     assert np.abs(torque / limits).max() < 1.01 * (1.0 - RESERVE)
@@ -68,8 +68,8 @@ def test_limits_are_met_on_the_path(name, way, leads, fastest):
     planned = plan.demand.T[: len(limits)]
     expected = np.array([np.interp(middle, plan.times, tau) for tau in planned]).T
     assert np.abs(expected - torque).max() < 0.02 * np.abs(torque).max()
-    assert not plan.said and plan.limiting.largest.max() < 1.006
-    parts = plan.limiting.of_the_way(plan.speed)
+    assert not plan.messages and plan.limiting.largest.max() < 1.006
+    parts = plan.limiting.path_shares(plan.speed)
     assert sum(parts.values()) == pytest.approx(1.0) and parts["none"] < 0.8
 
 
@@ -98,7 +98,7 @@ def test_from_rest_to_rest_as_smooth_as_the_law_needs(fastest):
 def test_a_largest_velocity_is_kept(fastest):
     plan = build(fastest(velocity=0.3)).task.drive_plan
     assert 0.29 < plan.speed.max() < 0.302
-    assert plan.limiting.of_the_way(plan.speed)["velocity"] > 0.5
+    assert plan.limiting.path_shares(plan.speed)["velocity"] > 0.5
 
 
 @pytest.mark.slow
@@ -109,9 +109,9 @@ def test_a_largest_velocity_is_kept(fastest):
 def test_surfaces_redundant_arms_and_other_laws(name, way, fastest):
     station = build(fastest(name, way), name)
     plan, n = station.task.drive_plan, station.robot.dimension
-    assert not plan.said and plan.limiting.largest.max() < 1.006
+    assert not plan.messages and plan.limiting.largest.max() < 1.006
     assert np.all(np.abs(plan.demand[:, :n]) <= 1.006 * (1.0 - RESERVE) * plan.limits[:n])
-    assert plan.limiting.of_the_way(plan.speed)["none"] < 0.8
+    assert plan.limiting.path_shares(plan.speed)["none"] < 0.8
     # straight in the coordinates of what is followed
     asked = fastest(name, way).reference
     ends = asked.places or [[point] for point in asked.points]
@@ -122,11 +122,11 @@ def test_surfaces_redundant_arms_and_other_laws(name, way, fastest):
 
 
 @pytest.mark.slow
-def test_a_posture_that_moves_is_told_of(fastest):
+def test_a_posture_that_moves_is_reported(fastest):
     """It stays where it is in the plan."""
     settings = fastest("pfc_panda_7r", -0.05)
     settings.controller.posture.task = "limits"
-    (said,) = build(settings, "pfc_panda_7r").task.drive_plan.said
+    (said,) = build(settings, "pfc_panda_7r").task.drive_plan.messages
     assert "planned for a posture that stays" in said
 
 
@@ -165,11 +165,11 @@ def test_weights_that_drives_cannot_hold_are_named(fastest):
         build(settings)
 
 
-def test_where_a_hand_leads_nobody_plans(fastest):
+def test_no_fastest_motion_with_hand_guiding(fastest):
     settings = fastest()
     gains = settings.controller.gains["elastic"].eta
     gains.poles, gains.integral_pole, gains.free = [-60.0, -60.0, -250.0], 0.0, True
-    with pytest.raises(InputError, match="speed = fastest; allowed: asked; where a hand leads"):
+    with pytest.raises(InputError, match="speed = fastest; allowed: asked; a hand-guided motion"):
         build(settings)
 
 

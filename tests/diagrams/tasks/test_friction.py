@@ -1,4 +1,4 @@
-"""What stations do about friction: each source on robots of each kind, in the loop."""
+"""Friction compensation of stations: each source on robots of each kind, in the loop."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.robots.belief import believed_robot
+from diagrams.robots.nominal_model import nominal_robot
 from diagrams.scenario import JointFrictionParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError
@@ -84,7 +84,7 @@ def test_the_estimate_is_the_true_friction(arm):
 
 @pytest.mark.slow
 def test_forces_on_the_tool_that_are_known_are_no_friction_of_rigid_joints(load_scenario):
-    """Pushed at rest: what the law is told of is not taken for friction."""
+    """Pushed at rest: known forces are not taken for friction."""
     settings = load_scenario("pfc_compliant_6r")
     settings.forces[0].begin, settings.forces[0].ramp = 0.0, 0.05
     settings.forces[0].end, settings.reference.dwell = 2.0, 1.0
@@ -143,8 +143,8 @@ def test_friction_that_drifts(arm):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"source": "model"}, r"source = model: nothing is believed of friction; write"),
-        ({"source": "observer", "observer": "kalman"}, "observer = kalman: nothing is believed"),
+        ({"source": "model"}, r"source = model: no nominal friction; write"),
+        ({"source": "observer", "observer": "kalman"}, "observer = kalman: no nominal friction"),
     ],
 )
 def test_without_coefficients(arm, change, message):
@@ -163,12 +163,12 @@ def test_wrong_choices_are_refused(arm):
         build_station(arm, Path())
     friction.kalman.momentum_noise = [1.0]
     friction.believed = JointFrictionParameters([1.0], [1.0, 2.0, 3.0])
-    with pytest.raises(InputError, match=r"controller.friction.believed.f_c: 1 values"):
+    with pytest.raises(InputError, match=r"controller.friction.believed.f_c = \[1\.0\]; allowed: "):
         build_station(arm, Path())
 
 
 @pytest.mark.slow
-def test_servos_are_left_to_overcome_friction_and_that_is_said(load_scenario):
+def test_friction_is_left_to_the_servos_with_a_warning(load_scenario):
     settings = load_scenario("pfc_compliant_6r")
     settings.controller.law = "velocity_servo"
     for source, watched in (("observer", False), ("none", True), ("none", False)):
@@ -183,9 +183,9 @@ def test_servos_are_left_to_overcome_friction_and_that_is_said(load_scenario):
 def test_a_difference_quotient_is_the_velocity_half_an_interval_ago(load_scenario, load_arm):
     settings, robot = load_scenario("pfc_elastic_3r"), load_arm("comau_racer_1_4_elastic_3r").chain
     T, t = settings.controller.sampling_time, 0.7
-    assert believed_robot(robot, settings.encoders, T).velocity_delay == 0.0
+    assert nominal_robot(robot, settings.encoders, T).velocity_delay == 0.0
     settings.encoders.difference_quotient = True
-    delay = believed_robot(robot, settings.encoders, T).velocity_delay
+    delay = nominal_robot(robot, settings.encoders, T).velocity_delay
     # exactly so of a motion with constant acceleration
     q = [3.0 * time**2 - time for time in (t, t - T)]
     assert (q[0] - q[1]) / T == pytest.approx(6.0 * (t - delay) - 1.0, rel=1e-9)

@@ -32,8 +32,8 @@ def test_names_of_modes_and_regions(wedge):
     assert "mode" in station.log.rows
 
 
-def test_a_soft_region_that_is_stiffer_than_the_damping_bears(wedge):
-    """What 90 N s/m bear behind 1/300 s and 2 ms; hard ones and those of other laws may be any."""
+def test_a_soft_region_that_is_too_stiff_for_the_damping(wedge):
+    """The limit of 90 N s/m with lags of 1/300 s and 2 ms, for soft regions with servos only."""
     settings, folder = copy.deepcopy(wedge[0]), wedge[1]
 
     def warnings() -> list[str]:
@@ -44,7 +44,7 @@ def test_a_soft_region_that_is_stiffer_than_the_damping_bears(wedge):
     assert warnings() == []
     settings.fixtures.regions[1].stiffness = 1e6
     (said,) = warnings()
-    assert "fixtures.regions[1].stiffness = 1e+06 N/m" in said and "bears 1.6e+05 N/m" in said
+    assert "fixtures.regions[1].stiffness = 1e+06 N/m" in said and "tolerates 1.6e+05 N/m" in said
     settings.controller.law = "rigid"
     assert warnings() == []
 

@@ -1,4 +1,4 @@
-"""Paths of a scenario that attract the tool: what is made of them, said of them and refused."""
+"""Guides of a scenario: creation, warnings, refusals."""
 
 import copy
 from pathlib import Path
@@ -61,9 +61,11 @@ def test_a_file_that_is_not_there_is_named_with_its_guide(scenario):
         make_task(scenario, SCENARIOS)
 
 
-def test_guides_need_a_tool_that_is_led(scenario):
+def test_guides_need_a_guided_tool(scenario):
     scenario.controller.manifold, scenario.fixtures.regions = "path", []
-    with pytest.raises(InputError, match=r"fixtures.guides = 3 given; .* = path; only a tool led"):
+    with pytest.raises(
+        InputError, match=r"fixtures.guides = 3 given; .* = path; only a tool guided"
+    ):
         make_task(scenario, SCENARIOS)
 
 
@@ -84,7 +86,7 @@ def test_more_than_sixteen_are_refused(scenario):
         type(scenario.fixtures)(guides=[GuideParameters(Line())] * 17)
 
 
-def test_a_hand_that_is_too_weak_and_a_guide_that_is_too_stiff_are_told(scenario):
+def test_weak_hands_and_stiff_guides_are_reported(scenario):
     task = make_task(scenario, SCENARIOS)
     assert firm_guides(task.guides, [45.0]) == []
     said = firm_guides(task.guides, [20.0])
@@ -93,5 +95,5 @@ def test_a_hand_that_is_too_weak_and_a_guide_that_is_too_stiff_are_told(scenario
     assert stiff_fixtures(scenario.fixtures, task) == []
     scenario.fixtures.guides[1].stiffness = 1e5
     scenario.compliance.tangential.damping.value = 20.0
-    (told,) = stiff_fixtures(scenario.fixtures, make_task(scenario, SCENARIOS))
-    assert told.startswith("fixtures.guides[1].stiffness = 100000 N/m: compliance")
+    (warning,) = stiff_fixtures(scenario.fixtures, make_task(scenario, SCENARIOS))
+    assert warning.startswith("fixtures.guides[1].stiffness = 100000 N/m: compliance")

@@ -1,4 +1,4 @@
-"""Forces on the tool without a sensor: told to the law, and yielded to."""
+"""Forces on the tool without a sensor: observed, compensated, complied with."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_an_arm_yields_without_a_sensor(soft):
 
 @pytest.mark.slow
 def test_friction_of_rigid_joints_is_no_force_if_it_is_known(soft):
-    """Moving against it: believed friction is taken off what is observed."""
+    """Moving against it: the friction model is subtracted from the observed torque."""
     soft.forces, soft.reference.dwell, soft.start.transition = [], 0.05, 0.0
     soft.friction = JointFrictionParameters([20.0] * 3 + [3.0] * 3, [10.0] * 3 + [1.0] * 3)
     soft.compliance.observed.force_dead_band = 1e3  # nothing yields
@@ -62,15 +62,15 @@ def test_friction_of_rigid_joints_is_no_force_if_it_is_known(soft):
 
 
 @pytest.mark.slow
-def test_the_elastic_law_is_told_what_is_observed(load_scenario):
+def test_the_elastic_law_receives_observed_forces(load_scenario):
     """With derivatives; friction of the drives is no force on the links."""
     settings = load_scenario("pfc_elastic_3r")
     settings.start.offset, settings.reference.dwell = [0.0, 0.0], 1.0
     settings.friction = JointFrictionParameters([5.0, 9.0, 2.0], [14.0, 97.0, 39.0])
     force = np.array([0.0, 40.0, -20.0])
     settings.forces = [ForcePulse(0.05, 1.0, force, ramp=0.1)]
-    told = settings.controller.external_torque
-    told.source, told.bandwidth = "observed", 150.0
+    external_torque = settings.controller.external_torque
+    external_torque.source, external_torque.bandwidth = "observed", 150.0
     station, _, log = run(settings, 0.5)
     expected = joint_torque_function(station.robot)(
         log["joint_state"][-1, :3], np.append(force, np.zeros(3))
@@ -86,7 +86,7 @@ def test_the_elastic_law_is_told_what_is_observed(load_scenario):
 
 def test_what_cannot_be_observed_is_refused(soft):
     soft.controller.friction.source = "observer"
-    with pytest.raises(InputError, match=r"cannot be told apart; allowed: controller.friction"):
+    with pytest.raises(InputError, match=r"cannot be separated; allowed: controller.friction"):
         build_station(soft, SCENARIO_DIRECTORY)
     soft.controller.friction.source, soft.controller.law = "none", "velocity_servo"
     with pytest.raises(InputError, match=r"compliance.source = observed with the law 'velocity_se"):

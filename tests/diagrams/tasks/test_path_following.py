@@ -1,4 +1,4 @@
-"""Where along a path the reference of a scenario leads."""
+"""Reference motion of a scenario along a path."""
 
 from pathlib import Path
 

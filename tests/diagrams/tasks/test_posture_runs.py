@@ -1,4 +1,4 @@
-"""What postures do over a second: away from limits, to good conditioning, far away, poles."""
+"""Posture control over a second: distance from limits, conditioning, large errors, poles."""
 
 from pathlib import Path
 
@@ -99,7 +99,7 @@ def test_a_posture_far_away_does_not_take_the_tool_off_its_path(run, posture):
 
 @pytest.mark.slow
 def test_an_elbow_that_hardly_moves_alone_leaves_the_joints_to_the_tool(run):
-    """Kept at any price, it took a joint beyond its largest speed, each lap."""
+    """With a stiff posture a joint exceeds its largest speed in each revolution."""
     start = [0.0, -20.0, 0.0, -130.0, 0.0, 110.0, 45.0]
     station, fault, log = run(start, 1.65, task="elbow")
     assert fault is None

@@ -168,5 +168,5 @@ def test_files_that_make_no_region(tmp_path):
         make(Fitted())
     horseshoe = [[-0.2, 0.0, 0.0], [-0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.0], [0.2, 0, 0]]
     shape = Extruded(file=csv(tmp_path, "x,y,z", horseshoe))
-    with pytest.raises(InputError, match=r"points.csv: profile: its ends, going on straight, meet"):
+    with pytest.raises(InputError, match=r"points.csv: profile: its ends, extended straight, meet"):
         make(shape, folder=tmp_path)

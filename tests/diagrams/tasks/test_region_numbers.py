@@ -1,4 +1,4 @@
-"""Where the numbers of regions stand in a scene."""
+"""Positions of the numbers of regions in a scene."""
 
 import numpy as np
 
@@ -28,10 +28,10 @@ def test_a_number_stands_next_to_who_looks_and_in_order():
         assert shown.across[0] > 0.5
         assert shown.across[2] == 0.0
         np.testing.assert_allclose(np.linalg.norm(shown.across), 1.0)
-        near = points[np.argmin(np.linalg.norm(points - shown.place, axis=1))]
+        near = points[np.argmin(np.linalg.norm(points - shown.base, axis=1))]
         assert near[1] == points[:, 1].min()
-        assert np.linalg.norm(near - shown.place) < 1.5 * shown.height
-        assert shown.place[1] < near[1]
+        assert np.linalg.norm(near - shown.base) < 1.5 * shown.height
+        assert shown.base[1] < near[1]
     # a small region has a small number
     assert numbers[2].height < 0.03 < numbers[0].height
 

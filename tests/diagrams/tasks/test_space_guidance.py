@@ -1,4 +1,4 @@
-"""A tool led through space: where it starts."""
+"""Start of a tool that is guided through space."""
 
 from pathlib import Path
 
@@ -35,7 +35,9 @@ def test_the_start_is_turned_about_the_axes_of_the_tool(scenario):
 
 def test_regions_need_a_tool_that_is_led(scenario):
     scenario.controller.manifold = "path"
-    with pytest.raises(InputError, match=r"fixtures.regions = 2 given; .* = path; only a tool led"):
+    with pytest.raises(
+        InputError, match=r"fixtures.regions = 2 given; .* = path; only a tool guided"
+    ):
         make_task(scenario, SCENARIOS)
 
 
@@ -63,5 +65,5 @@ def test_as_many_distances_are_computed_as_the_scenario_has_it(scenario, looks):
     task = make_task(scenario, SCENARIOS)
     assert (near_expression(task) is None) == bool(looks)
     scheduled = scheduled_regions(task)
-    sight = scheduled.look(scheduled.start((x, y, z), 0.0), (x, y, z), 0.0, 0.0)
+    sight = scheduled.update(scheduled.start((x, y, z), 0.0), (x, y, z), 0.0, 0.0)
     assert len(sight.evaluated) == (looks or 5)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.robots.arm import MultibodyArm
 from diagrams.robots.arm_model import ArmModel
-from diagrams.robots.belief import Belief
+from diagrams.robots.nominal_model import NominalModel
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
 from diagrams.scenario_task import make_task
@@ -24,9 +24,9 @@ LINE = Line([0.8, -0.1, 1.0], [0.8, 0.3, 1.0])
 
 
 def _part(arm):
-    true = ArmModel(arm.plant, arm.chain, arm.coordinates, arm.tool, [])
-    belief = Belief(arm.chain, ModelError.none(arm.chain.dimension))
-    return MultibodyArm(true, belief, true)
+    actual = ArmModel(arm.plant, arm.chain, arm.coordinates, arm.tool, [])
+    nominal_model = NominalModel(arm.chain, ModelError.none(arm.chain.dimension))
+    return MultibodyArm(actual, nominal_model, actual)
 
 
 def target(arm, q):
@@ -46,7 +46,7 @@ def start(load_arm):
         part = _part(arm)
         x = part.state_at_rest(part.posture(begin.target, settings.start))
         arm.set_state(x)
-        return task.path, begin.place[0], arm, x
+        return task.path, begin.projection[0], arm, x
 
     return put
 
@@ -165,15 +165,15 @@ def test_without_posture_the_arm_starts_near_the_middle_of_its_ranges(load_scena
     assert np.all(away < 0.9 * (upper - lower) / 2.0)
 
 
-@pytest.mark.parametrize("laps", [-1, 1, 2])
-def test_start_laps_later(load_scenario, start, laps):
-    """A closed path counts its laps; the place is the same."""
+@pytest.mark.parametrize("revolutions", [-1, 1, 2])
+def test_start_revolutions_later(load_scenario, start, revolutions):
+    """A closed path counts its revolutions; the projection is the same."""
     settings = load_scenario(THREE)
     path, theta, arm, _ = start(settings)
     y_t, _ = arm.tool_pose()
-    settings.reference.points = [0.96 + laps * path.length, 0.3]
+    settings.reference.points = [0.96 + revolutions * path.length, 0.3]
     _, later, _, _ = start(settings)
-    assert later == pytest.approx(theta + 2.0 * math.pi * laps, abs=1e-9)
+    assert later == pytest.approx(theta + 2.0 * math.pi * revolutions, abs=1e-9)
     np.testing.assert_allclose(arm.tool_pose()[0], y_t, atol=1e-8)
 
 
@@ -225,7 +225,7 @@ def test_the_ends_of_an_open_path_are_allowed(on_line, start):
 def test_posture_of_another_robot(on_line, start, posture):
     settings = on_line()
     settings.start.posture_deg = posture
-    refused(start, settings, "start.posture_deg", str(len(posture)), "3 joints")
+    refused(start, settings, f"start.posture_deg = {posture}; allowed: 3 values, one per joint")
 
 
 def beam(name, joint):
@@ -324,7 +324,7 @@ def test_a_closed_path_is_looked_at_once_however_many_rounds_there_are(load_scen
     settings = load_scenario(THREE)
     settings.reference.points = [0.1, 1e4]
     task = make_task(settings, None)
-    points = np.array([position for position, _ in task.way()])
+    points = np.array([position for position, _ in task.tool_positions()])
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert steps.sum() == pytest.approx(task.path.length, rel=1e-4)
 

@@ -1,4 +1,4 @@
-"""What a scenario says of way points that come, and what is wrong in it."""
+"""Streamed waypoints of a scenario, and invalid parameters."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def test_a_path_of_positions_alone():
     task = make_task(scenario, SCENARIO_DIRECTORY)
     assert task.path.start.shape == (3,)
     assert task.arrivals.rows.shape[1] == 4
-    assert not task.place.is_oriented
+    assert not task.projected_manifold.is_oriented
 
 
 @pytest.mark.parametrize(

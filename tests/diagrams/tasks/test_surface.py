@@ -256,7 +256,7 @@ def test_kinds_of_orientation_have_as_many_coordinates():
 
 
 @pytest.mark.slow
-def test_a_hole_that_is_bridged_is_said(tmp_path):
+def test_a_bridged_hole_is_reported(tmp_path):
     rng = np.random.default_rng(8)
     points = np.column_stack([rng.uniform(0.0, 0.3, (1500, 2)), np.zeros(1500)])
     points += 1e-5 * rng.normal(size=points.shape)
@@ -272,8 +272,8 @@ def test_a_hole_that_is_bridged_is_said(tmp_path):
     assert re.search(r"holed\.csv: no point within 2[3456].* mm of \[0\.(19|2).*, 0\.(09|1)", note)
 
 
-def test_the_side_of_the_normal_is_said_where_nobody_chose_it(tmp_path):
-    """A plane that leans: upwards, along the normal that a scenario's lines are told in."""
+def test_the_side_of_the_normal_is_reported_by_default(tmp_path):
+    """An inclined plane: upwards, along the normal."""
     rng = np.random.default_rng(3)
     flat = np.column_stack([rng.uniform(0.0, 0.3, (900, 2)), 1e-5 * rng.normal(size=900)])
     R = Rotation.from_euler("xyz", [2.6, 0.3, 0.4]).as_matrix()

@@ -1,4 +1,4 @@
-"""The task of following a surface: where it starts, where it leads, what it refuses."""
+"""The task of surface following: start, tool positions, refusals."""
 
 from pathlib import Path
 
@@ -56,21 +56,21 @@ def test_start_by_parameters_and_offset(task, theta, offset):
     normal = np.array([-2.0 * a, -2.0 * b, 1.0]) / np.sqrt(1.0 + 4.0 * (a * a + b * b))
     expected = np.array([0.8 + a, b, 1.0 + a * a + b * b]) + offset * normal
     np.testing.assert_allclose(begin.target.y_t, expected, atol=1e-12)
-    np.testing.assert_allclose(begin.place, [a, b, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(begin.projection, [a, b, 0.0, 0.0], atol=1e-9)
     assert begin.target.R_e is None
 
 
 def test_start_by_position_and_shift(task):
     begin = task(position=[0.8, 0.0, 0.99]).start(np.array([0.0, 0.0, 0.005]))
     np.testing.assert_allclose(begin.target.y_t, [0.8, 0.0, 0.995])
-    np.testing.assert_allclose(begin.place, 0.0, atol=1e-9)
+    np.testing.assert_allclose(begin.projection, 0.0, atol=1e-9)
 
 
 def test_the_place_starts_where_the_reference_does(scenario):
     settings = scenario()
     settings.reference.places = [[0.3, -0.1], [0.2, 0.0]]
     begin = make_task(settings, Path()).start(np.zeros(3))
-    np.testing.assert_allclose(begin.place, [0.0, 0.0, 0.3, -0.1], atol=1e-9)
+    np.testing.assert_allclose(begin.projection, [0.0, 0.0, 0.3, -0.1], atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["given", "normal"])
@@ -116,7 +116,7 @@ def test_a_start_between_two_sheets_is_refused(task, tmp_path):
         "nearer to one of both",
     )
     begin = task(channel, position=[0.01, 0.15, 0.2]).start(np.zeros(3))
-    np.testing.assert_allclose(begin.place[1], 0.15, atol=1e-9)
+    np.testing.assert_allclose(begin.projection[1], 0.15, atol=1e-9)
 
 
 @pytest.mark.slow(but="places1-theta_2")
@@ -128,19 +128,19 @@ def test_ways_that_leave_the_patch_are_refused(scenario, places, where):
     settings = scenario(Plane(origin=[0.8, 0.0, 1.0]))
     settings.reference.places = places
     made = make_task(settings, Path())
-    refusal(lambda: list(made.way()), "leaves the surface", where, "0.2")
+    refusal(lambda: list(made.tool_positions()), "leaves the surface", where, "0.2")
     settings.surface.shape = Cylinder(origin=[0.8, 0.0, 1.0], radius=0.02)
     made = make_task(settings, Path())
     if where == "theta_1":  # closed: twice around
-        assert len(list(made.way())) > 10
+        assert len(list(made.tool_positions())) > 10
     else:
-        refusal(lambda: list(made.way()), "leaves the surface")
+        refusal(lambda: list(made.tool_positions()), "leaves the surface")
 
 
 def test_the_way_is_that_of_the_reference(scenario):
     """On a plane the tangential coordinates are Cartesian ones."""
     settings = scenario(Plane(origin=[0.8, 0.0, 1.0]))
-    points = np.array([point for point, _ in make_task(settings, Path()).way()])
+    points = np.array([point for point, _ in make_task(settings, Path()).tool_positions()])
     np.testing.assert_allclose(points[0], [0.8, 0.0, 1.0], atol=1e-12)
     np.testing.assert_allclose(points[-1], [0.9, 0.05, 1.0], atol=1e-9)
 
@@ -199,9 +199,9 @@ def test_a_delta_robot_refuses_orientations(load_scenario, kind):
 
 def test_places_that_a_hand_goes_to(task):
     made = task()
-    made.check_place(np.array([0.1, 0.1, 0.02]), "hand.waypoints[0].position")
+    made.check_coordinates(np.array([0.1, 0.1, 0.02]), "hand.waypoints[0].position")
     refusal(
-        lambda: made.check_place(np.array([0.1, 0.5, 0.0]), "hand.waypoints[0].position"),
+        lambda: made.check_coordinates(np.array([0.1, 0.5, 0.0]), "hand.waypoints[0].position"),
         "hand.waypoints[0].position",
         "theta within",
     )

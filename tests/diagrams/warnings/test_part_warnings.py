@@ -11,7 +11,7 @@ from pfsc_drake.control.obstacles.watch_parameters import WatchParameters
 from pfsc_drake.physics.moving_obstacle import (
     ObstacleParameters,
     ObstacleSensorParameters,
-    Stride,
+    ObstacleWaypoint,
 )
 from pfsc_drake.robot.robot_model import mass_function
 from tests.scenarios import shipped_scenario
@@ -37,11 +37,11 @@ def test_an_increment_that_becomes_a_jump_of_the_torque(load_exact_scenario, sha
         assert said == []
     else:
         (sentence,) = said
-        assert f"answer with {100.0 * share:.0f} % of the torque" in sentence
+        assert f"respond with {100.0 * share:.0f} % of the torque" in sentence
 
 
 def _crossing(**watch):
-    way = [Stride(0.0, [0.0, 0.0, 0.0]), Stride(1.0, [1.0, 0.0, 0.0])]
+    way = [ObstacleWaypoint(0.0, [0.0, 0.0, 0.0]), ObstacleWaypoint(1.0, [1.0, 0.0, 0.0])]
     sensor = ObstacleSensorParameters(position_noise=0.01, delay=0.06, period=0.02)
     return CrossingParameters([ObstacleParameters(way=way)], sensor, WatchParameters(**watch))
 
@@ -67,7 +67,7 @@ def test_what_is_hastier_than_is_known_is_named():
     assert "moving[0] accelerates with up to inf m/s^2" in hasty
     crossing = _crossing(**good, velocity_uncertainty=0.2)
     crossing.moving[0].way = [
-        Stride(time, [x, 0.0, 0.0]) for time, x in [(0, 0), (1, 0), (2, 0.2), (3, 0.2)]
+        ObstacleWaypoint(time, [x, 0.0, 0.0]) for time, x in [(0, 0), (1, 0), (2, 0.2), (3, 0.2)]
     ]
     (noisy,) = obstacle_warnings(crossing)
     assert "velocity_uncertainty = 0.2 m/s" in noisy

@@ -1,4 +1,4 @@
-"""What is said before a run of what hangs below the force sensor."""
+"""Warnings about the load below the force sensor."""
 
 import numpy as np
 import pytest
@@ -20,10 +20,10 @@ def fixture_warnings():
     settings.workpiece = None
     station = build_station(settings, file.parent)
     assert station.warnings == []
-    robot, task, n = station.part.belief.robot, station.task, station.robot.dimension
+    robot, task, n = station.part.nominal_model.robot, station.task, station.robot.dimension
     q_J = (station.part.coordinates.link_rows @ station.initial_state)[:n]
     rest = RestPosture(q_J, task.point(task.start(np.zeros(3))))
-    load = station.part.believed_load(settings.sensor.joint)
+    load = station.part.nominal_load(settings.sensor.joint)
     return lambda changed: sensed_load_warnings(
         sensor_loop(changed), robot, load, station.law, rest
     )
@@ -34,7 +34,7 @@ def fixture_polish(load_scenario):
     return load_scenario("sfc_polish")
 
 
-def test_what_is_shipped_bears_what_it_says(polish, warnings):
+def test_the_shipped_mass_tolerates_its_unknown_mass(polish, warnings):
     assert warnings(polish) == []
     polish.sensor.unknown_mass = 3.1
     (warning,) = warnings(polish)
@@ -47,10 +47,10 @@ def test_a_tool_whose_inertia_is_felt_is_too_much_for_a_small_mass(polish, warni
     polish.compliance.transversal.mass.value = 2.0
     polish.sensor.inertia, polish.sensor.unknown_mass = "none", 0.0
     (warning,) = warnings(polish)
-    assert "may chatter" in warning and "sensor.inertia: differentiated" in warning
+    assert "may oscillate" in warning and "sensor.inertia: differentiated" in warning
     polish.sensor.unknown_mass = 1.5
     (warning,) = warnings(polish)
-    assert "more than 0.5 it chatters" in warning
+    assert "more than 0.5 the loop is unstable" in warning
     polish.sensor.inertia, polish.sensor.unknown_mass = "differentiated", 0.9
     assert warnings(polish) == []
 
@@ -65,7 +65,7 @@ def test_turning_counts_too(polish, warnings):
     assert "compliance.rotational.mass of 0." in warning and "kg m^2" in warning
 
 
-def test_a_lag_of_servos_or_no_sensor_bear_more(polish, warnings):
+def test_servos_or_no_sensor_tolerate_more(polish, warnings):
     polish.sensor.unknown_mass = 4.0
     assert len(warnings(polish)) == 1
     polish.controller.law = "velocity_servo"

@@ -1,4 +1,4 @@
-"""What is said of links that are outside of the capsules of an arm."""
+"""Warnings about links outside of the capsules of an arm."""
 
 import math
 from pathlib import Path
@@ -69,7 +69,7 @@ def _looking(model, tmp_path, load_scenario):
     settings = load_scenario("pfc_panda_7r")
     settings.robot = type(settings.robot)(str(file), tool_frame="tip")
     settings.model_error = type(settings.model_error)()
-    part = add_arm(DiagramBuilder(), StationOptions(settings, Path()).belief_source)
+    part = add_arm(DiagramBuilder(), StationOptions(settings, Path()).nominal_model_source)
     drawn = draw_robot(part.model, part.tool, settings.robot, Path()).parts
 
     def look(radius):
@@ -82,11 +82,11 @@ def _looking(model, tmp_path, load_scenario):
 
 def test_who_reaches_out_is_named_with_how_far(look):
     """What is before the second joint is not looked at, however large it is."""
-    (told,) = look(0.1)
-    assert "arm_radius = 0.1 m" in told
-    assert f"fore {math.hypot(0.2, 0.05):.3g} m, tip 0.12 m" in told
+    (warning,) = look(0.1)
+    assert "arm_radius = 0.1 m" in warning
+    assert f"fore {math.hypot(0.2, 0.05):.3g} m, tip 0.12 m" in warning
     for name in ("base", "upper", "hand"):
-        assert name not in told
+        assert name not in warning
     assert "hand 0.08 m" in look(0.05)[0]
 
 

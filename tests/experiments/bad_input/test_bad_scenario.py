@@ -4,6 +4,8 @@ Status 2, one line on stderr that names the file, the thing, the value and what 
 is simulated.
 """
 
+from pathlib import Path
+
 import pytest
 
 from experiments.cli import main
@@ -60,10 +62,13 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         # wrong dimensions
         ("start.offset=[0.01]", ("offset", "[0.01]", "2 finite numbers")),
         ("start.rotation_deg=[1, 2]", ("rotation_deg", "[1.0, 2.0]", "3 finite numbers")),
-        ("start.posture_deg=[15, 115]", ("start.posture_deg", "2 values", "3 joints")),
+        (
+            "start.posture_deg=[15, 115]",
+            ("start.posture_deg = [15.0, 115.0]; allowed: 3 values, one per joint",),
+        ),
         (
             "path.orientation.keyframes=[{angles_deg: [1, 2, 3, 4]}]",
-            ("keyframes[0]': angles_deg", "4.0", "3 finite numbers"),
+            ("keyframes[0].angles_deg", "4.0", "3 finite numbers"),
         ),
         ("path.shape=!Line {start: [1, 2]}", ("start", "[1.0, 2.0]", "3")),
         ("path.shape=!Circle {center: [1, 2]}", ("center", "[1.0, 2.0]", "3")),
@@ -117,12 +122,90 @@ def test_all_that_is_wrong_is_told(refused, mine):
         "did you mean 'controller'?",
         "key 'duration' is 'long'",
         "key 'reference.points[1]' is 'ende': did you mean 'end'?",
-        "key 'start': offset = [0.01]; allowed: 2 finite numbers",
-        "key 'start': rotation_deg = [1.0, 2.0]; allowed: 3 finite numbers",
-        "key 'simulation': integrator = runge_kuta3",
+        "start.offset = [0.01]; allowed: 2 finite numbers",
+        "start.rotation_deg = [1.0, 2.0]; allowed: 3 finite numbers",
+        "simulation.integrator = runge_kuta3",
         "did you mean 'runge_kutta3'?",
     )
     refused(mine(), *parts, changes=changes)
+
+
+@pytest.mark.parametrize(
+    ("written", "wrong", "message"),
+    [
+        # keys, types and values
+        ("  law: elastic ", "  lwa: elastic ", "unknown key 'controller.lwa' = 'elastic': "),
+        ("  velocity: 1.5", "  velocity: fast", "key 'reference.velocity' is 'fast': expected"),
+        ("  law: elastic ", "  law: magic ", "controller.law = magic; allowed: velocity_servo, "),
+        ("  offset: [0.010, 0.0]", "  offset: [0.01]", "start.offset = [0.01]; allowed: 2 finite"),
+        # while the station is built
+        (
+            "      xi: {coefficients: [6250000, 500000, 15000, 200]}",
+            "      xi: {poles: 5}",
+            "controller.gains.elastic.xi.poles = [5.0]; allowed: 4 negative numbers (1/s)",
+        ),
+        (
+            "  model: comau_racer_1_4_elastic_3r",
+            "  model: comau",
+            "robot.model: robot model 'comau'",
+        ),
+        ("  posture_deg: [15, 115, -10]", "  posture_deg: [15]", "start.posture_deg = [15.0]; "),
+        ("  points: [0.96,", "  points: [x,", "key 'reference.points[0]' is 'x': expected"),
+        ("  offset: [0.010, 0.0]", "  offset: [5.0, 0.0]", "start: "),
+        (
+            "  shape: !BentLemniscate {}",
+            "  shape: !Waypoints {file: none.csv}",
+            "path.shape.file: FOLDER/none.csv: No such file or directory",
+        ),
+        (
+            "    max_path_deviation:",
+            "    max_path_deviatio:",
+            "targets.elastic.max_path_deviatio: ",
+        ),
+    ],
+)
+def test_the_line_is_named(refused, mine, tmp_path, written, wrong, message):
+    file = Path(mine())
+    text = file.read_text(encoding="utf-8")
+    assert written in text
+    file.write_text(text.replace(written, wrong, 1), encoding="utf-8")
+    place = text[: text.index(written)].count("\n") + 1
+    if message == "start: ":  # of the mapping
+        place -= 1
+    refused(file, f"error: {file}:{place}: {message.replace('FOLDER', str(tmp_path))}")
+
+
+def test_lines_of_several_wrong_keys(refused, mine):
+    file = Path(mine())
+    lines = file.read_text(encoding="utf-8").splitlines()
+    file.write_text("\n".join([*lines, "duratoin: 1", "hand: 3"]), encoding="utf-8")
+    refused(
+        file,
+        f"error: {file}: 3 things are wrong: (1) line {len(lines) + 1}: unknown key 'duratoin' = 1",
+        f"; (2) line {len(lines) + 2}: key 'hand' is 3: expected ",
+        "; (3) --set start.offset=[1]: start.offset = [1.0]; allowed: 2 finite numbers",
+        changes=["start.offset=[1]"],
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("controller.gains.elastic.eta.poles=5", "controller.gains.elastic.eta.poles = [5.0]; "),
+        ("start.offset=[5.0, 0.0]", "start: "),
+        ("path.orientation.convention=xyz", "path.orientation.convention = xyz; allowed: zyx, "),
+        ("friction={file: none.yaml}", "friction.file: "),
+    ],
+)
+def test_the_option_is_named(refused, mine, change, message):
+    file = mine()
+    text = Path(file).read_text(encoding="utf-8")
+    Path(file).write_text(
+        text.replace("eta: {coefficients: [6250000, 500000, 15000, 200]}", "eta: {}")
+    )
+    place = "\nstart:" in text and text[: text.index("\nstart:")].count("\n") + 2
+    where = f":{place}" if message == "start: " else f": --set {change}"
+    refused(file, f"error: {file}{where}: {message}", changes=[change])
 
 
 @pytest.mark.parametrize(
@@ -159,21 +242,38 @@ def test_boundary_layer_damping(refused, mine, damping):
 @pytest.mark.parametrize(
     ("gains", "parts"),
     [
-        ("{poles: [-50, -50, -50, 1]}", ("eta", "not Hurwitz", "pole at 1", "negative")),
-        ("{poles: [-50, -50, -50, 0]}", ("eta", "not Hurwitz")),
-        ("{coefficients: [6250000, 500000, 15000, -200]}", ("eta", "-200", "not Hurwitz")),
-        ("{coefficients: [1, 1, 1, 1]}", ("eta", "not Hurwitz")),  # all positive, yet unstable
+        (
+            "{poles: [-50, -50, -50, 1]}",
+            ("eta.poles = [-50.0, -50.0, -50.0, 1.0]; allowed: 4 negative numbers (1/s)",),
+        ),
+        ("{poles: [-50, -50, -50, 0]}", ("eta.poles = [-50.0, ", "allowed: 4 negative")),
+        ("{poles: 5}", ("eta.poles = [5.0]; allowed: 4 negative", "'elastic', or one for all")),
+        (
+            "{coefficients: [6250000, 500000, 15000, -200]}",
+            ("eta.coefficients = ", "-200", "not Hurwitz", "allowed: "),
+        ),
+        # all positive, yet unstable
+        (
+            "{coefficients: [1, 1, 1, 1]}",
+            ("eta.coefficients = [1.0, 1.0, 1.0, 1.0]: not Hurwitz, pole at ",),
+        ),
         (
             "{coefficients: [6250000, 500000, 15000, 200], integral: 1e+9}",
-            ("eta", "a_0", "not Hurwitz"),
+            ("eta.coefficients = ", "with integral = 1e+09: not Hurwitz"),
         ),
-        ("{poles: [-50, -50]}", ("eta", "2 gains", "needs 4")),
-        ("{coefficients: [900, 60]}", ("controller.gains.elastic.eta", "2", "needs 4")),
-        ("{}", ("controller.gains.elastic.eta", "needs 4")),
+        ("{poles: [-50, -50]}", ("eta.poles = [-50.0, -50.0]; allowed: 4 negative numbers",)),
+        (
+            "{coefficients: [900, 60]}",
+            ("elastic.eta.coefficients = [900.0, 60.0]", "4 coefficients"),
+        ),
+        ("{}", ("controller.gains.elastic.eta: neither poles nor coefficients; allowed: 4 poles",)),
         ("{poles: [-1, -1, -1, -1], integral: 1}", ("poles", "either")),
         ("{poles: [-50, -50, -50, -.inf]}", ("eta.poles[3]", "-inf", "1/s")),
-        ("{free: true, coefficients: [3]}", ("elastic.eta", "1 coefficients", "needs 3")),
-        ("{free: true, coefficients: [6, 11, -6]}", ("elastic.eta", "not Hurwitz")),
+        (
+            "{free: true, coefficients: [3]}",
+            ("elastic.eta.coefficients = [3.0]; allowed: 3 poles",),
+        ),
+        ("{free: true, coefficients: [6, 11, -6]}", ("elastic.eta.coefficients", "not Hurwitz")),
         ("{free: true, poles: [-3, -4, -5], integral_pole: -1}", ("free", "integral_pole")),
     ],
 )

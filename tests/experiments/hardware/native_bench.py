@@ -16,7 +16,7 @@ from experiments.hardware.native_record import NativeRun, RepeatedDrive
 from experiments.hardware.simulated_robot import SimulatedRobot, Transport
 from experiments.scenario_file import read_scenario
 from pfsc_drake.drivers.driver_rules import DriverOptions
-from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
+from pfsc_drake.drivers.link import ControllerEndpoint, RobotEndpoint
 from pfsc_drake.drivers.messages import dialect
 from pfsc_drake.yaml.typed import load_typed
 
@@ -47,7 +47,7 @@ class Bench:
     @cached_property
     def project(self):
         """The C, not compiled."""
-        drive = self.make_drive(ControllerEnd(DrakeLcm("memq://"), self.dialect))
+        drive = self.make_drive(ControllerEndpoint(DrakeLcm("memq://"), self.dialect))
         return write_native(self.scenario, self.prepared, drive, self.dialect, self.folder)
 
     @cached_property
@@ -61,7 +61,7 @@ class Bench:
         settings = load_typed(Scenario, self.scenario.data, "")
         settings.simulation.integrator, settings.simulation.max_step = "runge_kutta3", 1e-3
         lcm = DrakeLcm("memq://")
-        robot_end, end = RobotEnd(lcm, self.dialect), ControllerEnd(lcm, self.dialect)
+        robot_end, end = RobotEndpoint(lcm, self.dialect), ControllerEndpoint(lcm, self.dialect)
         station = build_robot_station(settings, self.scenario.path.parent)
         options = DriverOptions(low_pass=0.0)
         way = Transport(delay=1 if settings.driver.delay else 0)

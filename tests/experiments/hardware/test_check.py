@@ -12,7 +12,7 @@ from diagrams.scenario import RobotParameters
 from experiments.hardware.check import listen
 from experiments.hardware.statics import check_statics
 from experiments.scenario_file import find_scenario
-from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
+from pfsc_drake.drivers.link import ControllerEndpoint, RobotEndpoint
 from pfsc_drake.drivers.messages import RobotStatus, dialect
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
@@ -61,7 +61,7 @@ def status(panda, tool=0.0, plant=None):
 def test_a_robot_as_it_is_believed(panda):
     found = check_at_rest(panda[1], status(panda))
     assert found.is_good
-    assert found.verdict == "the robot's torques at rest are those of the model"
+    assert found.verdict == "the robot's torques at rest agree with the model"
 
 
 @pytest.mark.parametrize("joint", [1, 3])
@@ -88,10 +88,10 @@ def test_a_zero(panda, joint, off):
 def test_a_payload(panda):
     found = check_at_rest(panda[1], status(panda, tool=1.0))
     assert "most likely the tool weighs 1.0" in found.verdict
-    assert "kg more than is told" in found.verdict
+    assert "kg more than in the model" in found.verdict
     found = check_at_rest(panda[1], status(panda, tool=-0.5))
     assert "most likely the tool weighs 0.5" in found.verdict
-    assert "kg less than is told" in found.verdict
+    assert "kg less than in the model" in found.verdict
 
 
 def test_gravity_from_another_side(panda):
@@ -110,14 +110,14 @@ def test_what_no_single_cause_explains(panda):
 
 def test_what_is_listened_to(panda):
     lcm, spoken = DrakeLcm("memq://"), dialect("panda")
-    robot, end = RobotEnd(lcm, spoken), ControllerEnd(lcm, spoken)
+    robot, end = RobotEndpoint(lcm, spoken), ControllerEndpoint(lcm, spoken)
     with pytest.raises(InputError, match="no status of a robot on PANDA_STATUS"):
         listen(end, 1.0)
-    robot.tell(replace(status(panda), v=np.full(7, 0.1)))
+    robot.send_status(replace(status(panda), v=np.full(7, 0.1)))
     with pytest.raises(InputError, match="the robot moves at"):
         listen(end, 0.5)
     for bad in (np.nan, np.inf):
-        robot.tell(replace(status(panda), v=np.array([0.0, bad, 0.0, 0.0, 0.0, 0.0, 0.0])))
+        robot.send_status(replace(status(panda), v=np.array([0.0, bad, 0.0, 0.0, 0.0, 0.0, 0.0])))
         with pytest.raises(InputError, match="the robot moves at"):
             listen(end, 0.5)
     with pytest.raises(InputError, match="the robot has 6 joints; the scenario's has 7"):

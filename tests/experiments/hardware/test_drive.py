@@ -12,7 +12,7 @@ from experiments.hardware.simulated_robot import SimulatedRobot, Transport
 from experiments.results.run_signals import collect_log
 from experiments.scenario_file import find_scenario
 from pfsc_drake.drivers.driver_rules import DriverOptions
-from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
+from pfsc_drake.drivers.link import ControllerEndpoint, RobotEndpoint
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus, dialect
 from pfsc_drake.errors import InputError
 from tests.scenarios import shipped_scenario
@@ -37,7 +37,7 @@ class Loop:
     def __init__(self, settings, kind="panda", options=None, **transport):
         settings.simulation.integrator, settings.simulation.max_step = "runge_kutta3", 1e-3
         lcm, spoken = DrakeLcm("memq://"), dialect(kind)
-        self.robot_end, self.end = RobotEnd(lcm, spoken), ControllerEnd(lcm, spoken)
+        self.robot_end, self.end = RobotEndpoint(lcm, spoken), ControllerEndpoint(lcm, spoken)
         self.robot = SimulatedRobot(
             station_of(settings, build_robot_station),
             settings,
@@ -148,8 +148,8 @@ def test_an_iiwas_messages_do_as_well():
 def test_what_was_lost_lies_between_both_statuses(monkeypatch):
     """Torques on a straight line; positions are those of ``test_bridge``."""
     loop, told = Loop(panda()).begin().run(0.02), []
-    drive, tell = loop.drive, loop.drive._tell
-    monkeypatch.setattr(drive, "_tell", lambda *given: (told.append(given), tell(*given)))
+    drive, tell = loop.drive, loop.drive._set_inputs
+    monkeypatch.setattr(drive, "_set_inputs", lambda *given: (told.append(given), tell(*given)))
     torque = drive.inputs._torque
     for _ in range(2):
         loop.robot.advance()
@@ -267,13 +267,13 @@ def test_a_clock_that_is_set_ends_it():
 
 def test_what_is_no_number_is_not_sent(monkeypatch):
     loop = Loop(panda()).begin().run(0.1)
-    loop.robot_end.hear()
-    monkeypatch.setattr(loop.drive, "_wanted", lambda: np.full(7, np.nan))
+    loop.robot_end.receive_command()
+    monkeypatch.setattr(loop.drive, "_command", lambda: np.full(7, np.nan))
     loop.robot.tell()
     loop.drive.answer(loop.end.receive(0.0))
-    assert loop.robot_end.hear() is None
+    assert loop.robot_end.receive_command() is None
     assert loop.drive.has_ended
-    assert loop.fault == "the controller wants what is no finite number"
+    assert loop.fault == "the controller's command is not finite"
     assert len(loop.log().time) == 100
 
 
@@ -302,7 +302,7 @@ def test_what_is_refused_before_anything_moves(values, said):
     loop.robot.tell()
     with pytest.raises(InputError, match=said):
         loop.drive.begin(changed(**values)(loop.end.receive(0.0)))
-    assert loop.robot_end.hear() is None
+    assert loop.robot_end.receive_command() is None
 
 
 def test_torques_come_up_smoothly_and_within_limits():

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.results.teleoperation_feature import teleoperation_metrics
 from pfsc_drake.control.teleoperation.message import FIELDS, MESSAGE
-from pfsc_drake.drivers.teleoperation_link import TeleoperationEnd
+from pfsc_drake.drivers.teleoperation_link import TeleoperationEndpoint
 from tests.experiments.hardware.test_drive import Loop
 from tests.scenarios import shipped_scenario
 
@@ -19,7 +19,7 @@ class Leader:
     """Waves of a hand that would move at a speed along the begin of the path, and their energy."""
 
     def __init__(self, loop, impedance, along):
-        self._loop, self._end = loop, TeleoperationEnd(loop.station.leader.lcm, "leader")
+        self._loop, self._end = loop, TeleoperationEndpoint(loop.station.leader.lcm, "leader")
         self._wave = math.sqrt(2.0 * impedance) * SPEED * along
         self._message, self._period = np.zeros(MESSAGE), loop.drive.period
 
@@ -67,7 +67,7 @@ def test_it_goes_where_the_leader_has_it(led):
 def test_it_stops_in_place_where_the_leader_is_silent(led):
     loop, _ = led
     log = loop.log()
-    assert loop.fault == f"no word of the leader for {SILENT:g} s"
+    assert loop.fault == f"no message of the leader for {SILENT:g} s"
     eta, last = log["eta"].values[:, 0], np.searchsorted(log.time, BEGIN + LEADS)
     assert abs(eta[-1] - eta[last]) < 0.02
     assert log.time[-1] < BEGIN + LEADS + SILENT + 1.0

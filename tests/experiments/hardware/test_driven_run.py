@@ -6,7 +6,7 @@ from pydrake.lcm import DrakeLcm
 
 from experiments.hardware.driven_run import DriveOptions, drive_scenario, prepare_driven
 from experiments.scenario_file import read_scenario
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEndpoint
 from pfsc_drake.drivers.messages import dialect
 from pfsc_drake.errors import InputError
 
@@ -28,7 +28,7 @@ def test_what_is_said_of_it():
 
 @pytest.mark.parametrize("override", [0.0, 1.6, np.nan])
 def test_overrides_out_of_range(override, tmp_path):
-    end = ControllerEnd(DrakeLcm("memq://"), dialect("panda"))
+    end = ControllerEndpoint(DrakeLcm("memq://"), dialect("panda"))
     scenario = read_scenario("pfc_panda_7r", [])
     with pytest.raises(InputError, match="--override = "):
         drive_scenario(
@@ -44,7 +44,7 @@ def test_overrides_out_of_range(override, tmp_path):
     ("name", "said"),
     [
         ("plate_mounting", "plate = given"),
-        ("pfc_delta", "robot.model = .* an arm, where it stands elsewhere"),
+        ("pfc_delta", "robot.model = .* an arm, where it is in another process"),
         ("pfc_elastic_6r", "controller.state = measured; allowed: from_torque"),
     ],
 )
@@ -55,7 +55,7 @@ def test_what_is_not_driven(name, said):
 
 def test_nobody_answers(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.hardware.driven_run._FIRST_STATUS", 0.1)
-    end = ControllerEnd(DrakeLcm("memq://"), dialect("panda"))
+    end = ControllerEndpoint(DrakeLcm("memq://"), dialect("panda"))
     with pytest.raises(InputError, match="no status of a robot on PANDA_STATUS within"):
         drive_scenario(
             read_scenario("pfc_panda_7r", []),
@@ -70,10 +70,10 @@ def test_nobody_answers(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_a_controller_in_c_is_not_led_from_afar(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.hardware.driven_run.check_native", lambda *_: None)
-    with pytest.raises(InputError, match="--native: a controller in C hears no leader"):
+    with pytest.raises(InputError, match="--native: not possible with a leader device"):
         drive_scenario(
             read_scenario("teleop_path", ["teleoperation.lcm=memq://"]),
-            ControllerEnd(DrakeLcm("memq://"), dialect("panda")),
+            ControllerEndpoint(DrakeLcm("memq://"), dialect("panda")),
             tmp_path / "out",
             DriveOptions(native=True, figures=False, recording=False),
             nothing,

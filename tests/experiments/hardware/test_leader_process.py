@@ -33,17 +33,20 @@ wait $FOLLOWS; STATUS=$?; kill $LEADS; wait $LEADS; exit $STATUS
 def test_a_leader_without_a_follower_is_held_by_damping_alone():
     told = []
     scenario = read_scenario("teleop_region", ["hand.tremor=0"])
-    led = lead_scenario(scenario, DrakeLcm("memq://"), duration=0.8, tell=told.append)
+    led = lead_scenario(scenario, DrakeLcm("memq://"), duration=0.8, notify=told.append)
     assert led.received == 0
     assert led.least_tank > 0.0
-    assert led.way < 0.1
-    assert told == ["leading; waiting for a follower"]
+    assert led.travel < 0.1
+    assert told == ["leader ready; waiting for a follower"]
 
 
 def test_only_what_is_led_from_afar_is_led():
     with pytest.raises(InputError, match="teleoperation = null"):
         lead_scenario(
-            read_scenario("vf_forbidden_region", []), DrakeLcm("memq://"), duration=1.0, tell=print
+            read_scenario("vf_forbidden_region", []),
+            DrakeLcm("memq://"),
+            duration=1.0,
+            notify=print,
         )
 
 
@@ -64,7 +67,7 @@ def test_two_processes_lead_and_follow(tmp_path):
     )
     said = (tmp_path / "follower.txt").read_text() + (tmp_path / "lead.txt").read_text()
     assert ended.returncode in (0, 3), said
-    assert "a follower is there" in said
+    assert "follower connected" in said
     metrics = json.loads((tmp_path / "follower" / "metrics.json").read_text())
     assert metrics["least_port_tank"]["value"] >= 0.0
     assert metrics["audit_ports"]["value"] < 1e-12

@@ -20,7 +20,7 @@ STATUS = RobotStatus(0, np.array([0.1, -0.2]), np.zeros(2), np.zeros(2))
 def test_what_was_missed_is_taken_to_lie_between():
     """Three ticks without a status: the controller sees a cubic way, and answers the last."""
     loop, told = Loop(panda()), []
-    drive, status, tell = loop.drive, loop.robot.status(), loop.drive._tell
+    drive, status, tell = loop.drive, loop.robot.status(), loop.drive._set_inputs
 
     def at(tick, **values):
         return changed(utime=5_000_000 + 1000 * tick, **values)(status)
@@ -29,11 +29,11 @@ def test_what_was_missed_is_taken_to_lie_between():
         told.append(np.concatenate([state, torque]))
         tell(state, torque)
 
-    drive._tell = note
+    drive._set_inputs = note
     drive.begin(at(0))
     for tick in range(3):
         drive.answer(at(tick))
-    loop.robot_end.hear()
+    loop.robot_end.receive_command()
     before, later = (
         told[-1],
         at(6, q=status.q + 4e-4, v=status.v + 0.02, torque=status.torque + 2.0),
@@ -46,11 +46,11 @@ def test_what_was_missed_is_taken_to_lie_between():
     side = np.hstack([way(ticks), way(ticks, 1)])
     torque = before[28:] + ticks[:, None] / 4e-3 * (after[28:] - before[28:])
     np.testing.assert_allclose(told, np.hstack([side, side, torque]), rtol=0, atol=1e-12)
-    assert loop.robot_end.hear().utime == later.utime
+    assert loop.robot_end.receive_command().utime == later.utime
     assert drive.time == pytest.approx(0.007)
     # what comes after the next is nothing any more
     drive.answer(at(5))
-    assert loop.robot_end.hear() is None
+    assert loop.robot_end.receive_command() is None
     assert drive.time == pytest.approx(0.007)
     # a robot that trembles does not rest, and is left alone in the end
     drive.stop("enough")
@@ -116,7 +116,7 @@ def test_a_drive_begins_with_what_is_new_and_ends_in_time(count, answers, lost):
     end = SimpleNamespace(
         receive=lambda timeout: waiting.pop(0) if waiting else None,
         requests=list,
-        tell=lambda utime, values: None,
+        publish_progress=lambda utime, values: None,
         foreign=0,
     )
     found = run_drive(drive, end, 0.01, lambda: False, lambda *_: None)

@@ -14,7 +14,7 @@ from pydrake.lcm import DrakeLcm
 from experiments.hardware.driven_run import DriveOptions, drive_scenario
 from experiments.hardware.native_project import check_native
 from experiments.scenario_file import read_scenario
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEndpoint
 from pfsc_drake.drivers.messages import (
     ControlMode,
     RobotCommand,
@@ -175,7 +175,7 @@ def test_what_is_refused_before_anything_is_done(tmp_path, monkeypatch, url, too
     with pytest.raises(InputError, match=said):
         drive_scenario(
             read_scenario("pfc_panda_7r", []),
-            ControllerEnd(DrakeLcm(url), dialect("panda")),
+            ControllerEndpoint(DrakeLcm(url), dialect("panda")),
             tmp_path / "out",
             DriveOptions(native=True, figures=False, recording=False),
             quiet,

@@ -12,7 +12,7 @@ from experiments.hardware.native_record import Event, NativeRun, RepeatedDrive
 from experiments.hardware.native_run import Operator, run_native
 from experiments.results.run_signals import collect_log
 from pfsc_drake.drivers.layout import UdpmAddress
-from pfsc_drake.drivers.link import RequestEnd, WatchingEnd
+from pfsc_drake.drivers.link import ObserverEndpoint, RequestEndpoint
 from pfsc_drake.drivers.messages import RobotMode, dialect
 from pfsc_drake.drivers.remote_values import Request
 from pfsc_drake.errors import InputError
@@ -114,10 +114,10 @@ def test_the_pace_changes_alike(panda, told):
 @needs_gcc
 def test_a_stop_that_makes_the_robot_faster_ends_alike(panda, told):
     faster = changed(told, 400, lambda s: {"v": s.v * 3.0, "utime": s.utime})
-    run, repeated = panda.answer(panda.rows(faster, {390: Event.ASKED}))
+    run, repeated = panda.answer(panda.rows(faster, {390: Event.REQUESTED}))
     assert repeated.first is None, repeated.warnings
     assert run.reason == "faster"
-    assert "asked to stop; the stop made the robot faster" in repeated.result.fault
+    assert "stop requested; the stop accelerated the robot" in repeated.result.fault
     assert len(run.rows) == 401
 
 
@@ -141,7 +141,7 @@ def stands(status, ticks):
     ("event", "said"),
     [
         (Event.INTERRUPTED, "interrupted"),
-        (Event.ALONE, "who started the controller is gone"),
+        (Event.ALONE, "the controller's parent process has ended"),
         (Event.UNRECORDED, "its record could not be written"),
         (Event.FOREIGN, "another sender commands the robot"),
     ],
@@ -260,7 +260,7 @@ class FakeLoop:
         self.program.chmod(0o755)
 
     def run(self, interrupted=lambda: False, progress=quiet, keys=lambda share: []):
-        operator = Operator(RequestEnd(DrakeLcm("memq://")), keys, 0.8, 1.2)
+        operator = Operator(RequestEndpoint(DrakeLcm("memq://")), keys, 0.8, 1.2)
         return run_native(self, ADDRESS, 5.0, interrupted, progress, operator)
 
 
@@ -272,7 +272,7 @@ def test_what_the_loop_says(panda, told):
     )
     loop = FakeLoop(panda, f'cd "$(dirname "$0")"; {words}')
     run = loop.run(progress=lambda time, what: seen.append((time, what)))
-    assert (run.reason, run.said, len(run.rows)) == ("mode", ["priority none"], 3)
+    assert (run.reason, run.messages, len(run.rows)) == ("mode", ["priority none"], 3)
     assert seen == [(1.5, "driving at 80%")]
     said = (panda.folder / "arguments").read_text().split()
     assert said == ["239.255.76.67", "7667", "0", "5.0", str(panda.folder / "drive.bin"), "0.8"]
@@ -282,10 +282,12 @@ def test_a_loop_that_breaks_off(panda, told):
     panda.project.record.write(panda.folder / "kept", panda.rows(told[:3]))
     run = FakeLoop(panda, 'cd "$(dirname "$0")"; cp kept drive.bin; kill -SEGV $$').run()
     assert run.reason is None
-    assert run.said == ["the loop in C broke off with status -11"]
+    assert run.messages == ["the loop in C ended abnormally with status -11"]
     repeated = RepeatedDrive(run, panda.make_drive, panda.dialect, quiet)
-    assert repeated.result.fault == run.said[0]
-    with pytest.raises(InputError, match="--native: 7: no such network; the loop in C broke off"):
+    assert repeated.result.fault == run.messages[0]
+    with pytest.raises(
+        InputError, match="--native: 7: no such network; the loop in C ended abnormally"
+    ):
         FakeLoop(panda, "echo 7: no such network; exit 2").run()
 
 
@@ -313,15 +315,15 @@ def test_what_people_ask_for_goes_to_the_loop_line_by_line(panda, told):
 
 def test_messages_ask_as_keys_do_and_are_told_how_far_it_is():
     lcm = DrakeLcm("memq://")
-    operator = Operator(RequestEnd(lcm), lambda share: [], 1.0, 1.5)
-    watching = WatchingEnd(lcm, dialect("panda"))
-    watching.ask(Request(0.5))
+    operator = Operator(RequestEndpoint(lcm), lambda share: [], 1.0, 1.5)
+    watching = ObserverEndpoint(lcm, dialect("panda"))
+    watching.send_request(Request(0.5))
     assert operator.lines() == "o 0.5\n"
     assert operator.lines() == ""
-    watching.ask(Request(stop=True))
+    watching.send_request(Request(stop=True))
     assert operator.lines() == "s\n"
     operator.tell(1.25)
-    watching.look(0.0)
+    watching.receive(0.0)
     told = watching.progress
     assert (told["time"], told["override"], told["stopping"]) == (1.25, 0.5, 1.0)
 

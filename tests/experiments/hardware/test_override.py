@@ -11,7 +11,7 @@ import pytest
 from experiments.hardware.drive import Drive
 from experiments.hardware.keys import DriveKeys, pressed_keys
 from pfsc_drake.drivers.driver_rules import DriverOptions
-from pfsc_drake.drivers.link import WatchingEnd
+from pfsc_drake.drivers.link import ObserverEndpoint
 from pfsc_drake.drivers.remote_values import (
     LARGEST_OVERRIDE,
     Request,
@@ -26,7 +26,7 @@ def changed():
     """A robot at full pace, at half of it, in a pause, and on its way again."""
     loop = Loop(panda()).begin().run(0.9)
     for request in (Request(0.5), Request(0.0), Request(1.2)):
-        loop.drive.heed(request)
+        loop.drive.handle_request(request)
         loop.run(loop.drive.time + 0.6)
     return loop
 
@@ -79,34 +79,34 @@ def test_a_motion_is_made_no_faster_than_drives_allow():
     settings.reference.velocity, settings.reference.acceleration = 3.0, 60.0
     loop = Loop(settings)
     plan = loop.station.task.drive_plan
-    loop.drive.heed(Request(1.5))
+    loop.drive.handle_request(Request(1.5))
     assert 1.0 < loop.drive.override < 1.2
     share = np.abs(plan.demand).max(axis=0) / plan.limits
     torques, speeds = share[:7].max(), share[7:].max()
     assert loop.drive.override == pytest.approx(min((0.95 / torques) ** 0.5, 0.95 / speeds))
-    assert plan.fastest_pace(4) == pytest.approx(min((0.95 / torques) ** 0.25, 0.95 / speeds))
+    assert plan.largest_scaling(4) == pytest.approx(min((0.95 / torques) ** 0.25, 0.95 / speeds))
 
 
 @pytest.mark.slow
 def test_who_watches_is_told_and_may_stop_the_robot():
     loop = Loop(panda()).begin()
-    watching = WatchingEnd(loop.end.lcm, loop.end.dialect)
+    watching = ObserverEndpoint(loop.end.lcm, loop.end.dialect)
     loop.run(0.9)
-    loop.end.tell(1, loop.drive.progress())
-    assert watching.look(0.0).q.shape == (7,)
+    loop.end.publish_progress(1, loop.drive.progress())
+    assert watching.receive(0.0).q.shape == (7,)
     told = watching.progress
     assert (told["override"], told["stopping"]) == (1.0, 0.0)
     assert told["time"] == pytest.approx(0.9)
     assert abs(told["xi_1"]) < 2e-5
-    watching.ask(Request(stop=True))
-    watching.ask(Request(0.3))
+    watching.send_request(Request(stop=True))
+    watching.send_request(Request(0.3))
     loop.end.receive(0.0)
     stop, slower = loop.end.requests()
     assert loop.end.requests() == []
     assert slower == Request(0.3)
-    loop.drive.heed(stop)
+    loop.drive.handle_request(stop)
     loop.run(5.0)
-    assert loop.fault == "asked to stop"
+    assert loop.fault == "stop requested"
     assert loop.speed() < 0.01
 
 

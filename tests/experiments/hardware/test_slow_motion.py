@@ -15,7 +15,7 @@ from experiments.hardware.statics import check_statics
 from experiments.scenario_file import find_scenario
 from pfsc_drake.controller.options.friction_parameters import JointFrictionParameters
 from pfsc_drake.drivers.driver_rules import DriverOptions
-from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
+from pfsc_drake.drivers.link import ControllerEndpoint, RobotEndpoint
 from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus, dialect
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import gravity_function, mass_function
@@ -25,7 +25,7 @@ FOLDER = find_scenario("pfc_panda_7r").parent
 PERIOD = 4e-3  # s, of what leads the simulated robot
 
 
-class Stepped(ControllerEnd):
+class Stepped(ControllerEndpoint):
     """The controller's end, on which waiting is a tick of the robot."""
 
     def __init__(self, robot_settings, seen, heard):
@@ -36,7 +36,7 @@ class Stepped(ControllerEnd):
         self.robot = SimulatedRobot(
             build_robot_station(robot_settings, FOLDER),
             robot_settings,
-            RobotEnd(lcm, spoken),
+            RobotEndpoint(lcm, spoken),
             DriverOptions(),
             Transport(),
         )
@@ -154,7 +154,7 @@ def test_a_zero_that_is_off(chain, degrees):
     _, found = Obedient(chain, lambda s: replace(s, q=s.q + off)).checked(chain)
     # alone, while at rest as well other zeros may be
     assert found.verdict.startswith(f"most likely the zero of joint 2 is off by {degrees}")
-    assert "as well may be" not in found.verdict
+    assert "also possible" not in found.verdict
 
 
 def test_a_torque_with_the_wrong_sign(chain):
@@ -177,9 +177,7 @@ def test_a_robot_as_it_is_believed_with_friction():
     settings = panda()
     settings.friction = JointFrictionParameters(f_c=[2.0] * 4 + [0.5] * 3, f_v=[1.0] * 7)
     found, off = checked(settings=settings)
-    assert (
-        found.verdict == "the robot's torques at rest and along the motion are those of the model"
-    )
+    assert found.verdict == "the robot's torques at rest and along the motion agree with the model"
     assert found.is_good
     # every joint has moved, and come back
     assert np.all(np.ptp(found.q, axis=0) > np.deg2rad(2.5))
@@ -190,14 +188,14 @@ def test_a_robot_as_it_is_believed_with_friction():
 def test_a_payload_that_nobody_told():
     found, off = checked(load=0.5)
     assert found.verdict.startswith("most likely the tool weighs 0.5")
-    assert "kg more than is told" in found.verdict
+    assert "kg more than in the model" in found.verdict
     assert off < np.deg2rad(1.0)
 
 
 def test_a_joint_that_turns_the_other_way_than_it_is_told():
     found, off = checked(heard=lambda values: flip(values, 1))
     assert found.complaint.startswith("joint 2 is ")
-    assert "the other way than it is told" in found.verdict
+    assert "in the opposite direction" in found.verdict
     assert off < np.deg2rad(8.0)
 
 

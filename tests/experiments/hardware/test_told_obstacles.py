@@ -23,7 +23,7 @@ def fixture_log():
 
     def told(request, until):
         while loop.drive.time < until - 1e-9:
-            loop.drive.heed(request)
+            loop.drive.handle_request(request)
             loop.run(loop.drive.time + 0.05)
 
     told(Request(obstacles=FAR), 1.0)

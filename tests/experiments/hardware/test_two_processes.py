@@ -99,7 +99,7 @@ print(driven.log["sent"].values.shape[1], driven.fault)
 """)
     status, _, said = beside(tmp_path, "pfc_panda_7r --low-pass 0", str(script))
     assert status == 0, said
-    assert said.startswith("TORQUE True\nthe robot's torques at rest are those of the model\n7 ")
+    assert said.startswith("TORQUE True\nthe robot's torques at rest agree with the model\n7 ")
     assert (out / "recording.html").is_file()
 
 

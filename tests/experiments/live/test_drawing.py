@@ -44,7 +44,7 @@ def test_the_arm_follows_while_one_draws_in_a_browser(tmp_path):
         assert arrived["phase"] == "running"
         assert max(map(abs, arrived["deviation"].values())) < 1e-3
         told = browser.evaluate("document.getElementById('stream').textContent")
-        assert "way points taken" in told
+        assert "waypoints accepted" in told
         assert browser.errors == []
         browser.evaluate("press('end (Q)')")
         assert session.end() == (0, "")

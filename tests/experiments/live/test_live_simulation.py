@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.live.live_simulation import RealTimePace
+from experiments.live.live_simulation import RealTimeClock
 
 
 class Wall:
@@ -21,7 +21,7 @@ def run(pace, wall, steps, work, start=0.0):
     for _ in range(steps):
         wall.now += work
         simulated += 0.01
-        pace.keep(simulated)
+        pace.wait_until(simulated)
     return simulated
 
 
@@ -32,7 +32,7 @@ def wall():
 
 @pytest.fixture
 def pace(wall):
-    pace = RealTimePace(lambda: wall.now, wall.sleep)
+    pace = RealTimeClock(lambda: wall.now, wall.sleep)
     pace.restart(0.0)
     return pace
 

@@ -122,7 +122,7 @@ def test_a_post_must_say_where_it_comes_from(server, pages):
 def test_who_leads_is_told_so_and_who_does_not_is_told_that(server, pages):
     assert post(server, GOOD)[0] == 204
     assert post(server, b'{"client": "b"}')[0] == 409
-    assert pages.heard().hand == {PULL: 3.5}
+    assert pages.collect().hand == {PULL: 3.5}
 
 
 def test_a_connection_is_good_for_many_messages(server, pages):
@@ -221,29 +221,29 @@ def say(pages, client, **entries):
 
 def test_nobody_leads_at_first_and_then_who_is_heard_first(pages):
     assert pages.leader is None
-    assert pages.heard().let_go
+    assert pages.collect().let_go
     assert say(pages, "a", hand={PULL: 3.5}, set={KEY: 2})
     assert not say(pages, "b", hand={PULL: -20}, set={KEY: 7})
     assert pages.leader == "a"
-    heard = pages.heard()
+    heard = pages.collect()
     assert heard.hand == {PULL: 3.5}
     assert heard.settings == [(KEY, 2.0)]
-    assert pages.heard().settings == []
+    assert pages.collect().settings == []
 
 
 def test_a_hand_is_what_was_heard_last_and_nothing_after_a_silence(pages, clock):
     say(pages, "a", hand={PULL: 3.5})
-    pages.heard()
+    pages.collect()
     clock.now += 0.29
-    assert pages.heard().hand == {PULL: 3.5}
-    assert not pages.heard().let_go
+    assert pages.collect().hand == {PULL: 3.5}
+    assert not pages.collect().let_go
     clock.now += 0.02
-    assert pages.heard().hand == {}
-    assert pages.heard().let_go
+    assert pages.collect().hand == {}
+    assert pages.collect().let_go
     say(pages, "a", hand={PULL: 3.5})
-    assert pages.heard().hand == {PULL: 3.5}
+    assert pages.collect().hand == {PULL: 3.5}
     say(pages, "a")
-    heard = pages.heard()
+    heard = pages.collect()
     assert heard.hand == {}
     assert not heard.let_go
 
@@ -258,10 +258,10 @@ def test_another_leads_when_the_first_is_silent_leaves_or_is_taken_the_lead_from
     assert not say(pages, "a")
     assert say(pages, "a", lead=TAKE, hand={PULL: 1.0})
     assert pages.leader == "a"
-    pages.heard()
+    pages.collect()
     assert not say(pages, "a", lead=LEAVE)
     assert pages.leader is None
-    assert pages.heard().let_go
+    assert pages.collect().let_go
     assert say(pages, "b")
     assert not say(pages, "c", lead=LEAVE)
     assert pages.leader == "b"
@@ -270,11 +270,11 @@ def test_another_leads_when_the_first_is_silent_leaves_or_is_taken_the_lead_from
 def test_what_one_hand_asked_for_is_not_done_by_the_next(pages):
     say(pages, "a", hand={PULL: 3.5}, set={KEY: 2})
     say(pages, "b", lead=TAKE, hand={PULL: -1.0})
-    heard = pages.heard()
+    heard = pages.collect()
     assert heard.let_go
     assert heard.hand == {PULL: -1.0}
     assert heard.settings == []
-    assert not pages.heard().let_go
+    assert not pages.collect().let_go
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_what_one_hand_asked_for_is_not_done_by_the_next(pages):
         (b"[" * 5000, "not JSON"),
         (b"\xff\xfe", "not JSON"),
         (b'{"client": "a", "set": {"across k": ' + b"9" * 5000 + b"}}", "not JSON"),
-        (b'["pull x [N]", 3.5]', "no JSON object"),
+        (b'["pull x [N]", 3.5]', "not a JSON object"),
         (b"{}", "client"),
         (b'{"client": 3}', "client"),
         (b'{"client": ""}', "client"),
@@ -300,8 +300,8 @@ def test_what_one_hand_asked_for_is_not_done_by_the_next(pages):
         (b'{"client": "a", "hand": {"pull x [N]": NaN}}', "'pull x [N]'"),
         (b'{"client": "a", "hand": {"pull x [N]": 1e999}}', "'pull x [N]'"),
         (b'{"client": "a", "hand": {"pull x [N]": ' + b"9" * 400 + b"}}", "'pull x [N]'"),
-        (b'{"client": "a", "hand": {"across k": 1}}', "'across k' is no control"),
-        (b'{"client": "a", "set": {"pull x [N]": 1}}', "'pull x [N]' is no control"),
+        (b'{"client": "a", "hand": {"across k": 1}}', "'across k' is not a control"),
+        (b'{"client": "a", "set": {"pull x [N]": 1}}', "'pull x [N]' is not a control"),
         (b'{"client": "a", "set": {"' + b"k" * 900 + b'": 1}}', "kkk...kkk"),
     ],
 )

@@ -245,4 +245,4 @@ def test_after_many_ends_it_draws_no_more_and_says_so():
     for _ in range(20):
         scene.draw("frame", 1.0)
     assert len(said) == 11
-    assert "no more" in said[-1]
+    assert "no longer" in said[-1]

@@ -1,4 +1,4 @@
-"""What a person draws becomes way points, and a session of it is repeated exactly."""
+"""What a person draws becomes waypoints, and a session of it is repeated exactly."""
 
 import json
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from diagrams.tasks.arrivals import END, NEW_PATH, WAY_POINT, read_drawn, told_messages
+from diagrams.tasks.arrivals import END, NEW_PATH, WAYPOINT, read_drawn, waypoint_messages
 from experiments.cli import main
 from experiments.live.page_server import Pages
 from experiments.live.takes import DRAWING
@@ -34,7 +34,7 @@ class Drawing(Rehearsal):
         script = []
         for begin, kind, stroke in strokes:
             for k, part in enumerate(np.array_split(stroke, max(1, len(stroke) // 9))):
-                kinds = [kind if k == i == 0 else WAY_POINT for i in range(len(part))]
+                kinds = [kind if k == i == 0 else WAYPOINT for i in range(len(part))]
                 places = [[*map(float, uv), what] for uv, what in zip(part, kinds, strict=True)]
                 script.append((begin + 0.05 * k, {"draw": places}))
             last = [[*map(float, stroke[-1]), END]]
@@ -61,11 +61,11 @@ def signals(folder):
 def test_the_tool_follows_while_one_draws_and_a_take_is_repeated_to_the_last_bit(tmp_path, capsys):
     rehearsal = Drawing(tmp_path / "takes", NAME)
     first, second = arc(0.0, 2.5, 90, 0.1), arc(0.0, -2.0, 90) + np.array([0.05, 0.03])
-    seen = rehearsal.draw([(0.1, WAY_POINT, first), (0.65, NEW_PATH, second)], 4.0)
-    folder = next(iter(rehearsal.session.kept))
+    seen = rehearsal.draw([(0.1, WAYPOINT, first), (0.65, NEW_PATH, second)], 4.0)
+    folder = next(iter(rehearsal.session.takes))
     log = signals(folder)
     told = [row["plane"] for row in seen if row["plane"] is not None]
-    assert told[-1]["told"] > 100
+    assert told[-1]["sent"] > 100
     assert any(row["status"] == StreamStatus.RUNNING.words for row in told)
     # it went over to the second stroke, and rests at its end
     end = np.array([0.95, -second[-1, 0], 1.0 + second[-1, 1]])
@@ -88,8 +88,8 @@ def test_messages_of_a_drawing_are_those_that_were_told(tmp_path):
     name = tmp_path / DRAWING
     name.write_text("tick,kind,x,y,z\n10,0,1,2,3\n10,0,1.5,2,3\n30,1,4,5,6\n40,2,4,5,6\n")
     events = read_drawn(str(name), 3, 1e-3)
-    assert [event.kind for event in events] == [WAY_POINT, WAY_POINT, NEW_PATH, END]
-    ticks, rows = told_messages(events, WaypointLayout(3, 4))
+    assert [event.kind for event in events] == [WAYPOINT, WAYPOINT, NEW_PATH, END]
+    ticks, rows = waypoint_messages(events, WaypointLayout(3, 4))
     assert ticks.tolist() == [0, 10, 10, 30, 40]
     assert rows[:, 0].tolist() == [0, 1, 2, 3, 3]
     assert rows[:, 1].tolist() == [0, 0, 0, 0, 1]
@@ -106,8 +106,8 @@ def test_places_are_heard_once_and_only_of_who_leads():
     pages = Pages(lambda: 0.0)
     assert pages.hear(b'{"client": "a", "draw": [[0.1, 0.2, 0]]}')
     assert not pages.hear(b'{"client": "b", "draw": [[0.3, 0.2, 0]]}')
-    assert pages.heard().drawn == [[0.1, 0.2, 0.0]]
-    assert pages.heard().drawn == []
+    assert pages.collect().strokes == [[0.1, 0.2, 0.0]]
+    assert pages.collect().strokes == []
 
 
 def test_the_shipped_drawing_is_left_out_of_a_live_session():

@@ -8,7 +8,7 @@ import pytest
 
 from diagrams.environment.operator import read_controls
 from experiments.cli import main
-from experiments.live.live_simulation import RealTimePace
+from experiments.live.live_simulation import RealTimeClock
 from experiments.live.page_server import Pages
 from experiments.live.session import LiveSession
 from experiments.live.start import with_operator
@@ -38,7 +38,7 @@ class Rehearsal:
             self.status,
             TakeFolders(folder, name, [], figures=False, recording=False),
             self.said.append,
-            RealTimePace(lambda: 0.0, lambda _: None),
+            RealTimeClock(lambda: 0.0, lambda _: None),
         )
 
     def _say(self, changes):
@@ -102,7 +102,7 @@ def test_a_take_is_repeated_to_the_last_bit(tmp_path, capsys):
         at(1.3, **{RECORD: True}),
         at(1.45, **{END: True}),
     )
-    first, second = rehearsal.session.kept
+    first, second = rehearsal.session.takes
     log, attributes = datasets(first)
     assert attributes["recorded_from"] == "0.600 s"
     assert log["t"][-1] == pytest.approx(1.3)
@@ -141,7 +141,7 @@ def test_in_space_a_person_changes_the_damping_and_switches_regions(tmp_path):
         at(0.8, **{"along d [Ns/m]": 200.0}),
         at(1.1, **{END: True}),
     )
-    folder = next(iter(rehearsal.session.kept))
+    folder = next(iter(rehearsal.session.takes))
     log, _ = datasets(folder)
     assert set(log["free_damping"][:790, 0]) == {90.0}
     assert set(log["free_damping"][820:, 0]) == {200.0}
@@ -158,6 +158,8 @@ def test_in_space_a_person_changes_the_damping_and_switches_regions(tmp_path):
     sliders = {slider["name"] for slider in rehearsal.status.controls["sliders"]}
     assert "along d [Ns/m]" in sliders
     assert not any(" k [" in name for name in sliders)
+    labels = {slider["label"] for slider in rehearsal.status.controls["sliders"]}
+    assert "damping d, along [Ns/m]" in labels
     again = tmp_path / "again"
     assert main(["run", str(folder / "scenario.yaml"), "--out", str(again), *BARE]) == 0
     assert_same(log, datasets(again)[0])
@@ -173,7 +175,7 @@ def test_a_person_afar_leads_the_tool_a_channel_later(tmp_path):
         "teleoperation.channel.loss=0",
     )
     rehearsal.play(at(0.6, **{"pull y [N]": 8.0}), at(1.6, **{END: True}))
-    folder = next(iter(rehearsal.session.kept))
+    folder = next(iter(rehearsal.session.takes))
     log, _ = datasets(folder)
     y = log["y_t"][:, 1]
     assert np.ptp(y[400:700]) < 1e-4
@@ -203,7 +205,7 @@ def test_a_leader_is_dragged_to_where_the_hand_is(tmp_path):
         at(1.9, **{END: True}),
     )
     assert rehearsal.session._panel.content()["drag"] == 0.15
-    log, _ = datasets(next(iter(rehearsal.session.kept)))
+    log, _ = datasets(next(iter(rehearsal.session.takes)))
     y = log["y_t"][:, 1]
     assert y[-1] - y[0] == pytest.approx(0.07, abs=0.01)
     assert np.ptp(log["y_t"][:, 2]) < 2e-3
@@ -227,14 +229,14 @@ def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
     assert "Press X to reset" in stopped[0][2]["message"]
     assert rehearsal.session.fault is not None
     assert any(line.startswith("fault: ") for line in rehearsal.said)
-    assert list(rehearsal.session.kept.values())[-1].fault == rehearsal.session.fault
+    assert list(rehearsal.session.takes.values())[-1].fault == rehearsal.session.fault
     # a recording that a reset ends is kept, what was done after it when the session ends
-    recorded, last = rehearsal.session.kept
+    recorded, last = rehearsal.session.takes
     assert datasets(recorded)[1]["recorded_from"] == "0.100 s"
     log, attributes = datasets(last)
     assert "recorded_from" not in attributes
     assert attributes["fault"] in stopped[0][2]["message"]
-    scenario = list(rehearsal.session.kept)[-1] / "scenario.yaml"
+    scenario = list(rehearsal.session.takes)[-1] / "scenario.yaml"
     again = tmp_path / "again"
     assert main(["run", str(scenario), "--out", str(again), *BARE]) == 3
     assert_same(log, datasets(again)[0])
@@ -244,7 +246,7 @@ def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
 def test_who_does_nothing_leaves_nothing(tmp_path):
     rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle")
     rehearsal.play(((lambda _: True), [(END, 1.0)]))
-    assert not rehearsal.session.kept
+    assert not rehearsal.session.takes
     assert not (tmp_path / "takes").exists()
 
 
@@ -259,5 +261,5 @@ def test_what_was_done_is_kept_even_if_the_session_breaks(tmp_path):
     rehearsal.session._scene.draw = draw
     with pytest.raises(ValueError, match="something else"):
         rehearsal.play(at(0.05, **{"pull z [N]": 30.0}))
-    (kept,) = rehearsal.session.kept
-    assert (kept / "log.h5").exists()
+    (takes,) = rehearsal.session.takes
+    assert (takes / "log.h5").exists()

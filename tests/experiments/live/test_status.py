@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from diagrams.station import Station
-from experiments.live.status import LiveStatus
+from experiments.live.status import LiveStatus, coordinate_labels
 from pfsc_drake.control.fixtures.contact_program import SLOTS
 from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
@@ -19,7 +19,9 @@ from tests.control.conftest import Robot
 COORDINATES = PathManifold(2, oriented=False).coordinates
 STATION = SimpleNamespace(
     law=SimpleNamespace(
-        linearization=SimpleNamespace(manifold=SimpleNamespace(coordinates=COORDINATES)),
+        linearization=SimpleNamespace(
+            manifold=SimpleNamespace(coordinates=COORDINATES, name="path")
+        ),
         layout=SimpleNamespace(manifold_state=slice(2, 8)),
     ),
     mode_labels=("free", "surface", "edge"),
@@ -50,6 +52,11 @@ def test_it_says_where_the_tool_is_what_acts_and_what_yields():
     assert content["ready"] is False
     assert content["slow"] is True
     assert content["mode"] == "surface"
+    assert content["labels"] == {
+        "eta": "along (eta)",
+        "xi_1": "across (xi_1)",
+        "xi_2": "across (xi_2)",
+    }
 
 
 def test_in_space_it_tells_the_nearest_region_and_what_leads():
@@ -62,7 +69,7 @@ def test_in_space_it_tells_the_nearest_region_and_what_leads():
     slots[:2, :2] = [[1.0, 0.02], [0.0, -1e-4]]
     row[record.fields["near"]] = slots.ravel()
     axes = SpaceManifold(1).coordinates
-    manifold = SimpleNamespace(coordinates=axes)
+    manifold = SimpleNamespace(coordinates=axes, name="space")
     law = SimpleNamespace(
         linearization=SimpleNamespace(manifold=manifold),
         layout=SimpleNamespace(manifold_state=slice(0, 3)),
@@ -72,6 +79,7 @@ def test_in_space_it_tells_the_nearest_region_and_what_leads():
     status = LiveStatus("mine")
     status.observe(station, signals)
     assert status.deviation == {"nearest region": -1e-4}
+    assert status.labels == {"eta_1": "x", "eta_2": "y", "eta_3": "z"}
     assert status.measured == {"eta_1": 4.0, "eta_2": 5.0, "eta_3": 6.0}
     assert status.damping == {"eta_1": 90.0, "eta_2": 90.0, "eta_3": 90.0}
     slots[:, 0] = -1.0
@@ -100,13 +108,13 @@ def chain_at_its_end():
     chain = Robot("comau_racer_1_4").chain
     axes = SpaceManifold(1).coordinates
     law = SimpleNamespace(
-        linearization=SimpleNamespace(manifold=SimpleNamespace(coordinates=axes)),
+        linearization=SimpleNamespace(manifold=SimpleNamespace(coordinates=axes, name="space")),
         layout=SimpleNamespace(manifold_state=slice(0, 3)),
     )
     tool = SimpleNamespace(tool_axis=None, yaw_axis=None)
     place = SimpleNamespace(is_oriented=True, tool=tool)
-    part = SimpleNamespace(belief=SimpleNamespace(robot=chain))
-    task = SimpleNamespace(place=place)
+    part = SimpleNamespace(nominal_model=SimpleNamespace(robot=chain))
+    task = SimpleNamespace(projected_manifold=place)
     station = SimpleNamespace(law=law, robot=chain, part=part, task=task)
     q = np.deg2rad([2.0, 60.0, 74.0, 5.0, 60.0, 3.0])
     return station, {"law": np.zeros(3), "wrench_ext": np.zeros(6), "joint_state": np.tile(q, 4)}
@@ -162,3 +170,10 @@ def test_what_is_not_finite_is_null():
     status = LiveStatus("mine")
     status.observe(STATION, SIGNALS | {"wrench_ext": np.full(6, np.nan)})
     assert status.content()["force"] == [None] * 3
+
+
+def test_rotations_have_their_axes_in_words():
+    labels = coordinate_labels(SpaceManifold(1, (1.0, 0.0, 0.0, 0.0)))
+    assert list(labels.values())[3:] == [f"rotation about {axis} (phi_{axis})" for axis in "zyx"]
+    labels = coordinate_labels(PathManifold(2, oriented=True, yaw_axis=(0.0, 0.0, 1.0)))
+    assert labels["phi"] == "rotation (phi)"

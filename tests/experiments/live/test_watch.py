@@ -9,7 +9,7 @@ from experiments.live.page_server import Pages
 from experiments.live.status import LiveStatus
 from experiments.live.watch import Watch, WatchPanel, run_watch
 from experiments.scenario_file import read_scenario
-from pfsc_drake.drivers.link import WatchingEnd
+from pfsc_drake.drivers.link import ObserverEndpoint
 from pfsc_drake.drivers.messages import RobotMode, RobotStatus, dialect
 from pfsc_drake.drivers.remote_values import Request
 from pfsc_drake.errors import InputError
@@ -36,7 +36,7 @@ class Watched:
 
     def __init__(self):
         self.loop, self.pages, self.frames = Loop(panda()).begin(), Pages(), Frames()
-        end = WatchingEnd(self.loop.end.lcm, self.loop.end.dialect)
+        end = ObserverEndpoint(self.loop.end.lcm, self.loop.end.dialect)
         self.status = LiveStatus("pfc_panda_7r")
         self.panel = WatchPanel(self.pages)
         self.watch = Watch(
@@ -44,7 +44,7 @@ class Watched:
         )
 
     def look(self):
-        self.loop.end.tell(1, self.loop.drive.progress())
+        self.loop.end.publish_progress(1, self.loop.drive.progress())
         return self.watch.look(0.0)
 
     def set(self, name, value):
@@ -53,7 +53,7 @@ class Watched:
     def heeded(self):
         self.loop.end.receive(0.0)
         for request in self.loop.end.requests():
-            self.loop.drive.heed(request)
+            self.loop.drive.handle_request(request)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_what_is_seen(watched):
     assert len(status.angles) == 3
     frame = watched.frames.seen[-1]
     # the robot as it told it, the path's point beside its tool
-    layout = watched.loop.station.task.place.layout
+    layout = watched.loop.station.task.projected_manifold.layout
     on_path = frame.manifold_point[layout.position][:3]
     assert np.linalg.norm(frame.tool_pose[:3] - on_path) < 1e-4
     assert json.dumps(status.content(), allow_nan=False)
@@ -83,14 +83,14 @@ def test_a_loop_in_c_tells_no_coordinates(watched):
     """They are found from what the robot tells, and are those that the controller has."""
     progress = watched.loop.drive.progress()
     bare = {name: value for name, value in progress.items() if name in PROGRESS}
-    watched.loop.end.tell(2, bare)
+    watched.loop.end.publish_progress(2, bare)
     watched.watch.look(0.0)
     status = watched.status
     assert list(status.deviation) == ["xi_1", "xi_2"]
     assert list(status.progress) == ["eta"]
     assert len(status.angles) == 3
-    for kept in (status.deviation, status.progress, status.angles):
-        for name, value in kept.items():
+    for takes in (status.deviation, status.progress, status.angles):
+        for name, value in takes.items():
             assert value == pytest.approx(progress[name], abs=1e-5), name
     assert status.progress["eta"] > 0.01
 
@@ -103,7 +103,7 @@ def test_the_page_slows_pauses_and_goes_on(watched):
     assert drive.override == pytest.approx(0.4)
     watched.look()
     for expected in (0.0, 0.4):
-        watched.set("pause, go on (space)", 1.0)
+        watched.set("pause, resume (space)", 1.0)
         watched.look()
         watched.heeded()
         assert drive.override == pytest.approx(expected)
@@ -127,11 +127,11 @@ def test_nobody_drives_and_another_robot_is_there(watched):
     assert not found.watch.look(0.0)
     assert found.status.phase == "no controller"
     few = RobotStatus(1, np.zeros(6), np.zeros(6), np.zeros(6), RobotMode.MOVE)
-    found.loop.robot_end.tell(few)
+    found.loop.robot_end.send_status(few)
     assert found.watch.look(0.0)
     assert not found.frames.seen
     lost = RobotStatus(1, np.full(7, np.nan), np.zeros(7), np.zeros(7), RobotMode.MOVE)
-    found.loop.robot_end.tell(lost)
+    found.loop.robot_end.send_status(lost)
     found.watch.look(0.0)
     assert not found.frames.seen
 
@@ -147,6 +147,6 @@ def test_a_bus_without_a_robot(monkeypatch):
     monkeypatch.setattr("experiments.live.watch._FIRST", 0.0)
     from pydrake.lcm import DrakeLcm
 
-    end = WatchingEnd(DrakeLcm("memq://"), dialect("panda"))
+    end = ObserverEndpoint(DrakeLcm("memq://"), dialect("panda"))
     with pytest.raises(InputError, match="no status of a robot on PANDA_STATUS"):
-        run_watch(read_scenario("pfc_panda_7r", []), end, port=0, tell=lambda line: None)
+        run_watch(read_scenario("pfc_panda_7r", []), end, port=0, notify=lambda line: None)

@@ -183,7 +183,7 @@ def test_progress_shows_the_error(drawn_log):
     np.testing.assert_allclose(error.lines[0].get_ydata(), -1.0, atol=1e-9)
     assert error.get_ylabel() == "error in mm"
     np.testing.assert_allclose(speed.lines[0].get_ydata(), 0.3)
-    assert "yields" not in drawing.caption
+    assert "compliant" not in drawing.caption
 
 
 def test_small_errors_are_in_micrometres(drawn_log):
@@ -200,7 +200,7 @@ def test_progress_shows_how_far_the_reference_yields(compliant_log):
     expected = 5.0 * np.sin(np.pi * compliant_log.time) ** 2
     np.testing.assert_allclose(yielding.lines[0].get_ydata(), expected, atol=1e-9)
     assert "mm" in yielding.get_ylabel()
-    assert "yields" in drawing.caption
+    assert "compliant" in drawing.caption
     compliant_log["eta_d"].values = compliant_log["eta_p"].values.copy()
     assert len(draw_progress(compliant_log).canvas.axes) == 3
 
@@ -211,7 +211,7 @@ def test_transversal_is_enlarged_after_convergence(drawn_log):
     low, high = panels[1].get_ylim()
     late = 10.0 * np.exp(-9 * 0.25)  # mm, where the last three quarters begin
     assert (low, high) == pytest.approx((-1.2 * late, 1.2 * late))
-    assert titles(drawing)[1] == "The same, scaled to the last three quarters"
+    assert titles(drawing)[1] == "Enlarged, scaled to the last three quarters"
     assert panels[2].get_yscale() == "log"
     assert "reference" not in drawing.caption
 

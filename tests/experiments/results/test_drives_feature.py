@@ -85,7 +85,7 @@ def test_a_short_peak_does_not_hide_the_rest(drawn_log):
     titles = [panel.get_title() for panel in panels]
     assert titles == [
         "Drive torques, axes 1 to 3",
-        "The same, scaled to the last three quarters",
+        "Scaled to the last three quarters",
         "Drive torques, axes 4 to 6",
     ]
     late = np.abs(drawn_log["tau_d"].values[50:, :3]).max()

@@ -6,8 +6,8 @@ import pytest
 from diagrams.scenario import ReferenceParameters
 from experiments.results.fastest_feature import (
     add_limits,
+    applied_torque_metrics,
     draw_fastest,
-    given_metrics,
     plan_metrics,
     rate_warnings,
 )
@@ -55,11 +55,11 @@ def test_signals_at_the_ticks_of_a_run(plan):
 def test_what_was_given(plan):
     log = RunLog(plan.times)
     add_limits(log, plan)
-    assert not given_metrics(log, plan)
+    assert not applied_torque_metrics(log, plan)
     torque = np.zeros((101, 2))
     torque[40] = [-8.0, 1.0]
     log.add("tau_d", torque, limits=LIMITS[:2])
-    metrics = given_metrics(log, plan)
+    metrics = applied_torque_metrics(log, plan)
     share = metrics["given_torque_share"]
     assert share.value == pytest.approx(0.8) and share.source == "at t = 0.400 s"
     # 8 Nm within a sample; 18 Nm are planned in one

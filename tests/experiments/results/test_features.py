@@ -9,7 +9,7 @@ from PIL import Image
 from diagrams.scenario import Scenario
 from experiments.results.features import FEATURES, draw_figures, render_figures
 from experiments.results.run_log import RunLog
-from reporting.registry import known_metric
+from reporting.registry import find_metric
 
 PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axis=1)
 
@@ -110,4 +110,4 @@ def test_a_log_without_samples_has_no_figures():
 def test_requirements_are_of_known_metrics():
     for feature in FEATURES:
         for name in (*feature.requirements(Scenario()), *feature.always):
-            assert known_metric(name) is not None, name
+            assert find_metric(name) is not None, name

@@ -72,8 +72,8 @@ def test_all_panels(drawn_log):
     assert titles(drawing) == [
         "Force along the path's coordinates",
         "Moment along the orientation's coordinates",
-        "Force measured, world axes",
-        "Moment measured, world axes",
+        "Measured force, world axes",
+        "Measured moment, world axes",
     ]
     labels = [panel.get_ylabel() for panel in drawing.canvas.axes]
     assert labels == ["force in N", "moment in Nm", "force in N", "moment in Nm"]
@@ -90,7 +90,7 @@ def test_data_of_the_manifold_force(drawn_log):
 
 def test_measured_over_acting(drawn_log):
     panel = draw_forces(drawn_log).canvas.axes[2]
-    assert set(lines(panel)) == {"acting", "$f_x$", "$f_y$", "$f_z$"}
+    assert set(lines(panel)) == {"actual", "$f_x$", "$f_y$", "$f_z$"}
     np.testing.assert_allclose(lines(panel)["$f_x$"][PUSH], 33.0)
     dashed = [line for line in panel.lines if line.get_linestyle() == "--"]
     np.testing.assert_allclose(dashed[0].get_ydata()[PUSH], 30.0)
@@ -101,20 +101,23 @@ def test_measured_over_acting(drawn_log):
 def test_moments_that_are_noise_are_left_out(drawn_log):
     for name in ("manifold_force", "wrench_ext", "wrench_measured"):
         drawn_log[name].values[:, 3:] = 0.01  # Nm, as 30 N have at a lever of a third of a mm
-    assert [title.split()[0] for title in titles(draw_forces(drawn_log))] == ["Force", "Force"]
+    assert titles(draw_forces(drawn_log)) == [
+        "Force along the path's coordinates",
+        "Measured force, world axes",
+    ]
 
 
 def test_position_only_has_no_moments(drawn_log):
     drawn_log.add("manifold_force", np.ones((201, 3)), "N", ["tau_par", "tau_perp", "tau_cross"])
-    assert titles(draw_forces(drawn_log))[1] == "Force measured, world axes"
+    assert titles(draw_forces(drawn_log))[1] == "Measured force, world axes"
 
 
 def test_acting_alone(drawn_log):
     drawn_log.signals = {"wrench_ext": drawn_log["wrench_ext"]}
     drawing = draw_forces(drawn_log)
-    assert titles(drawing) == ["Force acting, world axes", "Moment acting, world axes"]
+    assert titles(drawing) == ["Actual force, world axes", "Actual moment, world axes"]
     np.testing.assert_allclose(lines(drawing.canvas.axes[0])["$f_x$"][PUSH], 30.0)
-    assert drawing.caption == "The wrench that acts at the tool point."
+    assert drawing.caption == "Actual wrench at the tool point."
 
 
 def test_where_the_sensor_is_not_to_be_trusted(drawn_log):

@@ -91,7 +91,7 @@ def test_walls_that_squeeze_are_named_with_how_deep_it_was():
     log = run(walls, LAG, lambda t, y: np.zeros(3), (1.0, 0, -0.032))
     (said,) = guidance_warnings(log, scenario(LAG))
     assert said.startswith("plane_2 and plane_3 squeezed the tool for 1.5 s from t = 0.000 s on")
-    assert "up to 2 mm in one" in said
+    assert "up to 2 mm inside one" in said
 
 
 PROMISE = GuidanceRules(MASS, DAMPING, 2.0, 1.0)
@@ -258,7 +258,7 @@ def test_what_a_budget_has_not_looked_at_limits_the_speed_and_is_no_alarm():
     ]
     around = [lambda y, clock, ball=ball: ball.distance(*y) for ball in balls]
     parameters = GuidanceParameters(largest_speed=2.0, braking=2.0)
-    nearby = ScheduledRegions(balls, parameters, PERIOD, looks=2)
+    nearby = ScheduledRegions(balls, parameters, PERIOD, budget=2)
     guidance = ProgramGuidance(
         replace(point(REGIONS * 2), near=None), parameters, [math.inf] * len(balls)
     )
@@ -266,7 +266,7 @@ def test_what_a_budget_has_not_looked_at_limits_the_speed_and_is_no_alarm():
 
     def look(z):
         nonlocal memory
-        sight = nearby.look(memory, tuple(z), 0.0, 0.0)
+        sight = nearby.update(memory, tuple(z), 0.0, 0.0)
         memory = sight.memory
         rows = np.zeros((MOST_NEAR, 6))
         rows[:, 0] = -1.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.results.holder_feature import frame_error, holder_metrics, seen_poses
+from experiments.results.holder_feature import frame_error, holder_metrics, relative_poses
 from experiments.results.run_log import RunLog
 from pfsc_drake.geometry.rotation import placed_points
 
@@ -25,14 +25,14 @@ def motions():
 
 def test_what_is_seen_is_where_it_was_placed(motions):
     tool, frames = motions
-    seen = seen_poses(tool, frames)
+    seen = relative_poses(tool, frames)
     assert np.allclose(placed_points(seen[:, :3], frames), tool[:, :3], rtol=0, atol=1e-14)
     turned = frames[:, 3:].reshape(-1, 3, 3) @ seen[:, 3:].reshape(-1, 3, 3)
     assert np.allclose(turned.reshape(-1, 9), tool[:, 3:], rtol=0, atol=1e-14)
 
 
 def test_of_no_samples_nothing_is_seen():
-    assert seen_poses(np.zeros((0, 12)), np.zeros((0, 36))).shape == (0, 12)
+    assert relative_poses(np.zeros((0, 12)), np.zeros((0, 36))).shape == (0, 12)
 
 
 @pytest.mark.parametrize("angle", [1e-9, 1e-3, 2.0])

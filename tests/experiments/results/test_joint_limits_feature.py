@@ -64,12 +64,12 @@ def test_beyond_limits(log):
     assert metrics["joint_velocity_share"].value == pytest.approx(6.0 / 5.5)
     assert metrics["joint_velocity_share"].source == "q_1 at t = 0.300 s"
     assert narrow.warnings(log) == [
-        "joint 1 'j0' passes its limit of 57.3 deg at t = 0.200 s and reaches 74.5 deg at "
-        "t = 0.200 s; the simulation lets it pass",
-        "joint 2 'j1' passes its limit of -11.5 deg at t = 0.200 s and reaches -28.6 deg at "
-        "t = 0.200 s; the simulation lets it pass",
-        "joint 1 'j0' passes its speed limit of 315.1 deg/s at t = 0.300 s and reaches "
-        "343.8 deg/s at t = 0.300 s; the simulation lets it pass",
+        "joint 1 'j0' exceeds its limit of 57.3 deg at t = 0.200 s and reaches 74.5 deg at "
+        "t = 0.200 s; the simulation does not stop it",
+        "joint 2 'j1' exceeds its limit of -11.5 deg at t = 0.200 s and reaches -28.6 deg at "
+        "t = 0.200 s; the simulation does not stop it",
+        "joint 1 'j0' exceeds its speed limit of 315.1 deg/s at t = 0.300 s and reaches "
+        "343.8 deg/s at t = 0.300 s; the simulation does not stop it",
     ]
 
 

@@ -156,7 +156,7 @@ def test_limits_within_reach_are_bands(drawn_log):
         assert low < 0.0 < high
     (beyond,) = spans(panels[3], "beyond a limit")
     assert beyond == pytest.approx((2.0 / 3.0, 1.0), abs=0.006)
-    assert "grey beyond its limits, red where they are passed" in drawing.caption
+    assert "grey beyond its limits, red where they are exceeded" in drawing.caption
     assert [len(bands(panel)) for panel in panels[:4]] == [0, 0, 1, 1]
     assert bands(panels[2])[0][0] == pytest.approx(np.rad2deg(2.2))
 
@@ -166,7 +166,7 @@ def test_spare_joints_have_panels_and_the_posture_is_dashed(drawn_log):
     del drawn_log.signals["phi"]
     drawing = draw_positions(drawn_log)
     assert len(drawing.canvas.axes) == 6
-    assert "out of sight" in drawing.caption
+    assert "out of view" in drawing.caption
     drawn_log.add("q_posture", drawn_log["q_J"].values + 0.5, "rad")
     drawing = draw_positions(drawn_log)
     (dashed,) = [x for x in drawing.canvas.axes[1].lines if x.get_linestyle() == "--"]

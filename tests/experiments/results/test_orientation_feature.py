@@ -55,7 +55,7 @@ def test_angles_in_degrees(drawn_log):
         np.testing.assert_allclose(drawn[r"reference $R_d$"], np.rad2deg(path) * drawn_log.time)
     assert "waits" in drawing.caption
     drawn_log.add("tracking_error", np.zeros((201, 3)), "m")
-    assert "runs on" in draw_angles(drawn_log).caption
+    assert "is a function of time" in draw_angles(drawn_log).caption
 
 
 def test_angles_a_turn_apart_are_the_same(drawn_log):
@@ -84,7 +84,7 @@ def test_zyz_angles_are_called_so(drawn_log):
     drawn_log["phi"].labels = names
     drawn_log["angles_e"].labels = [name.removeprefix("phi_") for name in names]
     drawing = draw_orientation(drawn_log)
-    assert "ZYZ angles of the tool against" in drawing.caption
+    assert "ZYZ angles of the tool relative to" in drawing.caption
     assert r"$\psi$ (about z again)" in lines(drawing.canvas.axes[0])
     assert "ZYZ angles of tool and path" in draw_angles(drawn_log).caption
     for name in names:
@@ -97,7 +97,7 @@ def test_orientation_of_an_axis(drawn_log):
     drawn_log.signals.pop("phi_p", None)
     drawing = draw_orientation(drawn_log)
     assert titles(drawing)[0] == "Error of the tool's axis"
-    assert "the turn about the axis is free" in drawing.caption
+    assert "the rotation about the axis is free" in drawing.caption
     angles, _ = drawing.canvas.axes
     assert set(lines(angles)) == {r"$\varphi$", r"$\vartheta$"}
 
@@ -115,4 +115,4 @@ def test_direction_of_an_axis(drawn_log):
     assert between.get_ylabel() == "angle in mrad"
     assert "waits" in drawing.caption
     drawn_log.add("tracking_error", np.zeros((201, 3)), "m")
-    assert "runs on" in draw_axis(drawn_log).caption
+    assert "is a function of time" in draw_axis(drawn_log).caption

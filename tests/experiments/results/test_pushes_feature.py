@@ -8,7 +8,7 @@ from experiments.results.pushes_feature import (
     draw_pushes,
     elbow_shift,
     elbow_travel,
-    lap_before,
+    previous_revolution,
     push_metrics,
 )
 from experiments.results.run_log import RunLog
@@ -51,7 +51,7 @@ def test_all_metrics(log):
 def test_the_elbows_travel_is_from_its_undisturbed_motion(log):
     elbow, eta = log["elbow"].values, log["eta"].values[:, 0]
     disturbed = log["push_force"].values.any(axis=1)
-    undisturbed = lap_before(eta, elbow, disturbed, LAP)
+    undisturbed = previous_revolution(eta, elbow, disturbed, LAP)
     expected = 0.5 * np.sin(2.0 * np.pi * eta / LAP)
     np.testing.assert_allclose(undisturbed[:, 0], expected, atol=4e-4)
     # without it: from where it was when the push began, the tool's own motion included
@@ -66,14 +66,14 @@ def test_a_push_while_the_tool_rests_after_a_lap():
     eta = np.concatenate([eta, np.linspace(1.00004, 1.5, 250)])
     values = np.sin(2.0 * np.pi * eta)[:, None]
     values[:20] += 0.5
-    expected = lap_before(eta, values, np.arange(len(eta)) > 560, LAP)
+    expected = previous_revolution(eta, values, np.arange(len(eta)) > 560, LAP)
     np.testing.assert_allclose(expected, values, atol=2e-3)
 
 
 def test_no_lap_before_no_undisturbed_motion(log):
     elbow, eta = log["elbow"].values, log["eta"].values[:, 0]
-    assert lap_before(eta, elbow, eta > 0.5, LAP) is None
-    assert lap_before(eta, elbow, eta > 9.0, LAP) is None
+    assert previous_revolution(eta, elbow, eta > 0.5, LAP) is None
+    assert previous_revolution(eta, elbow, eta > 9.0, LAP) is None
 
 
 def test_what_the_elbow_does_before_it_is_pushed_is_no_shift(log):
@@ -120,7 +120,7 @@ def test_pushes_and_the_way_of_the_point(pushed_log):
     titles = [panel.get_title() for panel in panels]
     assert titles[0] == "Force on link_4, world axes"
     assert titles[1] == "Force on hand, world axes"
-    assert titles[2] == "Way of link_4 since the first push"
+    assert titles[2] == "Displacement of link_4"
     assert drawn(panels[0], "$f_y$").max() == 30.0
     assert drawn(panels[2], "distance").max() == pytest.approx(5.0)
     assert not drawn(panels[2], "distance")[:81].any()
@@ -130,7 +130,7 @@ def test_the_way_is_compared_with_an_undisturbed_motion(pushed_log):
     pushed_log.add("elbow_undisturbed", pushed_log["elbow"].values - 0.001, "m")
     drawing = draw_pushes(pushed_log)
     assert drawn(drawing.canvas.axes[-1], "distance") == pytest.approx(3.0**0.5)
-    assert "in the lap before" in drawing.caption
+    assert "in the previous revolution" in drawing.caption
 
 
 def test_no_push_no_figure(pushed_log):

@@ -72,7 +72,7 @@ def test_the_robot_that_holds_the_workpiece_rests_as_well():
     log.add("holder_tau_d", np.stack([0.0 * TIME, 1.5 * swing], axis=1), limits=LIMITS / 2.0)
     shaking = rest_metrics(log, 0.0)["rest_vibration"]
     assert shaking.value == pytest.approx(2 * 1.5 / 20.0, rel=1e-2)
-    assert shaking.source.startswith("axis 2 of the robot that holds the workpiece, rest until")
+    assert shaking.source.startswith("axis 2 of the workpiece robot, rest until")
 
 
 JOINTS = DriveLimitsOfRun(

@@ -136,7 +136,7 @@ def test_singularity_on_the_way(fault, tmp_path):
     assert metrics["joint_limit_margin"]["value"] == pytest.approx(-beyond)
     assert metrics["joint_velocity_share"]["value"] > 1.0
     report = unescape((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
-    assert "joint 3 'motor_3' passes its limit of 80.0 deg at t = " in report
+    assert "joint 3 'motor_3' exceeds its limit of 80.0 deg at t = " in report
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def test_held_or_said(tmp_path, capfd, place_on_path, seed):
     assert status == (3 if fault.any() else 0), told.err
     if status == 0:
         assert metrics["max_path_deviation"]["value"] == pytest.approx(far, abs=1e-4)
-        assert ("the tool was up to" in told.out) == (far > BEARABLE)
+        assert ("the tool deviated by up to" in told.out) == (far > BEARABLE)
     else:
         assert told.err.startswith("fault: ")
 

@@ -63,7 +63,7 @@ def test_an_interrupted_simulation_is_kept(tmp_path):
     assert metrics["peak_torque_1"]["value"] > 0.0
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "interrupted" in page
-    assert "completed" not in page
+    assert "✓ completed" not in page
     assert not (out / "figures").exists()  # who presses Ctrl-C wants no pictures
 
 
@@ -114,7 +114,7 @@ def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     (kept,) = temporary.iterdir()
     assert outcome.problem == (
         "cannot write log.h5, metrics.json, figures, report.html, scenario.yaml into "
-        f"{out}: No such file or directory; kept in {kept}"
+        f"{out}: No such file or directory; saved in {kept}"
     )
     assert (kept / "scenario.yaml").is_file()
     assert samples(kept / "log.h5") == 301

@@ -1,6 +1,7 @@
 """What a run leaves: files, log, metrics, and for how long it runs."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -46,6 +47,13 @@ def test_everything_that_a_run_can_write(six_axes):
     assert report.count("data:image/png;base64,") == len(figures)
     for text in ("pfc_elastic_6r", "max_orientation_error", "keyframes"):
         assert text in report
+    unfolded = re.sub(r"<details.*?</details>", "", report, flags=re.DOTALL)
+    for text in ("Duration", "Saturated drives", "trace of the tool point", "keyframes"):
+        assert text in unfolded
+    for text in ("peak_torque_1", "min_rcond"):
+        assert text not in unfolded
+    assert f"pfsc run {six_axes.folder / 'scenario.yaml'} --out OTHER" in unfolded
+    assert f"pfsc compare {six_axes.folder} OTHER" in unfolded
 
 
 SIGNALS = {

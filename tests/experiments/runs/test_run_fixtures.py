@@ -142,7 +142,7 @@ def test_a_soft_region_yields_like_its_spring(tmp_path):
         (["start.position=[]"], "start.position"),
         (["compliance.tangential.stiffness.value=100"], "compliance.tangential"),
         (["fixtures.guidance.approach_time=0"], "approach_time = 0.0; allowed: a positive number"),
-        (["fixtures.guidance.tank.initial=2"], "'fixtures.guidance.tank': initial = 2"),
+        (["fixtures.guidance.tank.initial=2"], "fixtures.guidance.tank.initial = 2"),
         (["fixtures.servo_lag=1"], "servo_lag = 1.0; allowed: below 0.1 s"),
         (["fixtures.looks=1"], "looks = 1; allowed: 0, or 2 and more"),
         (["fixtures.regions=[{admissible: inside}]"], "fixtures.regions[0]"),

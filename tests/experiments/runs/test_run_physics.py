@@ -238,8 +238,8 @@ def test_only_the_elastic_law_stays(three_axes):
 
 
 @pytest.mark.slow(but="points1--1")
-@pytest.mark.parametrize(("points", "laps"), [([1.58, 1.68], 1), ([0.03, -0.07], -1)])
-def test_a_closed_path_counts_laps(three_axes, points, laps):
+@pytest.mark.parametrize(("points", "revolutions"), [([1.58, 1.68], 1), ([0.03, -0.07], -1)])
+def test_a_closed_path_counts_revolutions(three_axes, points, revolutions):
     length = LEMNISCATE.length  # 1.598 m
     reference = f"reference={{points: {points}, velocity: 1.5, acceleration: 20, dwell: 0.1}}"
     result = three_axes(reference, "start.offset=[0, 0]", duration="0.45")
@@ -251,8 +251,8 @@ def test_a_closed_path_counts_laps(three_axes, points, laps):
     theta = result["theta"][:, 0]
     assert np.abs(np.diff(theta)).max() < 0.05  # no jump at the seam
     assert LEMNISCATE.arc_length(theta[-1]) == pytest.approx(end, abs=1e-5)
-    on_first_lap = LEMNISCATE.pose(end - laps * length)[0]
-    np.testing.assert_allclose(result["y_t"][-1], on_first_lap, atol=1e-5)
+    in_first_period = LEMNISCATE.pose(end - revolutions * length)[0]
+    np.testing.assert_allclose(result["y_t"][-1], in_first_period, atol=1e-5)
 
 
 @pytest.mark.slow(but="elastic")

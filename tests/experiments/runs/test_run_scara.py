@@ -50,7 +50,7 @@ def test_two_turns_and_one_angle_everywhere(scara):
     assert run.metrics["max_orientation_error"]["value"] == np.abs(run["phi"][late]).max()
     assert {"angles.png", "orientation.png"} <= {p.name for p in (run.folder / "figures").iterdir()}
     page = (run.folder / "report.html").read_text(encoding="utf-8")
-    assert "its tilt is no task" in page
+    assert "its tilt is not controlled" in page
     # the arm cannot tilt its tool
     np.testing.assert_allclose(run["R_e"][:, 8], -1.0, rtol=0, atol=1e-12)
 

@@ -1,4 +1,4 @@
-"""A tool follows way points that come while it moves, and goes over to a new path."""
+"""A tool follows waypoints that come while it moves, and goes over to a new path."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ DEGREE, DURATION = 6, 1.5
 
 
 def spline_of(name):
-    """Return the spline that a file's way points make, and the sites of the first and the last."""
+    """Return the spline that a file's waypoints make, and the sites of the first and the last."""
     w = read_waypoints(SCENARIO_DIRECTORY / "paths" / name).positions
     count, reach, s = len(w), 3, (DEGREE + 1) / 24.0
     c = w.copy()

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.studies.crossings import random_crossings, summary
 from experiments.sweep.worker import COMPLETED, RunRow
-from pfsc_drake.physics.moving_obstacle import ObstacleParameters, Stride
+from pfsc_drake.physics.moving_obstacle import ObstacleParameters, ObstacleWaypoint
 from reporting.metrics import Metrics
 
 
@@ -13,7 +13,9 @@ from reporting.metrics import Metrics
 def test_ways_cross_the_path_and_keep_away_from_the_start():
     for scenario in random_crossings(20, seed=3).values():
         (moving,) = scenario.data["obstacles"]["moving"]
-        way = ObstacleParameters(way=[Stride(x["time"], x["position"]) for x in moving["way"]])
+        way = ObstacleParameters(
+            way=[ObstacleWaypoint(x["time"], x["position"]) for x in moving["way"]]
+        )
         assert way.largest_speed <= 1.6
         assert way.way[0].time <= 0.0
         curve = way.curve

@@ -19,9 +19,9 @@ def test_the_page_is_written(tmp_path, monkeypatch):
     metrics = {name: metric["value"] for name, metric in found.items()}
     assert metrics["short: time"] < 0.9 * metrics["short: time, slowed"]
     assert metrics["short: time, finer grid"] == pytest.approx(metrics["short: time"], rel=0.02)
-    assert metrics["short, as believed: deviation"] < 5e-5
-    assert metrics["short, as believed: torque by plan"] == pytest.approx(1.0, abs=0.01)
-    heavier = metrics["short, masses believed 5 % too low: deviation"]
+    assert metrics["short, nominal model: deviation"] < 5e-5
+    assert metrics["short, nominal model: torque relative to plan"] == pytest.approx(1.0, abs=0.01)
+    heavier = metrics["short, nominal masses 5 % too low: deviation"]
     assert 5e-5 < heavier < 5e-3
     assert len(said) == 6
     assert (tmp_path / "out" / "report.html").stat().st_size > 10_000

@@ -46,4 +46,4 @@ def test_the_identified_model_drives_as_well_as_the_true_one(out):
     assert metrics["pfc_delta_ratio"]["value"] == pytest.approx(1.0, abs=0.1)
     assert metrics["pfc_delta_ratio"]["target"] == "<= 1.5"
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert "Driven with what was identified" in page
+    assert "Control with the identified model" in page

@@ -27,7 +27,7 @@ def test_both_arms_keep_their_geometry_at_another_speed():
 
 @pytest.mark.slow
 def test_jets_beat_the_pose_alone(tmp_path):
-    world, lines = "nothing wrong", []
+    world, lines = "exact models and sensors", []
     first, *_, last = SOURCES
     told = {name: SOURCES[name] for name in (first, last)}
     report = write_two_arms(tmp_path, lines.append, {world: WORLDS[world]}, told, [0.3])

@@ -9,7 +9,7 @@ from experiments.scenario_file import read_scenario
 from pfsc_drake.yaml.reading import dump_yaml
 
 
-class LedTool:
+class GuidedTool:
     """A tool that is led along a curve, which the controller sees a constant shift away."""
 
     SHIFT = np.array([2e-3, -1e-3, 0.0])
@@ -45,12 +45,12 @@ def fixture_wave():
     x = np.concatenate([np.zeros(500), np.linspace(0.0, 1.0, 3000), np.ones(500)])
     y = np.stack([0.8 + 0.0 * x, 0.3 * x, 1.0 + 0.02 * np.sin(2 * np.pi * x)], axis=1)
     tremor = 1e-4 * np.random.default_rng(0).normal(size=y.shape)
-    return LedTool(y + tremor, np.stack([np.pi + 0 * x, 0 * x, 0.5 * x], axis=1))
+    return GuidedTool(y + tremor, np.stack([np.pi + 0 * x, 0 * x, 0.5 * x], axis=1))
 
 
 @pytest.fixture(name="still")
 def fixture_still():
-    return LedTool(np.tile([0.8, 0.0, 1.0], (500, 1)), np.tile([np.pi, 0.0, 0.0], (500, 1)))
+    return GuidedTool(np.tile([0.8, 0.0, 1.0], (500, 1)), np.tile([np.pi, 0.0, 0.0], (500, 1)))
 
 
 @pytest.fixture(name="lap")
@@ -58,4 +58,4 @@ def fixture_lap():
     """Once round a circle of 0.1 m, all but 5 mm."""
     angle = np.linspace(0.0, 2.0 * np.pi - 0.05, 3000)
     y = np.stack([0.8 + 0.1 * np.cos(angle), 0.1 * np.sin(angle), 1.0 + 0.0 * angle], axis=1)
-    return LedTool(y, np.tile([np.pi, 0.0, 0.0], (3000, 1)))
+    return GuidedTool(y, np.tile([np.pi, 0.0, 0.0], (3000, 1)))

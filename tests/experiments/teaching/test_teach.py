@@ -57,8 +57,8 @@ def test_a_robot_that_repeats_itself_has_the_same_error(wave):
     again.add("eta", again.time, "m")
     followed = FollowedShape(taught, again)
     assert followed.eta[0] == pytest.approx(0.5)
-    assert followed.seen == pytest.approx(np.full(len(followed.eta), 5e-4))
-    assert followed.true == pytest.approx(np.full(len(followed.eta), 2e-3))
+    assert followed.measured == pytest.approx(np.full(len(followed.eta), 5e-4))
+    assert followed.actual == pytest.approx(np.full(len(followed.eta), 2e-3))
     assert followed.repeated.max() <= 1e-4 + 1e-12
     error = wave.SHIFT - [1e-4, 0.0, 0.0]
     assert followed.error == pytest.approx(np.full(len(followed.eta), np.linalg.norm(error)))
@@ -207,16 +207,16 @@ def test_it_runs_by_its_name(monkeypatch, tmp_path):
     from experiments.teaching import teach
     from reporting.page import Report
 
-    seen = []
+    outs = []
 
     def write(out, progress):
-        seen.append(out)
+        outs.append(out)
         return Report(out / "report.html", None)
 
     monkeypatch.setattr(teach, "write_teach_in", write)
     assert main(["run", "teach_in", "--out", str(tmp_path / "one")]) == 0
     assert main(["study", "teach_in", "--out", str(tmp_path / "two")]) == 0
-    assert seen == [tmp_path / "one", tmp_path / "two"]
+    assert outs == [tmp_path / "one", tmp_path / "two"]
 
 
 pytestmark = pytest.mark.slow

@@ -25,13 +25,13 @@ def test_wrap_leaves_open_curves_alone() -> None:
     assert PiecewisePolynomialCurve.line([0, 0], [1, 0]).wrap(5.0) == 5.0
 
 
-def test_laps_are_whole_periods_out_of_the_domain() -> None:
+def test_revolutions_are_whole_periods_out_of_the_domain() -> None:
     circle = FourierCurve.circle([0.0, 0.0, 0.0], 1.0)
     theta = np.array([-7.0, -0.1, 0.0, 3.0, 2.0 * math.pi, 6.3, 20.0])
-    laps = circle.laps(theta)
-    np.testing.assert_array_equal(laps, [-2, -1, 0, 0, 0, 1, 3])
-    np.testing.assert_allclose(theta - laps * circle.period, circle.wrap(theta), atol=1e-14)
-    assert PiecewisePolynomialCurve.line([0, 0], [1, 0]).laps(5.0) == 0.0
+    revolutions = circle.revolutions(theta)
+    np.testing.assert_array_equal(revolutions, [-2, -1, 0, 0, 0, 1, 3])
+    np.testing.assert_allclose(theta - revolutions * circle.period, circle.wrap(theta), atol=1e-14)
+    assert PiecewisePolynomialCurve.line([0, 0], [1, 0]).revolutions(5.0) == 0.0
 
 
 def test_open_curve_refuses_parameters_outside() -> None:

@@ -1,4 +1,4 @@
-"""Orientation curves: keyframes, signs, laps."""
+"""Orientation curves: keyframes, signs, revolutions."""
 
 import math
 
@@ -46,7 +46,7 @@ def test_steady_rotation_passes_every_representation_singularity() -> None:
 
 
 @pytest.mark.parametrize("smoothness", [2, 3, 5])
-def test_full_turn_takes_two_laps(smoothness: int) -> None:
+def test_full_turn_takes_two_revolutions(smoothness: int) -> None:
     count = 16
     angle = 2 * np.pi * np.arange(count + 1) / count
     q = _about_z(angle)
@@ -66,7 +66,7 @@ def test_full_turn_takes_two_laps(smoothness: int) -> None:
     np.testing.assert_allclose(before, -after, atol=1e-10)
 
 
-def test_closed_without_turn_takes_one_lap() -> None:
+def test_closed_without_turn_takes_one_revolution() -> None:
     angle = 0.5 * np.sin(2 * np.pi * np.arange(10) / 10)
     curve = interpolate_orientation(_about_z(angle), np.arange(11.0), smoothness=3, closed=True)
     assert curve.period == pytest.approx(10.0)

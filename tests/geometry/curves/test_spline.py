@@ -31,7 +31,7 @@ def _jumps(curve, order: int) -> np.ndarray:
 @pytest.mark.parametrize("closed", [False, True])
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=10, deadline=None)
-def test_interpolates_with_the_class_wanted(smoothness: int, closed: bool, seed: int) -> None:
+def test_interpolates_with_the_requested_class(smoothness: int, closed: bool, seed: int) -> None:
     rng = np.random.default_rng(seed)
     angle = np.arange(11) * 0.5
     points = np.stack([np.cos(angle), np.sin(angle), np.sin(2 * angle)], axis=1)
@@ -65,7 +65,7 @@ def test_open_spline_reproduces_polynomials(smoothness: int) -> None:
 
 
 @pytest.mark.parametrize("smoothness", SMOOTHNESS)
-def test_closed_spline_does_not_depend_on_where_the_lap_starts(smoothness: int) -> None:
+def test_closed_spline_does_not_depend_on_the_start_of_its_period(smoothness: int) -> None:
     rng = np.random.default_rng(2)
     angle = np.sort(rng.uniform(0, 2 * np.pi, 10))
     points = np.stack([np.cos(angle), np.sin(angle), 0.3 * np.cos(3 * angle)], axis=1)

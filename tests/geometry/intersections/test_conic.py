@@ -25,8 +25,8 @@ def test_an_ellipse_goes_through_its_points_from_the_first_on(seed, ratio):
     points, matrix = ellipse(seed, ratio)
     curve = line_or_ellipse(points, is_closed=True)
     np.testing.assert_allclose(curve.constant, matrix[0], rtol=0, atol=1e-10)
-    made = curve.derivatives(ANGLES, 0)[:, 0]
-    np.testing.assert_allclose(made, points, rtol=0, atol=1e-9)
+    result = curve.derivatives(ANGLES, 0)[:, 0]
+    np.testing.assert_allclose(result, points, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("bump", [1e-3, 1e-8])

@@ -20,7 +20,7 @@ class Projection(NamedTuple):
     """Result of the orthogonal projection onto a curve, (3.6).
 
     Attributes:
-        theta: Parameter of the closest point, unwrapped: it goes on over the laps.
+        theta: Parameter of the closest point, unwrapped: it counts revolutions.
         alpha: (3.9); the point lies in the feasible neighbourhood if alpha < 1.
         at_end: True if the curve is open and the point lies beyond one of its ends; theta
             is then that end.

@@ -60,7 +60,7 @@ def twisted_length(twisted: FourierCurve) -> ArcLength:
 
 @given(theta=st.floats(-50.0, 50.0))
 @settings(max_examples=60, deadline=None)
-def test_laps(twisted_length: ArcLength, theta: float) -> None:
+def test_revolutions(twisted_length: ArcLength, theta: float) -> None:
     s = twisted_length
     assert s(theta + 2 * math.pi) - s(theta) == pytest.approx(s.length, abs=1e-12)
     assert s.parameter(s(theta)) == pytest.approx(theta, abs=1e-10)

@@ -58,7 +58,7 @@ def test_agrees_with_double_reflection(
     frame = ParallelTransportFrame(curve)
     start = frame.normals(curve.domain[0])[0]
     thetas, expected = _reference(curve, start, samples)
-    # One lap, without its end: there the next lap begins.
+    # One revolution, without its end: there the next one begins.
     e_perp, e_cross = frame.normals(thetas[:-1])
     assert np.abs(e_perp - expected[:-1]).max() < 1e-9
     tangents = curve.derivatives(thetas[:-1], 1)[:, 1]
@@ -96,18 +96,20 @@ def test_holonomy_is_minus_the_total_torsion(twisted: FourierCurve) -> None:
     assert frame.holonomy == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("laps", [-2, -1, 1, 3])
-def test_laps_turn_the_frame_and_join_smoothly(twisted: FourierCurve, laps: int) -> None:
+@pytest.mark.parametrize("revolutions", [-2, -1, 1, 3])
+def test_revolutions_turn_the_frame_and_join_smoothly(
+    twisted: FourierCurve, revolutions: int
+) -> None:
     frame = ParallelTransportFrame(twisted)
     period = twisted.period
     theta = np.array([0.0, 1.0, 5.0])
     e_perp, e_cross = frame.normals(theta)
-    turned, _ = frame.normals(theta + laps * period)
-    angle = laps * frame.holonomy
+    turned, _ = frame.normals(theta + revolutions * period)
+    angle = revolutions * frame.holonomy
     np.testing.assert_allclose(
         turned, math.cos(angle) * e_perp + math.sin(angle) * e_cross, atol=1e-12
     )
-    seam = laps * period
+    seam = revolutions * period
     before, after = frame.normals(seam - 1e-9)[0], frame.normals(seam + 1e-9)[0]
     np.testing.assert_allclose(before, after, atol=1e-7)
     np.testing.assert_allclose(before - after, 0.0, atol=2e-8)
@@ -200,7 +202,7 @@ def test_errors() -> None:
         ParallelTransportFrame(line).normals(5.0)
 
 
-def test_closed_spline_returns_after_a_lap() -> None:
+def test_closed_spline_returns_after_a_revolution() -> None:
     rng = np.random.default_rng(11)
     angle = 2 * np.pi * np.arange(9) / 9
     points = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)

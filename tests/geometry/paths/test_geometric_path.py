@@ -80,7 +80,7 @@ def test_pose_on_open_path_and_beyond() -> None:
         path.pose(math.nan)
 
 
-def test_pose_counts_laps() -> None:
+def test_pose_counts_revolutions() -> None:
     circle = FourierCurve.circle([0, 0, 0.5], 0.2)
     angle = 2 * np.pi * np.arange(13) / 12
     q = zyx_to_quaternion(np.stack([angle, 0 * angle, 0 * angle], axis=1))

@@ -1,4 +1,4 @@
-"""Projection: constructed feet, dense samples, laps, crossings, ends."""
+"""Projection: constructed closest points, dense samples, revolutions, crossings, ends."""
 
 import math
 
@@ -43,7 +43,7 @@ def _beside(curve: Curve, theta: float, distance: float, angle: float) -> np.nda
     offset=st.floats(-0.05, 0.05),
 )
 @settings(max_examples=150, deadline=None)
-def test_warm_start_finds_the_constructed_foot(
+def test_warm_start_finds_the_constructed_closest_point(
     theta: float, distance: float, angle: float, offset: float
 ) -> None:
     point = _beside(LEMNISCATE, theta, distance, angle)
@@ -55,7 +55,7 @@ def test_warm_start_finds_the_constructed_foot(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_tracks_laps_and_the_crossing_without_changing_the_branch(direction: float) -> None:
+def test_tracks_revolutions_and_the_crossing_without_changing_the_branch(direction: float) -> None:
     projector = Projector(LEMNISCATE)
     theta = 0.3
     for step in range(1, 3000):
@@ -88,13 +88,13 @@ def test_far_guess_descends_to_a_minimum() -> None:
         assert np.linalg.norm(point - sigma) <= before + 1e-12
 
 
-def test_long_steps_do_not_skip_laps() -> None:
+def test_long_steps_do_not_skip_revolutions() -> None:
     # J'' is nearly zero at the guess: a full step of Newton's method is 5e5 rad long.
     circle = FourierCurve.circle([0, 0, 0], 1.0)
-    for lap in (-1, 0, 2):
-        guess = math.pi / 2 - 2e-6 + 2 * math.pi * lap
+    for revolution in (-1, 0, 2):
+        guess = math.pi / 2 - 2e-6 + 2 * math.pi * revolution
         result = Projector(circle).project([0.5, 0.0, 0.0], guess)
-        assert result.theta == pytest.approx(2 * math.pi * lap, abs=1e-10)
+        assert result.theta == pytest.approx(2 * math.pi * revolution, abs=1e-10)
 
 
 @pytest.mark.slow(but="1")
@@ -150,7 +150,7 @@ def test_centre_of_a_circle_is_not_a_strict_minimum() -> None:
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("step", [0.0, 1e-13, -1e-12, 1e-11, -1e-9])
-def test_no_stalled_maximum_counts_as_the_foot(
+def test_no_stalled_maximum_counts_as_the_closest_point(
     centre: list[float], beyond: float, angle: float, step: float
 ) -> None:
     """Just beyond the centre of a circle, at its farthest point: steps end in rounding errors."""

@@ -17,7 +17,7 @@ from pfsc_drake.geometry import (
     PiecewisePolynomialCurve,
     ProjectionStatus,
     WaypointTable,
-    foot,
+    closest_point,
     interpolate,
     interpolate_orientation,
     path_from_waypoints,
@@ -29,7 +29,7 @@ from tests.geometry.paths.newton_projector import Projector
 def _path(closed: bool) -> Path:
     angle = 2 * np.pi * np.arange(12) / 12
     positions = np.stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(2 * angle + 0.4)], axis=1)
-    # A full turn about z per lap: the quaternion returns with its sign flipped.
+    # A full turn about z per revolution: the quaternion returns with its sign flipped.
     quaternions = zyx_to_quaternion(np.stack([angle, 0.2 * np.sin(angle), 0 * angle], axis=1))
     return path_from_waypoints(
         WaypointTable(0.4 * positions, quaternions), smoothness=5, closed=closed
@@ -46,10 +46,10 @@ def test_fields(path: Path, order: int) -> None:
     evaluator = path.evaluator(order)
     layout = evaluator.layout
     rng = np.random.default_rng(order)
-    laps = [0] if not path.closed else [-1, 0, 1, 2]
+    revolutions = [0] if not path.closed else [-1, 0, 1, 2]
     period = path.position.period
-    for lap in laps:
-        theta = rng.uniform(0.1, 0.9) * period + lap * period
+    for revolution in revolutions:
+        theta = rng.uniform(0.1, 0.9) * period + revolution * period
         sigma, first, second = path.position.derivatives(theta, 2)
         e_perp, e_cross = path.frame.normals(theta)
         point = sigma + 0.01 * e_perp - 0.02 * e_cross
@@ -89,7 +89,7 @@ CIRCLE = Path(
 @pytest.mark.slow(but="c")
 @pytest.mark.parametrize("path", [OPEN, CLOSED, WILD, CIRCLE], ids=["open", "closed", "wild", "c"])
 def test_agrees_with_the_projector_wherever_the_guess_is(path: Path) -> None:
-    """Near and far guesses, points near and far, laps, ends, centres: one and the same branch."""
+    """Near and far guesses, points near and far, revolutions, ends, centres: the same branch."""
     evaluator, curve = path.evaluator(3), path.position
     layout = evaluator.layout
     rng = np.random.default_rng(17)
@@ -124,11 +124,11 @@ def test_agrees_with_the_projector_wherever_the_guess_is(path: Path) -> None:
 @pytest.mark.slow(but="-1.5-closed")
 @pytest.mark.parametrize("path", [OPEN, CLOSED, CIRCLE], ids=["open", "closed", "circle"])
 @pytest.mark.parametrize("speed", [0.0, 0.1, 1.5, -1.5])
-def test_ticks_of_a_motion_need_no_long_way(
+def test_ticks_of_a_motion_need_no_further_steps(
     path: Path, speed: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """At 1 ms the foot is found to rounding from the last one, piece after piece."""
-    monkeypatch.setattr(foot, "_MAX_STEPS", foot._TICK_STEPS)
+    """At 1 ms the closest point is found to rounding from the last one, piece after piece."""
+    monkeypatch.setattr(closest_point, "_MAX_STEPS", closest_point._TICK_STEPS)
     curve = path.position
     evaluator = PathEvaluator(curve, path.orientation, path.arc_length, path.frame, 2)
     eta = (0.5 if abs(speed) < 1.0 else 0.2 if speed > 0.0 else 0.8) * path.length
@@ -146,28 +146,28 @@ def test_ticks_of_a_motion_need_no_long_way(
         eta += 1e-3 * speed
 
 
-@pytest.mark.parametrize("laps", [-3, -1, 1, 2])
-def test_laps_turn_the_normal(twisted: FourierCurve, laps: int) -> None:
+@pytest.mark.parametrize("revolutions", [-3, -1, 1, 2])
+def test_revolutions_turn_the_normal(twisted: FourierCurve, revolutions: int) -> None:
     path = Path(twisted)
     evaluator = path.evaluator(2)
     assert abs(path.frame.holonomy) > 0.05
     for theta in (0.4, 3.0, 6.1):
-        unwrapped = theta + laps * twisted.period
+        unwrapped = theta + revolutions * twisted.period
         e_perp, e_cross = path.frame.normals(theta)
-        angle = laps * path.frame.holonomy
+        angle = revolutions * path.frame.holonomy
         expected = math.cos(angle) * e_perp + math.sin(angle) * e_cross
         sigma = twisted.derivatives(theta, 0)[0]
         for out in (evaluator.evaluate_at(unwrapped), evaluator(sigma.tolist(), unwrapped + 1e-3)):
             np.testing.assert_allclose(out[4:7], expected, atol=1e-12)
             assert out[0] == pytest.approx(unwrapped, abs=1e-13)
-            eta = path.arc_length(theta) + laps * path.length
+            eta = path.arc_length(theta) + revolutions * path.length
             assert out[1] == pytest.approx(eta, abs=1e-12)
 
 
-def test_the_seam_is_crossed_both_ways() -> None:
+def test_the_seam_is_crossed_in_both_directions() -> None:
     evaluator, curve = CLOSED.evaluator(2), CLOSED.position
-    for lap in (-2, 0, 1):
-        seam = curve.domain[0] + lap * curve.period
+    for revolution in (-2, 0, 1):
+        seam = curve.domain[0] + revolution * curve.period
         for guess, theta in ((-1e-4, 2e-4), (2e-4, -1e-4), (0.0, -1e-4), (0.0, 1e-4), (1e-4, 0.0)):
             point = curve.derivatives(seam + theta, 0)[0]
             out = evaluator(point.tolist(), seam + guess)
@@ -175,7 +175,7 @@ def test_the_seam_is_crossed_both_ways() -> None:
             assert out[1] == pytest.approx(CLOSED.arc_length(seam + theta), abs=1e-12)
 
 
-def test_centre_of_a_circle_has_no_foot() -> None:
+def test_centre_of_a_circle_has_no_closest_point() -> None:
     """There alpha is one, exactly or up to rounding, whichever way it is computed."""
     evaluator = CIRCLE.evaluator(2)
     for theta in np.linspace(-7.0, 7.0, 57).tolist():
@@ -196,9 +196,9 @@ def test_made_once_for_every_order() -> None:
 def test_everything_is_continuous_across_the_seam() -> None:
     evaluator = CLOSED.evaluator(3)
     period = CLOSED.position.period
-    for lap in (-1, 0, 1, 2):
-        before = evaluator.evaluate_at(lap * period - 1e-9)
-        after = evaluator.evaluate_at(lap * period + 1e-9)
+    for revolution in (-1, 0, 1, 2):
+        before = evaluator.evaluate_at(revolution * period - 1e-9)
+        after = evaluator.evaluate_at(revolution * period + 1e-9)
         np.testing.assert_allclose(before / (1 + abs(after)), after / (1 + abs(after)), atol=1e-6)
 
 
@@ -236,10 +236,10 @@ def test_input_that_is_not_finite() -> None:
 def test_has_no_memory() -> None:
     evaluator = CLOSED.evaluator(3)
     first = evaluator([0.3, 0.2, 0.0], 0.3)
-    kept = first.copy()
+    unchanged = first.copy()
     evaluator([-0.3, 0.1, 0.1], 1.2)
-    np.testing.assert_array_equal(first, kept)
-    np.testing.assert_array_equal(evaluator([0.3, 0.2, 0.0], 0.3), kept)
+    np.testing.assert_array_equal(first, unchanged)
+    np.testing.assert_array_equal(evaluator([0.3, 0.2, 0.0], 0.3), unchanged)
 
 
 def test_evaluate_at_refuses_what_is_not_on_the_path() -> None:
@@ -249,8 +249,8 @@ def test_evaluate_at_refuses_what_is_not_on_the_path() -> None:
         CLOSED.evaluator(2).evaluate_at(math.nan)
 
 
-def test_the_normal_turns_with_every_lap_of_a_table_of_two(twisted: FourierCurve) -> None:
-    """Holonomy, and an orientation that returns after two laps only."""
+def test_the_normal_turns_with_every_revolution_of_a_table_of_two(twisted: FourierCurve) -> None:
+    """Holonomy, and an orientation that returns after two revolutions only."""
     part = np.linspace(0.0, 1.0, 14)
     turn = zyx_to_quaternion(np.stack([2.0 * np.pi * part, 0 * part, 0 * part], axis=1))
     theta = twisted.domain[0] + twisted.period * part
@@ -259,8 +259,8 @@ def test_the_normal_turns_with_every_lap_of_a_table_of_two(twisted: FourierCurve
     path = Path(twisted, orientation)
     assert abs(path.frame.holonomy) > 0.05
     evaluator = path.evaluator(2)
-    for laps in (-3, -2, -1, 0, 1, 2, 3, 4):
-        at = 0.7 + laps * twisted.period
+    for revolutions in (-3, -2, -1, 0, 1, 2, 3, 4):
+        at = 0.7 + revolutions * twisted.period
         sigma = twisted.derivatives(at, 0)[0]
         expected = path.frame.normals(at)[0]
         for out in (evaluator(sigma.tolist(), at + 1e-3), evaluator.evaluate_at(at)):
@@ -270,7 +270,7 @@ def test_the_normal_turns_with_every_lap_of_a_table_of_two(twisted: FourierCurve
 
 @pytest.mark.slow(but="closed")
 @pytest.mark.parametrize("path", [OPEN, CLOSED, WILD], ids=["open", "closed", "wild"])
-def test_the_nearest_place_of_all_is_found(path: Path) -> None:
+def test_the_closest_point_of_all_is_found(path: Path) -> None:
     evaluator, curve = path.evaluator(1), path.position
     samples = curve.derivatives(np.linspace(*curve.domain, 4001), 0)[:, 0]
     rng = np.random.default_rng(5)
@@ -291,7 +291,7 @@ SAMPLES = LEMNISCATE.position.derivatives(ALONG, 0)[:, 0]
 
 @given(COORDINATE, COORDINATE, COORDINATE)
 @settings(max_examples=60, deadline=None)
-def test_the_nearest_place_on_a_curve_that_crosses_itself(x: float, y: float, z: float) -> None:
+def test_the_closest_point_on_a_curve_that_crosses_itself(x: float, y: float, z: float) -> None:
     # Not on the curve's planes of symmetry, where two minima are equal or merge.
     point = np.array([0.7013 + x, 0.2007 + y, 1.153 + z])
     sigma = LEMNISCATE.position.derivatives(LEMNISCATE.nearest(point), 0)[0]
@@ -299,7 +299,7 @@ def test_the_nearest_place_on_a_curve_that_crosses_itself(x: float, y: float, z:
     assert np.linalg.norm(sigma - point) <= least + 1e-12
 
 
-def test_a_place_is_found_for_what_is_not_finite() -> None:
+def test_a_point_is_found_for_infinite_input() -> None:
     """It must be a number, whichever: the projection tells that the point is nowhere."""
     for value in (math.nan, math.inf, -math.inf, 1e300):
         assert math.isfinite(CLOSED.evaluator(1).find([0.0, value, 0.0]))

@@ -125,7 +125,7 @@ def test_orientation_is_smoothed_with_the_position(closed: bool) -> None:
     rng = np.random.default_rng(4)
     count = 500
     part = np.arange(count) / count
-    # one turn a lap: the quaternion of a closed path returns with its sign flipped
+    # one turn a revolution: the quaternion of a closed path returns with its sign flipped
     angles = np.stack([2 * np.pi * part, 0.2 * np.sin(4 * np.pi * part), 0.0 * part], axis=1)
     noisy = angles + np.radians(0.2) * rng.normal(size=angles.shape)
     points = _circle(count) + 1e-4 * rng.normal(size=(count, 3))
@@ -182,10 +182,13 @@ def test_points_that_say_too_little() -> None:
 def test_a_tolerance_is_a_number_too() -> None:
     points = _circle(200) + 1e-4 * np.random.default_rng(4).normal(size=(200, 3))
     table = WaypointTable(points, zyx_to_quaternion(np.zeros((200, 3))))
-    said = path_from_waypoints(table, smoothness=3, tolerance=Tolerance(5e-4, np.radians(1.0)))
+    message = path_from_waypoints(table, smoothness=3, tolerance=Tolerance(5e-4, np.radians(1.0)))
     short = path_from_waypoints(table, smoothness=3, tolerance=5e-4)
-    theta = np.linspace(*said.position.domain, 50)
-    for one, other in ((said.position, short.position), (said.orientation, short.orientation)):
+    theta = np.linspace(*message.position.domain, 50)
+    for one, other in (
+        (message.position, short.position),
+        (message.orientation, short.orientation),
+    ):
         np.testing.assert_array_equal(one.derivatives(theta, 2), other.derivatives(theta, 2))
     with pytest.raises(InputError, match="tolerance"):
         path_from_waypoints(table, smoothness=3, tolerance=-1.0)

@@ -59,7 +59,7 @@ def test_noise(smoothness, noise):
 
 def test_corners_that_swing():
     (sentence,) = warnings(U_TURN, smoothness=5)
-    assert "swings" in sentence
+    assert "overshoots" in sentence
     assert "100 mm apart" in sentence
     assert "path.shape.corner_distance" in sentence
     assert warnings(U_TURN, smoothness=5, corner_distance=0.03) == []
@@ -89,7 +89,7 @@ def test_millimetres():
     assert "up to 300 m from the origin; if they are in mm write unit: mm" in sentence
 
 
-def test_orientation_that_turns_faster_than_was_asked_for():
+def test_orientation_that_turns_faster_than_its_waypoints():
     """Keyframes on uneven places: the spline through them overshoots."""
     line = PiecewisePolynomialCurve.line([0, 0, 0], [0, 1.0, 0])
     theta = np.array([0.0, 0.3, 0.6, 0.62, 0.64, 0.9, 1.0])
@@ -103,7 +103,7 @@ def test_orientation_that_turns_faster_than_was_asked_for():
     assert sentence.endswith("add orientations there")
 
 
-def test_waypoints_in_nearly_one_place():
+def test_nearly_coincident_waypoints():
     """Their direction is chance, and so is the path's: the two are named, not what comes of it."""
     points = np.array([[0.8 + 0.05 * k, 0.0, 0.9] for k in range(6)] + [[1.1, 0.1, 0.9]])
     points[4] = points[3] - [1e-6, 0.0, 0.0]

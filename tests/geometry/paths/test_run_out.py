@@ -49,7 +49,7 @@ def test_it_goes_on_as_smoothly_as_the_path(path: Path, order: int, end: int) ->
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("end", [0, 1])
-def test_derivatives_are_those_of_the_way(path: Path, order: int, end: int) -> None:
+def test_derivatives_along_the_path(path: Path, order: int, end: int) -> None:
     """Differences of each row along the run-out against the next row; arc length by quadrature."""
     evaluator, layout = path.evaluator(order), path.evaluator(order).layout
     sign, end_theta = 2 * end - 1, path.position.domain[end]

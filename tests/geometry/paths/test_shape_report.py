@@ -37,7 +37,7 @@ def test_straight_line() -> None:
     assert report.largest_angle_rate == 0.0
 
 
-def test_place_of_the_narrowest_bend_and_its_rate(twisted: FourierCurve) -> None:
+def test_position_of_the_narrowest_bend_and_its_rate(twisted: FourierCurve) -> None:
     path = Path(twisted)
     report = shape_report(path)
     s = np.linspace(0.0, path.length, 8001)
@@ -83,7 +83,7 @@ def test_distance_of_noisy_points_from_a_smooth_path(closed: bool) -> None:
     found = max(np.linalg.norm(near - point, axis=1).min() for point in points)
     missed = shape_report(path).distance_from_points
     assert missed is not None
-    # samples are up to 0.06 mm beside the foot
+    # samples are up to 0.06 mm beside the closest point
     assert found - 2e-6 < missed <= found + 1e-12
     assert 2e-4 < missed <= 2e-3
 

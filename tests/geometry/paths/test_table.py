@@ -29,10 +29,10 @@ def _rows(table: PathTable, theta: np.ndarray) -> np.ndarray:
     return np.einsum("mnj,mj->mn", table.rows[piece], powers)
 
 
-def _turning(curve: Curve, laps: int) -> OrientationCurve:
-    """Orientation on other breakpoints than the curve's; `laps` turns a lap."""
+def _turning(curve: Curve, revolutions: int) -> OrientationCurve:
+    """Orientation on other breakpoints than the curve's; `revolutions` turns a revolution."""
     part = np.linspace(0.0, 1.0, 14)
-    turn = laps * 2.0 * np.pi * part
+    turn = revolutions * 2.0 * np.pi * part
     angles = np.stack([turn, 0.2 * np.sin(2 * np.pi * part), 0.0 * part], axis=1)
     theta = curve.domain[0] + curve.period * part
     quaternions = zyx_to_quaternion(angles)
@@ -47,8 +47,8 @@ def test_rows_agree_with_the_parts(
     curve = request.getfixturevalue(name)
     path = Path(curve, None if turns is None else _turning(curve, turns))
     table, layout = _table(path, 4)
-    laps = 2 if curve.closed and turns == 1 else 1
-    begin, end = curve.domain[0], curve.domain[0] + laps * curve.period
+    revolutions = 2 if curve.closed and turns == 1 else 1
+    begin, end = curve.domain[0], curve.domain[0] + revolutions * curve.period
     assert table.breakpoints[0] == begin
     assert table.breakpoints[-1] == pytest.approx(end, rel=1e-15)
     theta = np.random.default_rng(0).uniform(begin, end, 3000)

@@ -95,7 +95,7 @@ MATRIX = ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
         ("x,y,z,zyz_deg_1,zyz_deg_2,zyz_deg_3\n0,0,0,0,9e9,0\n", "zyz_deg_2: 9e.09 deg"),
     ],
 )
-def test_errors_name_the_place(tmp_path: FilePath, text: str, message: str) -> None:
+def test_errors_name_the_location(tmp_path: FilePath, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as error:
         read_waypoints(_write(tmp_path, text))
     assert "\n" not in str(error.value)
@@ -178,7 +178,7 @@ def test_progress_of_reading(tmp_path: FilePath) -> None:
 
 
 def test_a_small_closing_gap_counts(tmp_path: FilePath) -> None:
-    """The lap ends at the first point, where its orientation is, not at the last one."""
+    """The revolution ends at the first point, where its orientation is, not at the last one."""
     angle = np.linspace(0.0, 2.0 * np.pi - 1e-4, 40)
     positions = 0.3 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     quaternions = zyx_to_matrix(np.stack([0.3 * np.sin(angle), 0 * angle, 0 * angle], axis=1))
@@ -207,9 +207,9 @@ def test_closed_path(tmp_path: FilePath, repeat: bool, parametrization) -> None:
     path = path_from_waypoints(table, smoothness=5, closed=True, parametrization=parametrization)
     path.require_smoothness(5, "elastic joints")
     assert path.orientation.period == pytest.approx(2 * path.position.period)
-    foot = path.nearest(table.positions[3])
+    closest_point = path.nearest(table.positions[3])
     np.testing.assert_allclose(
-        path.orientation.rotation_matrix(foot), zyx_to_matrix([np.pi / 2, 0, 0]), atol=1e-8
+        path.orientation.rotation_matrix(closest_point), zyx_to_matrix([np.pi / 2, 0, 0]), atol=1e-8
     )
 
 

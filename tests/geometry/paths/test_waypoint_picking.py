@@ -1,4 +1,4 @@
-"""Waypoints picked from a motion: distances, angles, rests, laps, gaps."""
+"""Waypoints picked from a motion: distances, angles, rests, revolutions, gaps."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def chords(points):
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 1000))
-def test_neighbours_are_as_far_apart_as_asked(seed):
+def test_neighbours_are_as_far_apart_as_requested(seed):
     """Whatever the speed: never nearer, and at most one sample further."""
     random = np.random.default_rng(seed)
     steps = np.abs(np.repeat(random.normal(size=(20, 3)), 60, axis=0)) * random.uniform(0, 1e-3)
@@ -109,7 +109,7 @@ def test_the_end_is_the_last_waypoint():
 
 
 @pytest.mark.parametrize("end", [2 * np.pi - 0.05, 2 * np.pi, 2 * np.pi + 0.07, 2 * np.pi + 2.5])
-def test_a_lap_is_cut_where_it_meets_its_begin(end):
+def test_a_revolution_is_cut_where_it_meets_its_begin(end):
     way = circle(0.3, 0.3 + end)
     rows = pick_waypoints(way, None, LAP)
     polygon = np.vstack([way[rows], way[rows[:1]]])
@@ -121,12 +121,12 @@ def test_a_lap_is_cut_where_it_meets_its_begin(end):
     assert np.all(np.diff(angle) > 0.0)
 
 
-def test_a_lap_that_does_not_close_is_refused():
+def test_a_revolution_that_does_not_close_is_refused():
     with pytest.raises(InputError, match=r"^closed path: the tool ended 0.2 m from where it began"):
         pick_waypoints(circle(0.0, np.pi), None, LAP)
 
 
-def test_a_lap_that_goes_nowhere_is_refused():
+def test_a_revolution_without_motion_is_refused():
     with pytest.raises(InputError, match=r"^closed path: the tool went nowhere"):
         pick_waypoints(line(0.025), None, LAP)
 

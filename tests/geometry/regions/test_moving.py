@@ -76,7 +76,7 @@ def test_a_turning_region_is_where_it_was_turned(name, clock):
 
 
 @pytest.mark.parametrize("kind", ["shifted", "turning"])
-def test_no_distance_changes_faster_than_told(kind):
+def test_no_distance_changes_faster_than_its_bound(kind):
     """And one somewhere changes nearly as fast."""
     centre, radius = np.array([0.2, -0.1, 0.3]), 0.5
     rng, fastest = np.random.default_rng(4), 0.0

@@ -1,4 +1,4 @@
-"""Pieces of boundaries: their bounds hold, and the search misses no foot."""
+"""Pieces of boundaries: their bounds hold, and the search misses no closest point."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from pfsc_drake.geometry import interpolate, surface_through_grid, torus
 from pfsc_drake.geometry.regions import plane_curve, surface_region
-from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces, nearest_foot
+from pfsc_drake.geometry.regions.pieces import ClosestBoundaryPoint, Pieces, closest_boundary_point
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
 
 
@@ -71,8 +71,8 @@ class _PlaceFoot(NamedTuple):
     below: bool = False
 
 
-def _foot(point, number, distance, piece, below):
-    """Return an expression of a foot, as `nearest_foot` takes it."""
+def _closest(point, number, distance, piece, below):
+    """Return an expression of a minimum for `closest_boundary_point`."""
     return ca.Function("foot", [point, number], [ca.vertcat(distance, piece, below)])
 
 
@@ -93,16 +93,16 @@ def test_a_piece_may_bulge_far_from_its_disc(bulging):
 
     pieces = Pieces(centre, normal, radius, sag, bends, (False, False))
     x, y, z = places[bulging] - [0.0, 0.0, 0.01]
-    assert NearestFoot(pieces, project)(x, y, z).distance == pytest.approx(0.01)
+    assert ClosestBoundaryPoint(pieces, project)(x, y, z).distance == pytest.approx(0.01)
     point, number = ca.MX.sym("point", 3), ca.MX.sym("number")
     away = ca.norm_2(ca.MX(ca.DM(places).T)[:, number] - point)
-    expression = nearest_foot(pieces, _foot(point, number, away, -1.0, 0.0))
+    expression = closest_boundary_point(pieces, _closest(point, number, away, -1.0, 0.0))
     assert float(expression([x, y, z])[0]) == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("below", [False, True])
-def test_a_foot_hides_its_neighbours_only_where_the_boundary_bends_away(below):
-    """A trough from above: from beyond its centres of curvature another foot may be beside one.
+def test_a_closest_point_hides_its_neighbours_only_where_the_boundary_bends_away(below):
+    """A trough from above: from beyond its centres of curvature another minimum may be beside one.
 
     From below, where it bends away, there is none, and none is looked for.
     """
@@ -118,14 +118,14 @@ def test_a_foot_hides_its_neighbours_only_where_the_boundary_bends_away(below):
         return _PlaceFoot(0.5 if row == 11 and not below else 1.0, (row, 0), below)
 
     pieces, y = Pieces(centre, normal, radius, sag, bends, (False, False)), -1.0 if below else 1.0
-    foot = NearestFoot(pieces, project)(1.02, 0.0, y)
+    closest_point = ClosestBoundaryPoint(pieces, project)(1.02, 0.0, y)
     assert tried[0] == 10
-    assert foot.distance == (1.0 if below else 0.5)
+    assert closest_point.distance == (1.0 if below else 0.5)
     assert not below or not {8, 9, 11, 12} & set(tried)
     point, number = ca.MX.sym("point", 3), ca.MX.sym("number")
-    found = _foot(point, number, ca.if_else(number == 11, 0.5, 1.0), number, float(below))
+    found = _closest(point, number, ca.if_else(number == 11, 0.5, 1.0), number, float(below))
     # what is hidden is not tried, whatever it would be
-    expression = nearest_foot(pieces, found)
+    expression = closest_boundary_point(pieces, found)
     assert float(expression([1.02, 0.0, y])[0]) == (1.0 if below else 0.5)
 
 

@@ -139,11 +139,11 @@ def test_the_ends_of_an_open_profile_go_on_straight():
         nearest = np.hypot(*(every - (x, y)).T).min()
         assert abs(h) == pytest.approx(nearest, abs=2e-6, rel=1e-4)
         assert (h > 0.0) == _encloses(around, x, y)  # right of a way along x
-        foot = np.array([x, y]) - h * np.array(n)
-        assert distance(*foot)[0] == pytest.approx(0.0, abs=1e-10)
+        closest_point = np.array([x, y]) - h * np.array(n)
+        assert distance(*closest_point)[0] == pytest.approx(0.0, abs=1e-10)
 
 
-def test_where_all_places_are_as_near_one_of_them_is_told():
+def test_where_all_points_are_equally_near_one_of_them_is_reported():
     """Around the centre of a circle, whose radius a spline has to a few um."""
     t = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
     curve = interpolate(0.2 * np.stack([np.cos(t), np.sin(t)], axis=1), smoothness=3, closed=True)
@@ -173,10 +173,10 @@ def test_a_bell_is_closed_at_its_tip():
 
 def test_profiles_that_divide_nothing():
     spiral = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.1, 0.4], [0.4, 0.3]])
-    with pytest.raises(InputError, match="its last end, going on straight, meets it"):
+    with pytest.raises(InputError, match="its last end, extended straight, meets it"):
         PlaneCurve(interpolate(spiral, smoothness=3))
     horseshoe = np.array([[-0.2, 0.0], [-0.5, 0.5], [0.0, 1.0], [0.5, 0.5], [0.2, 0.0]])
-    with pytest.raises(InputError, match="its ends, going on straight, meet each other"):
+    with pytest.raises(InputError, match="its ends, extended straight, meet each other"):
         PlaneCurve(interpolate(horseshoe, smoothness=3))
     kinked = PiecewisePolynomialCurve([0.0, 1.0, 2.0], [[[0, 0], [1, 0]], [[1, 0], [1, 1]]])
     with pytest.raises(InputError, match=r"class C\^0; C\^2 or smoother"):

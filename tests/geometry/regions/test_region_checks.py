@@ -25,7 +25,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 class Still:
-    """A course that goes nowhere."""
+    """A motion that goes nowhere."""
 
     largest_rate = 0.0
 
@@ -69,12 +69,12 @@ def test_no_admissible_point_near(scene):
         refuse_forbidden_start(scene, START)
 
 
-def test_a_start_without_a_way_out():
+def test_a_start_without_an_admissible_point_nearby():
     """Two walls that overlap admit nothing; apart by a millimetre they do."""
     floor, ceiling = HalfSpace((0, 0, 0.81), UP), HalfSpace((0, 0, 0.80), (0, 0, -1))
     walls = {"floor": floor, "ceiling": ceiling}
-    (said,) = blocked_start(walls, (0, 0, 0.812))
-    assert "in that of ceiling, and no admissible point" in said
+    (message,) = blocked_start(walls, (0, 0, 0.812))
+    assert "in that of ceiling, and no admissible point" in message
     walls["ceiling"] = HalfSpace((0, 0, 0.811), (0, 0, -1))
     assert blocked_start(walls, (0, 0, 0.812)) == []
     assert blocked_start(walls, (0, 0, 0.8105)) == []
@@ -99,7 +99,7 @@ def test_one_boundary_with_two_sides(scene):
         refuse_same_regions(scene, START)
 
 
-def test_moving_regions_may_begin_at_one_place():
+def test_moving_regions_may_begin_at_one_point():
     regions = {
         name: ShiftedRegion(HalfSpace((0, 0, 0), UP), Still(), UP) for name in ("one", "other")
     }
@@ -125,13 +125,13 @@ def test_moving_regions_may_begin_at_one_place():
 )
 def test_boundaries_that_touch(one, other, angle):
     (sentence,) = tangent_regions({"one": one, "other": other}, (0.05, 0.02, 0.1))
-    told = re.fullmatch(
+    reports = re.fullmatch(
         r"one and other: boundaries touch at \[(.*)\] m, (.*) deg between their normals", sentence
     )
-    place = np.array([float(value) for value in told[1].split(",")])
+    place = np.array([float(value) for value in reports[1].split(",")])
     for region in (one, other):
         assert region.distance(*place)[0] == pytest.approx(0.0, abs=2e-6)
-    assert float(told[2]) == pytest.approx(angle, abs=0.1)
+    assert float(reports[2]) == pytest.approx(angle, abs=0.1)
 
 
 def test_an_obstacle_may_stand_on_the_floor():

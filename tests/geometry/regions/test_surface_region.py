@@ -107,7 +107,7 @@ def test_gradient_is_that_of_the_distance(case):
         turns = [region.distance(*(y + d))[1:] for d in 2e-6 * np.vstack([np.eye(3), -np.eye(3)])]
         if np.abs(np.array(turns) - n).max() < 1e-2:  # no other place is as near
             assert n == pytest.approx(gradient(region.distance, y), abs=1e-5)
-        # the foot
+        # the closest point
         assert abs(region.distance(*(y - h * np.array(n)))[0]) < 1e-12
 
 
@@ -139,7 +139,7 @@ def test_it_is_lipschitz(case, examples):
 
 
 @pytest.mark.slow
-def test_newton_from_the_last_place_is_no_bound(folds):
+def test_newton_from_the_last_projection_is_no_bound(folds):
     """Along a straight way over the valleys it stays behind; the region's distance is global."""
     region, project = SurfaceRegion(folds, above=True), SurfaceProjector(folds).project
     brute = BruteForce(folds, 200)
@@ -147,18 +147,18 @@ def test_newton_from_the_last_place_is_no_bound(folds):
     theta, behind = begin, 0.0
     for x in np.linspace(-0.3, 0.3, 61):
         y = (float(x), 0.05, 0.06)
-        foot = project(y, theta)
-        theta = foot.theta
+        closest_point = project(y, theta)
+        theta = closest_point.theta
         h = region.distance(*y)[0]
         assert abs(h) == pytest.approx(brute(y), abs=1e-7)
-        behind = max(behind, foot.distance - abs(h))
+        behind = max(behind, closest_point.distance - abs(h))
     assert behind > 0.01
 
 
 def test_beyond_the_border_the_sheet_has_ended():
     """The distance is that of the border, admissible, away from it; under the sheet it is not."""
     region = SurfaceRegion(plane(((-0.2, 0.2), (-0.1, 0.1)), ORIGIN, R), above=True)
-    for local, foot, sign in [
+    for local, closest_point, sign in [
         ((0.3, 0.0, 0.05), (0.2, 0.0, 0.0), 1.0),
         ((0.3, 0.2, -0.05), (0.2, 0.1, 0.0), 1.0),
         ((0.1, -0.3, 0.0), (0.1, -0.1, 0.0), 1.0),
@@ -166,7 +166,7 @@ def test_beyond_the_border_the_sheet_has_ended():
         ((0.1, 0.05, 0.04), (0.1, 0.05, 0.0), 1.0),
     ]:
         h, *n = region.distance(*(ORIGIN + R @ local))
-        way = np.subtract(local, foot)
+        way = np.subtract(local, closest_point)
         assert h == pytest.approx(sign * np.linalg.norm(way), abs=1e-13)
         assert R.T @ n == pytest.approx(sign * way / np.linalg.norm(way), abs=1e-12)
 

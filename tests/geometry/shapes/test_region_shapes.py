@@ -104,7 +104,7 @@ def test_distance_is_that_of_brute_force(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_gradient_is_a_unit_vector_and_that_of_the_distance(name):
-    """And the foot, which is h along it away, lies on the boundary."""
+    """The closest point, at the distance h along it, lies on the boundary."""
     distance = CASES[name][0].distance
     rng = np.random.default_rng(6)
     for y in ORIGIN + rng.uniform(-0.4, 0.4, size=(60, 3)):
@@ -144,7 +144,7 @@ def test_inside_is_outside_turned_round(name):
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("height", [-0.3, 0.0, 0.01, 0.014441, 0.3])
-def test_on_the_axis_one_of_the_feet_is_told(name, height):
+def test_on_the_axis_one_of_the_closest_points_is_reported(name, height):
     """Also at centre, apex and vertex, at the centre of the tube, and where curvature ends."""
     distance = CASES[name][0].distance
     for y in (ORIGIN + height * R[:, 2], ORIGIN + 0.3 * R[:, 0]):
@@ -171,14 +171,14 @@ def test_symbols_and_numbers_have_one_formula(name):
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(st.floats(-9.0, 9.0), st.floats(-30.0, 3.0), st.floats(-3.0, 3.0))
 def test_the_cubic_of_a_paraboloid(curvature, exponent, height):
-    """Of the foot's radius u: 2 c^2 u^3 + (1 - 2 c z) u - rho = 0, c and rho of any size."""
+    """Radius u of the closest point: 2 c^2 u^3 + (1 - 2 c z) u - rho = 0, c and rho of any size."""
     c, rho = 10.0**curvature, 10.0**exponent
     region = ParaboloidRegion(c, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), inside=False)
     h, n_x, n_y, n_z = region.distance(rho, 0.0, height)
     u, z = rho - h * n_x, height - h * n_z
     assert n_y == 0.0
     assert math.isfinite(h)
-    # the foot's own slope is that of the normal
+    # slope of the meridian at the closest point from the normal
     slope = -n_x / n_z
     size = abs(h) + rho + abs(height)
     assert slope / (2.0 * c) == pytest.approx(u, abs=1e-14 * size)

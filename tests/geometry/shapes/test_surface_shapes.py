@@ -128,10 +128,12 @@ def test_closed_extrusion_wraps():
     assert surface.closed == (True, False)
     assert surface.domain[1] == (0.0, 0.4)
     theta = np.array([0.3, 0.1])
-    lap = np.add(theta, (3 * profile.period, 0.0))
-    np.testing.assert_allclose(surface.partials(lap, 2), surface.partials(theta, 2), atol=1e-12)
+    revolution = np.add(theta, (3 * profile.period, 0.0))
+    np.testing.assert_allclose(
+        surface.partials(revolution, 2), surface.partials(theta, 2), atol=1e-12
+    )
     sample = surface.flat_sampler(2)
-    np.testing.assert_allclose(sample(*lap), sample(*theta), atol=1e-12)
+    np.testing.assert_allclose(sample(*revolution), sample(*theta), atol=1e-12)
 
 
 def test_cylinder_of_the_experiment():

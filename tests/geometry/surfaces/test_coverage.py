@@ -36,7 +36,7 @@ def test_holes_are_measured_across_seams(closed):
     centre, radius = coverage.hole
     np.testing.assert_allclose(centre, [0.02, 2.25], atol=0.02)
     np.testing.assert_allclose(radius, 0.1, atol=0.012)
-    part = coverage.covered(0.05, SIDES, closed)
+    part = coverage.covered_rectangle(0.05, SIDES, closed)
     if closed:
         assert part[0] == SIDES[0]
         assert part[1].length < 0.25
@@ -46,7 +46,7 @@ def test_holes_are_measured_across_seams(closed):
 
 def test_nothing_covered_is_no_rectangle():
     coverage = cover(np.array([[0.5, 2.2]]), SIDES, 0.01, closed=True)
-    assert coverage.covered(0.01, SIDES, True) is None
+    assert coverage.covered_rectangle(0.01, SIDES, True) is None
 
 
 def test_points_stand_as_they_do_over_most_of_the_area():

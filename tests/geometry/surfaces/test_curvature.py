@@ -57,8 +57,8 @@ def test_principal_curvatures(name):
     surface, expected = CASES[name]
     theta = _places(surface)
     forms = fundamental_forms(surface, theta)
-    wanted = np.array([expected(u, v) for u, v in theta])
-    np.testing.assert_allclose(np.transpose(forms.principal_curvatures), wanted, atol=1e-11)
+    curvatures = np.array([expected(u, v) for u, v in theta])
+    np.testing.assert_allclose(np.transpose(forms.principal_curvatures), curvatures, atol=1e-11)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -82,7 +82,7 @@ def test_it_goes_on_in_its_class(pair, axis, side):
 
 @pytest.mark.slow(but="part of a cylinder-0")
 @pytest.mark.parametrize("axis", [0, 1])
-def test_derivatives_are_those_of_the_way(pair, axis):
+def test_derivatives_along_the_path(pair, axis):
     """Every row along lines out over both borders is the integral of the next order's row."""
     surface, extended = pair
     orders, sample = partial_orders(ORDER), extended.flat_sampler(ORDER)
@@ -136,7 +136,7 @@ def test_it_ends_before_poles_apices_and_its_own_begin():
     assert ExtendedSurface(nearly_closed, ORDER).domain[0].length < 2.0 * math.pi
 
 
-def test_where_even_that_ends_the_border_is_the_foot():
+def test_beyond_the_extension_the_border_has_the_closest_point():
     evaluator, ends_at = SurfaceEvaluator(plane((1.0, 1.0)), 2), 1.25
     theta, eta = (0.98, 0.5), (0.0, 0.0)
     for x in np.linspace(0.98, 1.4, 43):

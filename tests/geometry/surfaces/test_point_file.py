@@ -73,7 +73,7 @@ def test_equal_vertices_are_taken_once_in_the_order_of_the_file(tmp_path):
     np.testing.assert_array_equal(read_surface_points(file)[:, 0], [3.0, 1.0, 2.0])
 
 
-def test_equal_points_of_a_scan_are_taken_once_and_that_is_said(tmp_path):
+def test_equal_points_of_a_scan_are_taken_once_and_reported(tmp_path):
     file = write(tmp_path, "a.csv", b"x,stamp,y,z\n3,1,0,0\n1,2,0,0\n3,3,0,0\n2,4,0,0\n1,5,0,0\n")
     points, notes = read_surface_file(file)
     np.testing.assert_array_equal(points[:, 0], [3.0, 1.0, 2.0])

@@ -78,8 +78,8 @@ def test_residuals_are_the_noise_along_the_normal(scanned):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     ends = np.array(scanned.surface.domain).T
     inside = np.all((left.theta > ends[0]) & (left.theta < ends[1]), axis=1)
-    feet = rows[:, 0] + left.distances[:, None] * normals
-    np.testing.assert_allclose(feet[inside], points[inside], atol=1e-10)
+    closest_points = rows[:, 0] + left.distances[:, None] * normals
+    np.testing.assert_allclose(closest_points[inside], points[inside], atol=1e-10)
 
 
 def test_the_uncertainty_stated_is_that_of_the_error(scanned):
@@ -121,7 +121,7 @@ def roughness(surface):
 
 @pytest.mark.slow(but="6.283185307179586")
 @pytest.mark.parametrize("span", [2.0, 4.0, 2.0 * np.pi])
-def test_what_bends_over_is_seen_from_its_axis(span):
+def test_points_that_bend_over_are_projected_from_their_axis(span):
     fit = fit_scattered(tube(span))
     assert fit.base == "a cylinder"
     assert fit.surface.closed == (span > 6.0, False)
@@ -252,7 +252,7 @@ def test_flying_points_are_named_instead_of_a_fold():
 
 
 @pytest.mark.slow
-def test_a_place_that_points_leave_open_is_named_in_space():
+def test_an_undetermined_point_is_named_in_space():
     """A step of 5 mm: no smooth surface follows, and the scatter about it is said."""
     rng = np.random.default_rng(4)
     points = np.column_stack([rng.uniform(-0.15, 0.15, (3000, 2)), np.zeros(3000)])
@@ -262,7 +262,7 @@ def test_a_place_that_points_leave_open_is_named_in_space():
 
 
 @pytest.mark.slow
-def test_the_place_of_the_largest_hole():
+def test_the_position_of_the_largest_hole():
     points = workpiece(4000)
     flat = flat_place(points)
     centre = np.array([0.05, -0.03])

@@ -20,7 +20,7 @@ from pfsc_drake.geometry import (
     surface_of_revolution,
     torus,
 )
-from pfsc_drake.geometry.surfaces.sheets import _ways
+from pfsc_drake.geometry.surfaces.sheets import _path_lengths
 
 EIGHT = FourierCurve([0, 0, 0], [[0.2, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0.1, 0]])
 EIGHT_BESIDE = FourierCurve([0.5, 0], [[0.2, 0], [0, 0]], [[0, 0], [0, 0.1]])
@@ -77,13 +77,13 @@ def test_single_sheets(surface):
     check_single_sheet(surface)
 
 
-def test_around_a_tube_the_way_across_the_seam_counts():
+def test_around_a_tube_the_path_across_the_seam_counts():
     """Around it the shorter of two, along it the only one."""
     angle, height = np.meshgrid(np.arange(12) * math.pi / 6.0, [0.0, 0.5, 1.0], indexing="ij")
     tube = np.stack([np.cos(angle), np.sin(angle), height], axis=-1)
     other = np.ravel_multi_index(([11, 5, 7], [2, 0, 0]), angle.shape)
     chord = 2.0 * math.sin(math.pi / 12.0)
-    found = _ways(tube, (True, False), np.zeros(3, dtype=int), other)
+    found = _path_lengths(tube, (True, False), np.zeros(3, dtype=int), other)
     np.testing.assert_allclose(found, [chord + 1.0, 5.0 * chord, 5.0 * chord])
 
 

@@ -1,4 +1,4 @@
-"""The surface's point tick by tick: feet, lengths, laps, borders, bad input."""
+"""The surface's point tick by tick: closest points, lengths, revolutions, borders, bad input."""
 
 import math
 
@@ -74,8 +74,8 @@ CASES = {
 )
 @pytest.mark.parametrize("height", [-0.03, 0.0, 0.02])
 @pytest.mark.parametrize("name", CASES)
-def test_a_way_beside_the_surface(name, height):
-    """The feet and partial derivatives at each tick; eta against an independent integral."""
+def test_a_motion_beside_the_surface(name, height):
+    """Closest points and partial derivatives at each tick; eta against an independent integral."""
     surface, middle, reach = CASES[name]
     evaluator = SurfaceEvaluator(surface, 4)
     s = np.linspace(0.0, 2.5, 400)
@@ -120,18 +120,18 @@ def test_eta_is_of_fourth_order_on_a_straight_line_of_parameters():
 
 @pytest.mark.slow
 def test_eta_returns_on_a_cylinder():
-    """Over a closed curve that does not go round, and by the circumference over each lap."""
+    """Over a closed curve without a revolution, and by the circumference over each revolution."""
     evaluator = SurfaceEvaluator(cylinder(0.09, (-0.2, 0.2), TURNED), 2)
     s = np.linspace(0.0, 2.0 * math.pi, 1001)
     theta = np.column_stack([1.0 + 1.5 * np.cos(s), 0.1 * np.sin(s)])
     rows = _follow(evaluator, _above(evaluator.surface, theta, 0.01))
     np.testing.assert_allclose(rows[-1, 2:4], 0.0, atol=1e-12)
-    laps = 40
-    s = np.linspace(0.0, 2.0 * math.pi * laps, 1000 * laps)
+    revolutions = 40
+    s = np.linspace(0.0, 2.0 * math.pi * revolutions, 1000 * revolutions)
     theta = np.column_stack([1.0 + s, 0.1 * np.sin(s)])
     rows = _follow(evaluator, _above(evaluator.surface, theta, -0.02))
-    np.testing.assert_allclose(rows[-1, :2], [1.0 + 2.0 * math.pi * laps, 0.0], atol=1e-11)
-    np.testing.assert_allclose(rows[-1, 2:4], [0.09 * 2.0 * math.pi * laps, 0.0], atol=1e-9)
+    np.testing.assert_allclose(rows[-1, :2], [1.0 + 2.0 * math.pi * revolutions, 0.0], atol=1e-11)
+    np.testing.assert_allclose(rows[-1, 2:4], [0.09 * 2.0 * math.pi * revolutions, 0.0], atol=1e-9)
 
 
 def test_holonomy_on_the_paraboloid():
@@ -194,7 +194,7 @@ def test_border_and_back():
     np.testing.assert_allclose(rows[:, 3], np.minimum(height, 0.15), atol=1e-12)
 
 
-def test_a_far_guess_finds_the_nearest_place():
+def test_a_far_guess_finds_the_closest_point():
     evaluator = SurfaceEvaluator(torus(0.5, 0.1), 2)
     point = _above(evaluator.surface, np.array([0.5, 1.0]), 0.02)
     for guess in [(3.0, 4.0), (6.5, 7.0), (0.5, -2.2), (40.0, 1.0)]:
@@ -270,20 +270,20 @@ def test_what_it_cannot_be_made_of():
         SurfaceEvaluator(surface, 2, orientation=[0.0, 0.0, 0.0, 0.0])
 
 
-@pytest.mark.parametrize("lap", [-2, 0, 3])
+@pytest.mark.parametrize("revolution", [-2, 0, 3])
 @pytest.mark.parametrize("guess", [2.0, -2.0])
-def test_a_far_jump_finds_the_nearest_sheet_on_the_lap_of_the_guess(guess, lap):
-    """Within an elliptic tube the way down from the guess leads to the farther of two feet."""
+def test_a_far_jump_finds_the_nearest_sheet_in_the_period_of_the_guess(guess, revolution):
+    """Within an elliptic tube the descent from the guess leads to the farther of two minima."""
     ellipse = FourierCurve([0, 0, 0], [[0.1, 0, 0]], [[0, 0.14, 0]])
     evaluator = SurfaceEvaluator(extruded_surface(ellipse, (0.0, 0.0, 1.0), 0.3), 2)
-    turns = 2.0 * math.pi * lap
+    turns = 2.0 * math.pi * revolution
     row = evaluator([0.01, 0.0, 0.1], (turns + guess, 0.1), (0.0, 0.0))
     assert row[5] == ProjectionStatus.OK
     np.testing.assert_allclose(row[:2], [turns, 0.1], atol=1e-9)
 
 
 def test_beyond_both_centres_of_curvature_no_maximum_is_taken():
-    """In a sphere, past its centre: f has a maximum at the guess, and the foot is opposite."""
+    """In a sphere, past its centre: f has a maximum at the guess; the closest point is opposite."""
     surface = sphere(0.2, (-1.4, 1.4), TURNED)
     theta = np.array([0.3, 0.2])
     point = ORIGIN + 0.25 * (surface.partials(theta, 0)[0] - ORIGIN)
@@ -313,7 +313,7 @@ def test_eta_over_a_far_jump():
 
 @pytest.mark.slow(but="cylinder")
 @pytest.mark.parametrize("name", CASES)
-def test_the_nearest_place_of_all_is_found(name):
+def test_the_closest_point_of_all_is_found(name):
     surface = CASES[name][0]
     evaluator, ends = SurfaceEvaluator(surface, 1), np.array(surface.domain)
     along = [np.linspace(*own, 121) for own in ends]

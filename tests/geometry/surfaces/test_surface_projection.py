@@ -57,21 +57,23 @@ def test_on_a_cylinder(projectors, u, v, xi):
     """From outside and inside: alpha = -xi / r."""
     radius = 0.09 * (1.0 + xi)
     point = _place(radius * math.cos(u), radius * math.sin(u), 0.1 * v)
-    foot = projectors["cylinder"].project(point)
-    assert foot.converged
-    assert not foot.at_border
-    assert _near(foot.theta[0], u)
-    assert foot.theta[1] == pytest.approx(0.1 * v, abs=1e-13)
-    assert foot.distance == pytest.approx(0.09 * abs(xi), abs=1e-14)
-    assert foot.alpha == pytest.approx(max(-xi, 0.0), abs=1e-12)
+    closest_point = projectors["cylinder"].project(point)
+    assert closest_point.converged
+    assert not closest_point.at_border
+    assert _near(closest_point.theta[0], u)
+    assert closest_point.theta[1] == pytest.approx(0.1 * v, abs=1e-13)
+    assert closest_point.distance == pytest.approx(0.09 * abs(xi), abs=1e-14)
+    assert closest_point.alpha == pytest.approx(max(-xi, 0.0), abs=1e-12)
 
 
 def test_start_of_the_experiment_on_a_cylinder():
     """Section 4.8.1: the initial parameters, as printed."""
     rotation = rotation_from_axes((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
     turned = Turned((0.0, 0.0, 0.505), rotation, inward=True)
-    foot = GlobalProjector(cylinder(0.09, (-0.1, 0.2), turned)).project([0.0899, -0.0628, 0.5092])
-    assert foot.theta == pytest.approx((0.0467, -0.0628), abs=5e-5)
+    closest_point = GlobalProjector(cylinder(0.09, (-0.1, 0.2), turned)).project(
+        [0.0899, -0.0628, 0.5092]
+    )
+    assert closest_point.theta == pytest.approx((0.0467, -0.0628), abs=5e-5)
 
 
 @pytest.mark.parametrize(("u", "v", "xi"), _random(12))
@@ -80,11 +82,11 @@ def test_on_a_sphere(projectors, u, v, xi):
     latitude = 1.3 * v
     flat = radius * math.cos(latitude)
     point = _place(flat * math.cos(u), flat * math.sin(u), radius * math.sin(latitude))
-    foot = projectors["sphere"].project(point)
-    assert foot.converged
-    assert _near(foot.theta[0], u)
-    assert foot.theta[1] == pytest.approx(latitude, abs=1e-11)
-    assert foot.alpha == pytest.approx(-xi, abs=1e-9)
+    closest_point = projectors["sphere"].project(point)
+    assert closest_point.converged
+    assert _near(closest_point.theta[0], u)
+    assert closest_point.theta[1] == pytest.approx(latitude, abs=1e-11)
+    assert closest_point.alpha == pytest.approx(-xi, abs=1e-9)
 
 
 @pytest.mark.parametrize(("u", "v", "xi"), _random(12))
@@ -93,13 +95,13 @@ def test_on_a_torus(projectors, u, v, xi):
     tube = 0.1 * (1.0 + xi)
     flat = 0.5 + tube * math.cos(angle)
     point = _place(flat * math.cos(u), flat * math.sin(u), tube * math.sin(angle))
-    foot = projectors["torus"].project(point)
-    assert foot.converged
-    assert _near(foot.theta[0], u)
-    assert _near(foot.theta[1], angle)
+    closest_point = projectors["torus"].project(point)
+    assert closest_point.converged
+    assert _near(closest_point.theta[0], u)
+    assert _near(closest_point.theta[1], angle)
     ring = 0.5 + 0.1 * math.cos(angle)
     expected = max(-xi, -0.1 * xi * math.cos(angle) / ring)
-    assert foot.alpha == pytest.approx(expected, abs=1e-11)
+    assert closest_point.alpha == pytest.approx(expected, abs=1e-11)
 
 
 @pytest.mark.slow
@@ -127,11 +129,11 @@ def test_on_random_paraboloids():
             (minimize(squared, start, bounds=size, tol=1e-14) for start in starts),
             key=lambda result: result.fun,
         )
-        foot = GlobalProjector(surface).feet(point)[0]
-        borders += foot.at_border
-        assert foot.converged
-        assert foot.distance <= math.sqrt(best.fun) + 1e-12
-        assert foot.distance == pytest.approx(math.sqrt(best.fun), rel=1e-6)
+        closest_point = GlobalProjector(surface).closest_points(point)[0]
+        borders += closest_point.at_border
+        assert closest_point.converged
+        assert closest_point.distance <= math.sqrt(best.fun) + 1e-12
+        assert closest_point.distance == pytest.approx(math.sqrt(best.fun), rel=1e-6)
     assert borders > 3
 
 
@@ -148,52 +150,56 @@ def test_on_random_paraboloids():
 def test_beyond_borders_of_a_plane(x, y, expected):
     surface = plane((1.0, 2.0), ORIGIN, R)
     for guess in [(0.5, 1.0), (0.0, 0.0), (1.0, 2.0), (0.0, 2.0), (5.0, -5.0)]:
-        foot = SurfaceProjector(surface).project(_place(x, y, 0.2), guess)
-        assert foot.converged
-        assert foot.at_border
-        assert foot.theta == pytest.approx(expected, abs=1e-13)
-        assert foot.distance == pytest.approx(math.dist((x, y, 0.2), (*expected, 0.0)), abs=1e-13)
+        closest_point = SurfaceProjector(surface).project(_place(x, y, 0.2), guess)
+        assert closest_point.converged
+        assert closest_point.at_border
+        assert closest_point.theta == pytest.approx(expected, abs=1e-13)
+        assert closest_point.distance == pytest.approx(
+            math.dist((x, y, 0.2), (*expected, 0.0)), abs=1e-13
+        )
 
 
 def test_along_a_slanted_border_the_other_parameter_is_optimal():
     """Of a graph whose tangents are not orthogonal there: one parameter held, the other free."""
     surface = paraboloid(((-0.2, 0.2), (-0.3, 0.3)), 2.0)
     point = [0.5, 0.2, 0.1]
-    foot = SurfaceProjector(surface).project(point, (0.0, -0.2))
-    assert foot.theta[0] == 0.2
-    position, _, second = surface.partials(foot.theta, 1)
+    closest_point = SurfaceProjector(surface).project(point, (0.0, -0.2))
+    assert closest_point.theta[0] == 0.2
+    position, _, second = surface.partials(closest_point.theta, 1)
     assert abs((point - position) @ second) < 1e-12
     along = np.linspace(-0.3, 0.3, 20001)
     line = surface.partials(np.column_stack([np.full_like(along, 0.2), along]), 0)[:, 0]
-    assert foot.distance <= np.linalg.norm(line - point, axis=1).min() + 1e-12
+    assert closest_point.distance <= np.linalg.norm(line - point, axis=1).min() + 1e-12
 
 
 def test_on_a_border_is_not_beyond_it():
     surface = cylinder(0.09, (-0.1, 0.1), TURNED)
     for height, beyond in [(0.1, False), (0.1 + 1e-6, True), (0.1 - 1e-6, False)]:
-        foot = SurfaceProjector(surface).project(_place(0.1, 0.0, height), (0.3, 0.05))
-        assert foot.converged
-        assert foot.at_border == beyond
+        closest_point = SurfaceProjector(surface).project(_place(0.1, 0.0, height), (0.3, 0.05))
+        assert closest_point.converged
+        assert closest_point.at_border == beyond
 
 
 def test_at_the_centre_of_curvature():
     """H is singular on the axis of a cylinder, where alpha is one; beyond it, larger."""
     project = SurfaceProjector(cylinder(0.09, (-0.1, 0.1))).project
-    foot = project([0.0, 0.0, 0.03], (1.0, 0.03))
-    assert foot.alpha == pytest.approx(1.0, abs=1e-14)
+    closest_point = project([0.0, 0.0, 0.03], (1.0, 0.03))
+    assert closest_point.alpha == pytest.approx(1.0, abs=1e-14)
     side = -0.02 * np.array([math.cos(1.0), math.sin(1.0), 0.0])
-    foot = project(side, (1.0, 0.0))
-    assert foot.alpha == pytest.approx(11.0 / 9.0, abs=1e-12) or foot.alpha < 1.0
-    foot = SurfaceProjector(paraboloid((0.3, 0.3), 2.0)).project([0.0, 0.0, 0.25], (0.0, 0.0))
-    assert foot.alpha == pytest.approx(1.0, abs=1e-14)
+    closest_point = project(side, (1.0, 0.0))
+    assert closest_point.alpha == pytest.approx(11.0 / 9.0, abs=1e-12) or closest_point.alpha < 1.0
+    closest_point = SurfaceProjector(paraboloid((0.3, 0.3), 2.0)).project(
+        [0.0, 0.0, 0.25], (0.0, 0.0)
+    )
+    assert closest_point.alpha == pytest.approx(1.0, abs=1e-14)
 
 
 def test_from_the_far_side_it_finds_the_near_one():
     """Where H is not definite the way goes downhill."""
     surface = sphere(0.2, (-1.35, 1.35))
-    foot = SurfaceProjector(surface).project([0.25, 0.02, 0.01], (3.0, 0.4))
-    assert foot.converged
-    assert foot.distance == pytest.approx(math.dist((0.25, 0.02, 0.01), (0, 0, 0)) - 0.2)
+    closest_point = SurfaceProjector(surface).project([0.25, 0.02, 0.01], (3.0, 0.4))
+    assert closest_point.converged
+    assert closest_point.distance == pytest.approx(math.dist((0.25, 0.02, 0.01), (0, 0, 0)) - 0.2)
 
 
 def test_it_stays_on_its_sheet():
@@ -203,8 +209,8 @@ def test_it_stays_on_its_sheet():
     project = SurfaceProjector(surface).project
     theta = (1.2, 0.1)
     for angle in np.linspace(1.2, 2.0, 200):
-        foot = project(surface.partials([angle, 0.1], 0)[0], theta)
-        theta = foot.theta
+        closest_point = project(surface.partials([angle, 0.1], 0)[0], theta)
+        theta = closest_point.theta
         assert theta == pytest.approx((angle, 0.1), abs=1e-10)
 
 
@@ -218,9 +224,9 @@ def fixture_project():
 def test_input_that_is_not_finite(project, bad, where):
     values = [0.1, 0.0, 0.0, 0.2, 0.0]
     values[where] = bad
-    foot = project(values[:3], (values[3], values[4]))
-    assert not foot.converged
-    assert math.isnan(foot.alpha)
+    closest_point = project(values[:3], (values[3], values[4]))
+    assert not closest_point.converged
+    assert math.isnan(closest_point.alpha)
 
 
 def test_global_start_refuses_what_is_not_clear():
@@ -233,13 +239,15 @@ def test_global_start_refuses_what_is_not_clear():
     crossing = GlobalProjector(extruded_surface(eight, (0.0, 0.0, 1.0), 0.3))
     with pytest.raises(InputError, match=r"from the surface at theta = \[.*\] and .*nearer to one"):
         crossing.project([0.0, 0.03, 0.1])
-    foot = crossing.project([0.03, 0.017, 0.1])
-    assert foot.converged
+    closest_point = crossing.project([0.03, 0.017, 0.1])
+    assert closest_point.converged
 
 
-def test_feet_are_sorted_and_none_twice():
+def test_closest_points_are_sorted_and_distinct():
     start = GlobalProjector(torus(0.5, 0.1))
-    feet = start.feet([0.3, 0.0, 0.0])
-    strict = [foot for foot in feet if foot.converged]
+    closest_points = start.closest_points([0.3, 0.0, 0.0])
+    strict = [closest_point for closest_point in closest_points if closest_point.converged]
     assert strict[0].distance == pytest.approx(0.1)
-    assert [foot.distance for foot in strict] == sorted(foot.distance for foot in strict)
+    assert [closest_point.distance for closest_point in strict] == sorted(
+        closest_point.distance for closest_point in strict
+    )

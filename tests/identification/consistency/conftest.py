@@ -1,4 +1,4 @@
-"""Robots, what is known of them, and the consistent set nearest to Tab. C.3."""
+"""Robots, their bounds, and the consistent set nearest to Tab. C.3."""
 
 import numpy as np
 import pytest

@@ -63,7 +63,7 @@ def test_is_the_nearest_to_the_free_estimate(comau_estimate, comau_base, comau_b
 def test_is_the_better_estimate_of_a_consistent_robot(
     comau_regressor, comau_base, comau_bounds, comau
 ):
-    """Chi squared of 52 degrees of freedom; what is required of a robot takes part of it away."""
+    """Chi squared of 52 degrees of freedom; the constraints of a robot reduce it."""
     for link in comau_bounds.links:
         link.least_extent *= 0.5
     motion = measured(comau_regressor, 10.0 * NOISE)

@@ -56,7 +56,7 @@ def test_infimum_of_the_table(comau_base, comau_bounds, printed):
     assert found.chi_squared == pytest.approx(1228.4, abs=0.5)
 
 
-def test_what_is_known_is_kept(set_of_table, comau_bounds):
+def test_bounds_are_satisfied(set_of_table, comau_bounds):
     for link, known in zip(links(set_of_table.parameters), comau_bounds.links, strict=True):
         center, box = link[1:4] / link[0], known.center_of_mass
         assert known.mass[0] - 1e-6 <= link[0] <= known.mass[1] + 1e-6

@@ -19,18 +19,18 @@ def cloud(seed, points=12):
     return random.uniform(0.1, 1.0, points), random.normal(0.3, [0.1, 0.2, 0.4], (points, 3))
 
 
-def parameters_of(masses, places):
+def parameters_of(masses, positions):
     inertia = sum(
-        m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, places, strict=True)
+        m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, positions, strict=True)
     )
-    return link_parameters(masses.sum(), masses @ places / masses.sum(), inertia)
+    return link_parameters(masses.sum(), masses @ positions / masses.sum(), inertia)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_moments_of_points(seed):
-    masses, places = cloud(seed)
-    points = np.column_stack([places, np.ones(len(places))])
-    parameters = parameters_of(masses, places)
+    masses, positions = cloud(seed)
+    points = np.column_stack([positions, np.ones(len(positions))])
+    parameters = parameters_of(masses, positions)
     P = pseudo_inertia(parameters)
     np.testing.assert_allclose(P, (points.T * masses) @ points, rtol=1e-12)
     np.testing.assert_allclose(from_pseudo_inertia(P), parameters, rtol=1e-12)
@@ -70,5 +70,5 @@ def test_distance_is_zero_for_equals_and_independent_of_the_frame():
     assert distance(near, one) == pytest.approx(entropy, rel=1e-2)
     frame = np.random.default_rng(7).normal(size=(4, 4))
     frame[3] = [0.0, 0.0, 0.0, 1.0]
-    moved = distance(frame @ other @ frame.T, frame @ one @ frame.T)
-    assert moved == pytest.approx(distance(other, one), rel=1e-9)
+    transform_parameters = distance(frame @ other @ frame.T, frame @ one @ frame.T)
+    assert transform_parameters == pytest.approx(distance(other, one), rel=1e-9)

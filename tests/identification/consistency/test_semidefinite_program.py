@@ -65,7 +65,7 @@ def test_without_measurements_the_prior_is_left(bounds):
     np.testing.assert_allclose(rho, np.append(prior[:11], 3.0), rtol=1e-3, atol=1e-4)
 
 
-def test_what_is_measured_without_doubt_is_kept(bounds):
+def test_certain_measurements_are_matched(bounds):
     """A prior that is far away does not move it, only what was not measured."""
     measured = np.array([2.0, 0.1, -0.1, 0.2])
     A = np.zeros((5, 12))

@@ -146,18 +146,18 @@ def test_a_scenario_believes_what_was_identified(name, identified, comau):
     true = build_station(scenario, file.parent)
     scenario.controller.model = str(identified.parameters)
     scenario.controller.friction.source = "model"
-    scenario.controller.friction.believed.file = str(identified.parameters)
+    scenario.controller.friction.nominal.file = str(identified.parameters)
     station = build_station(scenario, file.parent)
-    believed, own = station.part.belief.robot, station.robot
+    nominal, own = station.part.nominal_model.robot, station.robot
     for link, plant_link in zip(own.links, true.robot.links, strict=True):
         assert link.mass == plant_link.mass
-    bare = load_subject(identified.parameters.with_name("comau_racer_1_4.sdf"))
-    for link, expected in zip(believed.links[:5], bare.chain.links, strict=False):
+    without_tool_file = load_subject(identified.parameters.with_name("comau_racer_1_4.sdf"))
+    for link, expected in zip(nominal.links[:5], without_tool_file.chain.links, strict=False):
         assert link.mass == pytest.approx(expected.mass, rel=1e-9)
         np.testing.assert_allclose(link.I_C, expected.I_C, atol=1e-9)
     tool = own.links[5].mass - comau.chain.links[5].mass
-    assert believed.links[5].mass == pytest.approx(bare.chain.links[5].mass + tool)
-    np.testing.assert_array_equal(believed.gather("stiffness"), own.gather("stiffness"))
+    assert nominal.links[5].mass == pytest.approx(without_tool_file.chain.links[5].mass + tool)
+    np.testing.assert_array_equal(nominal.gather("stiffness"), own.gather("stiffness"))
 
 
 @pytest.mark.slow
@@ -180,7 +180,7 @@ def test_a_scenario_believes_an_identified_delta_robot(delta, tmp_path):
     scenario.model_error = Scenario().model_error
     scenario.controller.model = str(written.parameters)
     station = build_station(scenario, file.parent)
-    masses = station.part.belief.robot.parameters.masses
+    masses = station.part.nominal_model.robot.parameters.masses
     assert masses.effective_slide == pytest.approx(parameters[0])
     assert masses.effective_plate == pytest.approx(parameters[3])
     assert station.robot.parameters.masses.effective_slide == pytest.approx(parameters[0] / 1.1)

@@ -71,11 +71,11 @@ def test_deviations_are_those_stated(locked):
     clean, runs, distances = steady_motion(locked), 40, []
     for seed in range(runs):
         found = estimate_joint(noisy(clean, seed), **options(locked))
-        kept = [i for i, name in enumerate(found.parameters) if name != "lag"]
+        chosen = [i for i, name in enumerate(found.parameters) if name != "lag"]
         error = found.values - [TRUE[name] for name in found.parameters]
-        covariance = found.covariance[np.ix_(kept, kept)]
-        distances.append(error[kept] @ np.linalg.solve(covariance, error[kept]))
-    freedom = runs * len(kept)
+        covariance = found.covariance[np.ix_(chosen, chosen)]
+        distances.append(error[chosen] @ np.linalg.solve(covariance, error[chosen]))
+    freedom = runs * len(chosen)
     low, high = chi2.ppf([1e-4, 1.0 - 1e-4], freedom)
     # the covariance is itself estimated, from some sixty independent stretches
     assert 0.8 * low < np.sum(distances) < 1.25 * high
@@ -100,9 +100,9 @@ def test_viscous_friction_of_a_locked_joint_is_no_damping():
     assert both.damping == pytest.approx(sure.damping + VISCOUS)
 
 
-def refused(message, signals, **given):
+def refused(message, signals, **options):
     with pytest.raises(InputError, match=message):
-        estimate_joint(signals, **given)
+        estimate_joint(signals, **options)
 
 
 def test_a_joint_that_is_not_twisted():
@@ -114,9 +114,9 @@ def test_a_joint_that_is_not_twisted():
     refused("not excited as an elastic joint: torsion of .* is lost in noise", rigid)
 
 
-def test_one_frequency_does_not_tell_all_apart():
+def test_one_frequency_does_not_distinguish_all_parameters():
     refused(
-        "does not tell .* apart; a motion with more",
+        "does not distinguish .* and .*; a motion with more",
         steady_motion(True, lines=1),
         locked=True,
         viscous=0.0,
@@ -149,21 +149,21 @@ def test_a_link_that_is_late():
     refused("signals at other instants", replace(signals, q=np.roll(signals.q, 2)))
 
 
-def test_locked_or_not_must_be_said():
-    moving, held = steady_motion(False), steady_motion(True)
-    refused("viscous friction not given; must be for a locked joint", held, locked=True)
+def test_the_option_for_locked_joints_is_required():
+    moving, locked_motion = steady_motion(False), steady_motion(True)
+    refused("viscous friction not given; must be for a locked joint", locked_motion, locked=True)
     refused("viscous friction given; must be not", moving, viscous=1.0)
     refused("a locked joint must stand still", moving, locked=True, viscous=1.0)
-    refused("that it is locked has to be said", held)
+    refused("or the option for locked joints", locked_motion)
 
 
 def test_known_noise_of_the_positions():
     signals = noisy(steady_motion(False), 4)
     measured = estimate_joint(signals)
-    told = estimate_joint(signals, position_noise=(POSITION_NOISE, POSITION_NOISE))
-    np.testing.assert_allclose(told.values, measured.values, rtol=1e-3, atol=1e-2)
+    with_noise = estimate_joint(signals, position_noise=(POSITION_NOISE, POSITION_NOISE))
+    np.testing.assert_allclose(with_noise.values, measured.values, rtol=1e-3, atol=1e-2)
     ignored = estimate_joint(signals, position_noise=(0.0, 0.0))
-    assert ignored.stiffness < told.stiffness
+    assert ignored.stiffness < with_noise.stiffness
 
 
 def test_slow_sampling():

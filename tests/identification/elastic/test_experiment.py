@@ -1,4 +1,4 @@
-"""What is found of simulated elastic robots against what they are."""
+"""Estimates of simulated elastic robots compared to their parameters."""
 
 from dataclasses import replace
 
@@ -141,7 +141,7 @@ def test_bad_experiments(arm, faults):
     refused("friction is not known", simulate_locked, replace(arm, viscous=None), faults)
     refused("rms = .* must be positive", simulate_locked, arm, faults, share=0.0)
     refused(
-        "asks motor_. for .* within the drive's",
+        "needs .* at motor_.; must stay within the drive's",
         simulate_locked,
         arm,
         faults,
@@ -153,4 +153,4 @@ def test_bad_experiments(arm, faults):
     refused("of 2 joints", simulate_excited, arm, two, faults)
     weak = replace(arm, effort_limit=np.full(6, 20.0))
     brief = {"periods": 1}
-    refused("asks motor_. for", simulate_excited, weak, excitation(arm), faults, **brief)
+    refused("needs .* at motor_.", simulate_excited, weak, excitation(arm), faults, **brief)

@@ -40,7 +40,7 @@ def comau():
 
 @pytest.fixture(scope="session")
 def other_trajectory(comau):
-    """A motion like that of Tab. C.2, and within the same limits, with joints exchanged in time."""
+    """A motion like the one of Tab. C.2, within the same limits, with joints exchanged in time."""
     excitation = comau.trajectory
     return FourierTrajectory(
         excitation.q_0, -excitation.b, excitation.a, excitation.period, excitation.harmonics
@@ -63,7 +63,7 @@ def measured(motion, tau, noise, period=10.0, periods=4, seed=0, colour=0.0):
 
 @pytest.fixture(scope="session")
 def measure(comau):
-    """Return a function that gives what is measured of the Comau on a motion."""
+    """Return a function that returns a measurement of the Comau on a motion."""
 
     def of_motion(seed=0, motion=None, extra=0.0, noise=1.0, **options):
         motion = comau.motion if motion is None else motion
@@ -75,5 +75,5 @@ def measure(comau):
 
 @pytest.fixture(scope="session")
 def measure_torques():
-    """Return a function that gives what is measured of torques."""
+    """Return a function that returns a measurement of torques."""
     return measured

@@ -50,14 +50,14 @@ def test_motion_that_follows_its_excitation(comau, record_of):
 def test_motion_with_ripple(comau, record_of):
     """20 harmonics are not enough, parameters are biased; noise forbids many more."""
     record = record_of(0.003, position_noise=2e-4)
-    told = []
+    reports = []
     choice = choose_bandwidth(
-        comau.regressor, comau.base, record, skip=0, progress=lambda *args: told.append(args)
+        comau.regressor, comau.base, record, skip=0, progress=lambda *args: reports.append(args)
     )
     assert choice.bandwidth_hz == pytest.approx(4.0)
     assert (choice.excess.p_value > 1e-4).all()
     assert not (choice.excesses[0].p_value > 1e-4).all()
-    assert told[0] == (0.0, "choosing the bandwidth")
+    assert reports[0] == (0.0, "choosing the bandwidth")
     chosen, usual = (
         compare_with_truth(estimate(comau.regressor, comau.base, motion), comau.truth)
         for motion in (choice.motion, average(record, skip=0))

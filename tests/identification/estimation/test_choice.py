@@ -99,7 +99,7 @@ def test_saturation_is_found(comau, data):
     assert [(term.joint, term.kind) for term in choice.model.terms] == [(0, "saturation")]
 
 
-def test_only_kinds_that_are_asked_for(comau, data):
+def test_only_requested_kinds(comau, data):
     choice = choose_friction(comau.regressor, comau.base, *data(stribeck), kinds=["offset"])
     assert choice.model.terms == ()
 
@@ -111,11 +111,11 @@ def test_bad_input(comau, data, measure):
     with pytest.raises(InputError, match="no kind to choose from; allowed: stribeck"):
         choose_friction(comau.regressor, comau.base, motion, other, kinds=[])
     same = tuple(values[:, [1, 1, 1, 1, 1, 1]] for values in comau.motion)
-    with pytest.raises(InputError, match="cannot be told apart"):
+    with pytest.raises(InputError, match="cannot be distinguished"):
         choose_friction(comau.regressor, comau.base, measure(motion=same), other)
     with pytest.raises(InputError, match="regressor without friction"):
-        bare = Regressor(comau.subject, friction=False)
-        choose_friction(bare, comau.base, motion, other)
+        without_friction = Regressor(comau.subject, friction=False)
+        choose_friction(without_friction, comau.base, motion, other)
     q, v, a = (values.copy() for values in comau.motion)
     q[:, 4], v[:, 4], a[:, 4] = 0.1, 0.0, 0.0
     with pytest.raises(InputError, match="joint_5 stands still in the other motion"):

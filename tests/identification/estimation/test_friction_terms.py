@@ -54,7 +54,7 @@ def test_bad_terms(comau, measure):
         FrictionTerm(0, "offset", 1.0)
     with pytest.raises(InputError, match=r"width = 0\.0; must be positive"):
         FrictionTerm(0, "stribeck", 0.0)
-    with pytest.raises(InputError, match=r"joint_1\.f_o is there 2 times"):
+    with pytest.raises(InputError, match=r"joint_1\.f_o appears 2 times"):
         FrictionTerms((FrictionTerm(0, "offset"), FrictionTerm(0, "offset")))
     with pytest.raises(InputError, match=r"joint_9\.f_o; the robot has the joints 1 to 6"):
         terms = FrictionTerms((FrictionTerm(8, "offset"),))

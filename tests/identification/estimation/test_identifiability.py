@@ -1,4 +1,4 @@
-"""Parameters that made-up columns tell apart or not."""
+"""Parameters that artificial columns distinguish or not."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_column_of_zeros(columns):
 def test_columns_that_depend_on_each_other(columns):
     columns[:, 3] = 2.0 * columns[:, 0] - 1e4 * columns[:, 2]
     columns[:, 4] = 1e-3 * columns[:, 1]
-    with pytest.raises(InputError, match=r"^robot.*cannot be told apart: a, c, d; b, e; must move"):
+    with pytest.raises(InputError, match=r"^robot.*cannot be distinguished: a, c, d; b, e; must"):
         factorize(columns, columns[:, 0], NAMES, "robot")
 
 

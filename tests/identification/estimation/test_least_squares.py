@@ -95,7 +95,7 @@ def test_errors_are_as_large_as_predicted(comau, measure):
 
 
 def test_coloured_noise(comau, measure):
-    """White noise's covariance is far too small for it, that of the spectrum is not."""
+    """White noise's covariance is far too small for it, the spectrum's is not."""
     motions = [measure(seed, colour=0.9, periods=5) for seed in range(5)]
     runs = [estimate(comau.regressor, comau.base, motion) for motion in motions]
     assert all(run.coloured.all() for run in runs)

@@ -22,7 +22,7 @@ def system(samples, seed=0):
 
 
 def expected(system, covariances):
-    """Return that of weighted least squares, with matrices written out."""
+    """Return the covariance of weighted least squares, with matrices written out."""
     weight = system.used / system.variance
     X = [system.matrix[:, j] for j in range(JOINTS)]
     inverse = np.linalg.inv(sum(X[j].T @ (weight[:, j, None] * X[j]) for j in range(JOINTS)))

@@ -51,7 +51,7 @@ def test_spread_is_as_predicted(runs):
 
 
 def test_mean_of_the_runs(comau, runs):
-    """Its errors are not larger than what is said of them; nor much smaller."""
+    """Its errors are not larger than predicted; nor much smaller."""
     errors = (runs.mean - comau.truth) / np.sqrt(np.diag(runs.covariance_of_mean))
     assert np.abs(errors).max() < 4.0
     assert 0.6 < np.sqrt(np.mean(errors**2)) < 1.2

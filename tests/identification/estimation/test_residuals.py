@@ -78,7 +78,7 @@ def test_bad_frequencies(comau, result):
 
 
 def test_the_statistic_of_ljung_and_box():
-    """Of few residuals, where ``n + 2`` for n matters; the formula in a loop."""
+    """Few residuals, where ``n + 2`` for n matters; the formula in a loop."""
     n, lags = 40, 4
     e = np.random.default_rng(5).normal(size=(n, 1))
     found = whiteness(e, np.ones((n, 1), bool), ["joint"], lags)

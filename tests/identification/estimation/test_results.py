@@ -1,4 +1,4 @@
-"""What the file holds, read with h5py alone, and what comes back."""
+"""Content of the file, read with h5py alone, and read back."""
 
 from dataclasses import replace
 
@@ -89,12 +89,12 @@ def test_files_that_are_none(path, tmp_path, result):
         save_estimate(tmp_path / "none" / "x.h5", result)
     for name in ("covariance", "motion", "friction"):
         with h5py.File(path, "a") as file:
-            kept = file[name]
+            stored = file[name]
             del file[name]
             with pytest.raises(InputError, match=r"identification\.h5"):
                 file.flush()
                 load_estimate(path)
-            file[name] = kept
+            file[name] = stored
     with h5py.File(path, "a") as file:
         del file["covariance"]
         file["covariance"] = np.eye(3)

@@ -1,4 +1,4 @@
-"""Whether an estimate is to be believed: predicted motions, known truth, signs that cannot be."""
+"""Plausibility of an estimate: predicted motions, ground truth, impossible signs."""
 
 from dataclasses import replace
 
@@ -141,5 +141,5 @@ def test_friction_of_another_form_may_have_a_negative_part(comau, measure):
 def test_torques_that_the_model_does_not_explain(comau, measure):
     extra = np.zeros_like(comau.motion[0])
     extra[:, 1] = 300.0 * np.sin(7.0 * comau.motion[0][:, 1])
-    with pytest.raises(InputError, match=r"tau of joint_2 is [\d.]+ times the noise .* gravity"):
+    with pytest.raises(InputError, match=r"tau of joint_2: [\d.]+ times the noise .* gravity"):
         refuse_implausible(found(comau, measure(extra=extra)))

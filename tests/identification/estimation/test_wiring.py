@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from identification.estimation.wiring import find_mistake, unchecked
+from identification.estimation.wiring import doubtful_signals, find_mistake
 from identification.excitation.fourier import FourierTrajectory
 from identification.model.base import base_parameters
 from identification.model.dynamic_parameters import true_parameters
@@ -27,7 +27,7 @@ def fixture_arm():
 
 @pytest.fixture(name="sound", scope="module")
 def fixture_sound(arm, measure_torques):
-    """Return what is measured of the arm."""
+    """Return a measurement of the arm."""
     regressor, _, truth = arm
     random = np.random.default_rng(3)
     a, b = random.uniform(-0.6, 0.6, (2, JOINTS, 2))
@@ -100,10 +100,10 @@ def test_exchanged_joints_are_named(arm, sound, pair, signals):
 
 
 @pytest.mark.parametrize("joint", range(JOINTS))
-@pytest.mark.parametrize(("factor", "said"), [(180.0 / np.pi, "deg"), (np.pi / 180.0, "rad")])
-def test_a_unit_of_an_angle_is_named(arm, sound, joint, factor, said):
+@pytest.mark.parametrize(("factor", "notes"), [(180.0 / np.pi, "deg"), (np.pi / 180.0, "rad")])
+def test_a_unit_of_an_angle_is_named(arm, sound, joint, factor, notes):
     spoilt = times(sound, "q", only(joint, factor))
-    assert f"q of joint_{joint + 1} is in {said}" in causes(arm, spoilt)
+    assert f"q of joint_{joint + 1} is in {notes}" in causes(arm, spoilt)
 
 
 @pytest.mark.parametrize("factor", [180.0 / np.pi, np.pi / 180.0])
@@ -127,33 +127,36 @@ def test_a_unit_of_time_is_named(arm, sound, factor, cause):
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
-def test_a_unit_that_no_torque_tells_is_said(arm, sound, factor):
+def test_a_unit_that_torques_cannot_verify_is_reported(arm, sound, factor):
     """All masses times 1,000 move in the same way: the model alone knows better."""
     regressor, base, truth = arm
     other = times(sound, "tau", np.full(JOINTS, factor))
     assert find_mistake(regressor, base, other) is None
-    said = unchecked(regressor, base, other, truth)
-    assert any(f"all torques are about {factor:.2g} times" in note for note in said)
+    notes = doubtful_signals(regressor, base, other, truth)
+    assert any(f"all torques are about {factor:.2g} times" in note for note in notes)
 
 
 @pytest.mark.parametrize("factor", [1.2, 1.0 / 1.2])
-def test_a_factor_that_no_other_torque_tells_is_told_by_the_model(arm, sound, factor):
+def test_an_undetectable_factor_is_reported_from_the_model(arm, sound, factor):
     """With so much noise that a factor in the last torque does not show in the others."""
     regressor, base, truth = arm
     noise = np.array([300.0, 300.0, 2.0])
     loud = replace(sound, torque_variance=noise**2)
     wrong = times(loud, "tau", only(2, factor))
     assert find_mistake(regressor, base, wrong) is None
-    hidden, doubtful = unchecked(regressor, base, wrong, truth)[-2:]
+    hidden, doubtful = doubtful_signals(regressor, base, wrong, truth)[-2:]
     assert hidden.startswith("a factor of 1.2 in tau of ") and "joint_3" in hidden
-    assert doubtful.startswith(f"tau of joint_3 is {factor:.2g} times what the model's masses")
+    assert doubtful.startswith(f"tau of joint_3 is {factor:.2g} times the model's torque")
     # sound torques are none, and a model without friction does not know
     unknown = np.where(np.arange(len(truth)) < len(truth) - 1, truth, np.nan)
-    for said in unchecked(regressor, base, loud, truth), unchecked(regressor, base, wrong, unknown):
-        assert not any(note.startswith("tau of ") for note in said)
+    for notes in (
+        doubtful_signals(regressor, base, loud, truth),
+        doubtful_signals(regressor, base, wrong, unknown),
+    ):
+        assert not any(note.startswith("tau of ") for note in notes)
 
 
-def test_what_no_torque_tells_of_a_single_joint_is_said(measure_torques, tmp_path):
+def test_unverifiable_signals_of_a_single_joint_are_reported(measure_torques, tmp_path):
     """A wheel: any factor of its torque, and any unit of its angle, is another inertia."""
     file = tmp_path / "wheel.urdf"
     file.write_text(
@@ -170,9 +173,9 @@ def test_what_no_torque_tells_of_a_single_joint_is_said(measure_torques, tmp_pat
     motion = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
     tau = 2.0 * motion[2] + 0.5 * np.sign(motion[1]) + 0.3 * motion[1]
     measured = measure_torques(motion, tau, 0.01)
-    said = " ".join(unchecked(regressor, base, measured, np.zeros(13)))
-    assert "q of axle is in deg" in said
-    assert "factor of 1.2 in tau of axle" in said
+    notes = " ".join(doubtful_signals(regressor, base, measured, np.zeros(13)))
+    assert "q of axle is in deg" in notes
+    assert "factor of 1.2 in tau of axle" in notes
     # a sign makes friction negative even here
     found = find_mistake(regressor, base, times(measured, "tau", -1.0))
     assert "tau of all joints" in found.cause and "joint_1.f_" in found.negative
@@ -181,7 +184,7 @@ def test_what_no_torque_tells_of_a_single_joint_is_said(measure_torques, tmp_pat
 @pytest.mark.slow(but="1")
 @pytest.mark.parametrize("joint", range(6))
 def test_signs_of_the_comau(comau, measure, joint):
-    """The last axis hardly acts on the others: friction below zero tells it."""
+    """The last axis hardly acts on the others: friction below zero shows it."""
     found = find_mistake(comau.regressor, comau.base, times(measure(), "tau", only(joint, -1.0, 6)))
     assert found.cause.startswith(f"tau of joint_{joint + 1} has the wrong sign")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.excitation.excitation_program import believed_parameters, excitation_problem
+from identification.excitation.excitation_program import excitation_problem, nominal_parameters
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import chosen_limits
 from identification.excitation.scene import RobotScene, cell_of
@@ -65,13 +65,13 @@ def arm_problem(arm):
 
 @pytest.fixture(scope="session")
 def verified():
-    """Tells how much of its limits a robot's motion takes."""
+    """Return the shares of its limits that a robot's motion uses."""
 
     def tell(subject, motion, limits=None, cell=None):
         around, joints = cell_of(subject, cell), chosen_limits(subject, limits)
         scene = None if subject.block is None else RobotScene(subject, around)
-        believed = believed_parameters(subject)
-        return verify(Regressor(subject), believed, joints, motion, around, scene)
+        nominal = nominal_parameters(subject)
+        return verify(Regressor(subject), nominal, joints, motion, around, scene)
 
     return tell
 

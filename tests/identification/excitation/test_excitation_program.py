@@ -7,7 +7,7 @@ from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoD
 from identification.excitation.excitation_program import (
     ExcitationProgram,
     excitation_problem,
-    tightened,
+    tighten,
 )
 from identification.excitation.fourier import fourier_basis
 from identification.excitation.limits import chosen_limits
@@ -52,7 +52,7 @@ def test_torques_are_those_of_the_robot(problem, program, random_motion, arm):
     np.testing.assert_allclose(shares.reshape(7, 3), tau / arm.effort_limit)
 
 
-def test_limits_hold_at_given_instants(problem, program, random_motion):
+def test_limits_hold_at_specified_instants(problem, program, random_motion):
     times = np.arange(20) * 0.25
     coefficients, value = program.solve(random_motion, times, times, 30)
     assert value < program.cost(random_motion)[0] - 5.0
@@ -74,7 +74,7 @@ def test_limits_hold_in_between_after_a_local_search(problem):
 
 
 def test_narrower_limits(problem):
-    narrower = tightened(problem, 0.5, {"height of the flange": 0.1}, 0.02)
+    narrower = tighten(problem, 0.5, {"height of the flange": 0.1}, 0.02)
     q = np.array([[0.1, 0.7, 0.2]])
     lost = (problem.posture.values(q) - narrower.posture.values(q))[0]
     expected = {"height of the flange": 0.1}

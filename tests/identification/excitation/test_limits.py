@@ -37,7 +37,7 @@ def test_shares(comau):
     for key, expected in (("position", 1.0), ("velocity", 1.2), ("acceleration", 1.0)):
         np.testing.assert_allclose(shares[key], expected)
     np.testing.assert_allclose(shares["effort"], 0.5)
-    narrower = limits.scaled(0.5)
+    narrower = limits.shrink(0.5)
     np.testing.assert_allclose(narrower.middle, limits.middle)
     np.testing.assert_allclose(narrower.reach, 0.5 * limits.reach)
 

@@ -27,15 +27,15 @@ QUICK = SearchOptions(period=5.0, harmonics=(1, 2), starts=2, workers=1, iterati
 
 
 @pytest.fixture(scope="module")
-def found_and_told(arm):
-    told = []
-    found = search(arm, QUICK, cell=CELL, progress=lambda *args: told.append(args))
-    return found, told
+def result_and_progress(arm):
+    progress_reports = []
+    found = search(arm, QUICK, cell=CELL, progress=lambda *args: progress_reports.append(args))
+    return found, progress_reports
 
 
 @pytest.fixture(scope="module")
-def found(found_and_told):
-    return found_and_told[0]
+def found(result_and_progress):
+    return result_and_progress[0]
 
 
 @pytest.fixture(scope="module")
@@ -125,11 +125,11 @@ def test_is_the_same_again(arm_problem):
     assert not np.allclose(ends[0], ends[2])
 
 
-def test_progress(found_and_told):
-    _, told = found_and_told
-    fractions = [fraction for fraction, _ in told]
+def test_progress(result_and_progress):
+    _, progress_reports = result_and_progress
+    fractions = [fraction for fraction, _ in progress_reports]
     assert fractions == sorted(fractions)
-    assert "1 of 2 starts, best log det" in told[1][1]
+    assert "1 of 2 starts, best log det" in progress_reports[1][1]
 
 
 @pytest.mark.slow(
@@ -151,7 +151,7 @@ def test_progress(found_and_told):
         ({"workers": 0}, "workers = 0; must be 1 or more"),
         ({"period": 0.0}, "period = 0.0 s"),
         ({"harmonics": ()}, "harmonics"),
-        ({"harmonics": (1,)}, r"harmonics = \[1\]: too few to show all 22 base .* link_3.Izz"),
+        ({"harmonics": (1,)}, r"harmonics = \[1\]: too few to excite all 22 base .* link_3.Izz"),
         ({"cell": "nowhere.yaml"}, "nowhere.yaml"),
         ({"limits": {"velocity": {"elbow": 1.0}}}, "no joint 'elbow'"),
         ({"limits": {"effort": 1.0}}, "hardest to keep is the effort limit of joint_2"),

@@ -50,9 +50,9 @@ def test_distance_of_a_motion_away_from_a_wall(arm, far_wall):
     assert 0.1 < swept.guaranteed <= swept.least
     assert swept.instants == 401
     # what is asked for to a hundredth of a millimetre is known as well
-    asked = swept_clearance(arm.chain, far_wall, motion, swept.least - 1e-5, 1e-5)
-    assert asked.least - 2e-5 <= asked.guaranteed <= asked.least
-    assert 0 < asked.instants - swept.instants < 100
+    requested = swept_clearance(arm.chain, far_wall, motion, swept.least - 1e-5, 1e-5)
+    assert requested.least - 2e-5 <= requested.guaranteed <= requested.least
+    assert 0 < requested.instants - swept.instants < 100
 
 
 def test_finds_what_happens_between_coarse_samples(arm, thin_wall, monkeypatch):
@@ -120,6 +120,6 @@ def test_no_pair_comes_nearer_than_its_joints_allow(arm):
     postures = np.random.default_rng(1).uniform(low, high, (60, 3))
     weights = swept_clearance_module._reach_between(arm.chain, scene, postures)
     for j, shift in enumerate(0.05 * np.eye(3)):
-        way = np.abs(scene.distances(postures + shift) - scene.distances(postures - shift))
-        assert np.all(way <= 0.1 * weights[:, j] + 3e-3)
-        assert way.max() > 0.08 * weights[:, j].max()
+        travel = np.abs(scene.distances(postures + shift) - scene.distances(postures - shift))
+        assert np.all(travel <= 0.1 * weights[:, j] + 3e-3)
+        assert travel.max() > 0.08 * weights[:, j].max()

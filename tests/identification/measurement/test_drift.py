@@ -24,7 +24,7 @@ def measured(series, robot, growth, seed=0):
     return average(Record(t, q, tau + noise, robot.joint_names, series.period), skip=0)
 
 
-def test_five_percent_are_seen(series, robot):
+def test_five_percent_are_detected(series, robot):
     # of 5 Nm with 2 Nm of noise on 2,000 samples
     trend = friction_trend(measured(series, robot, 0.5))
     assert trend.changes.all()
@@ -50,7 +50,7 @@ def test_deviations_are_those_of_many_runs(series, robot):
 def test_a_joint_that_stands_still(series, robot):
     motion = measured(series, robot, 0.0)
     still = replace(motion, v=motion.v * [1.0, 0.0])
-    with pytest.raises(InputError, match="lift does not move to and fro"):
+    with pytest.raises(InputError, match="lift must move to and fro"):
         friction_trend(still)
 
 

@@ -1,4 +1,4 @@
-"""What is measured of a simulated robot against what the robot is."""
+"""Measurements of a simulated robot compared to its parameters."""
 
 from dataclasses import replace
 
@@ -151,19 +151,19 @@ def test_noise_and_encoders(delta):
 
 
 @pytest.mark.slow
-def test_five_percent_of_drift_are_seen(delta):
+def test_five_percent_of_drift_are_detected(delta):
     faults = shipped_imperfections("festo_expt_45")
     warm = replace(faults, drift=FrictionDrift(factor=1.05, begin=0.0, end=5 * PERIOD))
-    seen = []
+    detected = []
     for imperfections in (faults, warm):
         record = run_experiment(delta, excitation(delta), imperfections, periods=5).record
-        seen.append(friction_trend(average(record)))
-    assert not seen[0].changes.any()
+        detected.append(friction_trend(average(record)))
+    assert not detected[0].changes.any()
     # of the drives together; from the first to the last of four periods
-    total = np.sqrt(np.sum(seen[1].significance ** 2))
+    total = np.sqrt(np.sum(detected[1].significance ** 2))
     assert total > 5.0
     np.testing.assert_array_less(
-        np.abs(seen[1].coulomb - 0.03 * delta.coulomb), 4.0 * seen[1].coulomb_deviation
+        np.abs(detected[1].coulomb - 0.03 * delta.coulomb), 4.0 * detected[1].coulomb_deviation
     )
 
 
@@ -179,15 +179,15 @@ def test_runs_differ_by_their_seed_alone(delta):
 
 @pytest.mark.slow
 def test_a_record_through_a_file(delta, tmp_path):
-    told = []
+    reports = []
     record = run_experiment(
         delta,
         excitation(delta),
         periods=2,
-        progress=lambda fraction, what: told.append((fraction, what)),
+        progress=lambda fraction, what: reports.append((fraction, what)),
     ).record
-    assert told[-1] == (1.0, "simulating the experiment")
-    assert np.all(np.diff([fraction for fraction, _ in told]) > 0.0)
+    assert reports[-1] == (1.0, "simulating the experiment")
+    assert np.all(np.diff([fraction for fraction, _ in reports]) > 0.0)
     write_record(tmp_path / "run.csv", record, delta)
     again = read_record(tmp_path / "run.csv", delta)
     np.testing.assert_allclose(again.tau, record.tau, rtol=1e-10, atol=1e-10)
@@ -210,4 +210,4 @@ def test_bad_input(delta):
     odd = replace(motion, period=2.0003)
     refused("period", delta, odd)
     weak = replace(delta, effort_limit=np.full(3, 4.0))
-    refused("asks slide_. for .* N; must stay within the drive's 4 N", weak, motion)
+    refused("needs .* N at slide_.; must stay within the drive's 4 N", weak, motion)

@@ -91,9 +91,11 @@ def test_all_wrong_columns_together(tmp_path, record, robot):
 
 
 def test_all_missing_columns_together(tmp_path, record, robot):
-    kept = [i for i, name in enumerate(HEADER.split(", ")) if not name.startswith(("t ", "tau_2"))]
-    header = ", ".join(HEADER.split(", ")[i] for i in kept)
-    file = csv(tmp_path / "a.csv", record, header, [columns(record)[i] for i in kept])
+    selected = [
+        i for i, name in enumerate(HEADER.split(", ")) if not name.startswith(("t ", "tau_2"))
+    ]
+    header = ", ".join(HEADER.split(", ")[i] for i in selected)
+    file = csv(tmp_path / "a.csv", record, header, [columns(record)[i] for i in selected])
     with pytest.raises(InputError, match=r"2 things .* no time; .* no tau_2 \(lift\); tau of all"):
         read_record(file, robot)
 
@@ -110,7 +112,7 @@ def test_counts_with_a_scale_and_other_names(tmp_path, record, robot):
     np.testing.assert_allclose(read.tau, record.tau, atol=1e-12)
 
 
-def test_what_is_said_of_nothing_is_refused(tmp_path, record, robot):
+def test_unused_options_are_refused(tmp_path, record, robot):
     file = csv(tmp_path / "a.csv", record, HEADER, columns(record))
     with pytest.raises(InputError, match="names of 'gone' given, which the file does not have"):
         read_record(file, robot, reading=Reading(names={"gone": "q_1"}))

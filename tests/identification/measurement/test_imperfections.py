@@ -1,4 +1,4 @@
-"""Statistics of what is wrong with a measurement."""
+"""Statistics of the imperfections of a measurement."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,8 @@ def test_the_disturbance_has_the_stated_size_and_memory():
     w = faults.coloured_torque(200_000, 1e-3, np.random.default_rng(0))
     np.testing.assert_allclose(np.std(w, axis=0), 0.2 * NOISE, rtol=0.1)
     # correlation falls to 1 / e after the correlation time
-    kept = np.sum(w[100:] * w[:-100], axis=0) / np.sum(w**2, axis=0)
-    np.testing.assert_allclose(kept, np.exp(-1.0), atol=0.1)
+    correlation = np.sum(w[100:] * w[:-100], axis=0) / np.sum(w**2, axis=0)
+    np.testing.assert_allclose(correlation, np.exp(-1.0), atol=0.1)
     starts = [
         faults.coloured_torque(2, 1e-3, np.random.default_rng(k))[0] / NOISE for k in range(500)
     ]

@@ -27,8 +27,8 @@ def test_what_is_above_the_bandwidth_is_gone(series):
     q, _, a = differentiate(clean + ripple, series.period, 11.0 / series.period)
     np.testing.assert_allclose(q, clean, atol=1e-13)
     np.testing.assert_allclose(a, series.motion(t)[2], atol=1e-9)
-    kept = differentiate(clean + ripple, series.period, 12.0 / series.period)[0]
-    np.testing.assert_allclose(kept, clean + ripple, atol=1e-13)
+    filtered = differentiate(clean + ripple, series.period, 12.0 / series.period)[0]
+    np.testing.assert_allclose(filtered, clean + ripple, atol=1e-13)
 
 
 def test_the_first_period_and_the_rest_are_left_out(record):
@@ -82,9 +82,7 @@ def test_a_wrong_period(record):
 
 @pytest.mark.parametrize("bandwidth", [0.4, 100.0])
 def test_bandwidth_out_of_range(record, bandwidth):
-    refused(
-        record, "must be from 0.5 Hz, that of the period, to below 100 Hz", bandwidth_hz=bandwidth
-    )
+    refused(record, "must be from 0.5 Hz, the period's, to below 100 Hz", bandwidth_hz=bandwidth)
 
 
 def test_a_gap_is_not_averaged_over(record):
@@ -93,7 +91,7 @@ def test_a_gap_is_not_averaged_over(record):
 
 
 def test_derivatives_of_noisy_positions(robot):
-    """Of a Fourier excitation, with the errors that noise leaves below the bandwidth.
+    """Derivatives of a Fourier excitation, with the errors of noise below the bandwidth.
 
     White noise of variance ``s^2`` has ``2 s^2 / (P K)`` in each harmonic of an average over P
     periods of K samples; a derivative multiplies it by ``w^2``.

@@ -1,4 +1,4 @@
-"""What was measured of a robot while it moved, and whether that is sound."""
+"""Records of a moving robot, and checks of their validity."""
 
 from dataclasses import replace
 

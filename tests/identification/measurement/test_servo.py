@@ -38,7 +38,7 @@ def test_torques_of_the_true_parameters(subject):
     np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-8)
 
 
-def test_gains_place_the_poles():
+def test_gains_assign_the_poles():
     """``J s^2 + K_d s + K_p`` with the stated bandwidth and damping."""
     K_p, K_d = Servo(bandwidth=100.0, damping=0.7).gains(np.array([2.0, 0.5]))
     for J, p, d in zip([2.0, 0.5], K_p, K_d, strict=True):

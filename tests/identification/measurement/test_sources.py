@@ -28,12 +28,12 @@ def signal(add, *arguments):
     return at
 
 
-def test_held_and_smooth_samples():
+def test_zero_order_hold_and_smooth_samples():
     values = np.column_stack([T**2, 1.0 - T])
-    held, curves = (signal(f, T, values) for f in (add_samples, add_curves))
-    np.testing.assert_allclose(held(0.47), [0.16, 0.6])
-    np.testing.assert_allclose(held(0.4), [0.16, 0.6])
-    np.testing.assert_allclose(held(1.0), [1.0, 0.0])
+    steps, curves = (signal(f, T, values) for f in (add_samples, add_curves))
+    np.testing.assert_allclose(steps(0.47), [0.16, 0.6])
+    np.testing.assert_allclose(steps(0.4), [0.16, 0.6])
+    np.testing.assert_allclose(steps(1.0), [1.0, 0.0])
     np.testing.assert_allclose(curves(0.45), [0.2025, 0.55])
 
 

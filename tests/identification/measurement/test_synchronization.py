@@ -18,7 +18,7 @@ PARAMETERS = np.array([3.0, 2.0, 5.0, 9.0])
 
 
 def regressor(v, a):
-    """Return that of ``tau = 3 a + 2 v + [5, 9] sign(v)``, with a column that is a combination."""
+    """Return the regressor of ``tau = 3 a + 2 v + [5, 9] sign(v)``, with a dependent column."""
     Y = np.zeros((*v.shape, 5))
     Y[..., 0], Y[..., 1] = a, v
     Y[:, 0, 2], Y[:, 1, 3] = np.sign(v).T
@@ -43,7 +43,7 @@ def test_a_lag_of_the_torques_is_found(series, robot, lag):
     assert abs(found.time - lag) < 4.0 * found.standard_deviation + 0.5 * 0.001
 
 
-def test_a_lag_is_refused_and_said(series, robot):
+def test_a_lag_is_refused_with_its_size(series, robot):
     motion = measured(series, robot, 0.02)
     with pytest.raises(InputError, match=r"tau lags the motion by (19.\d|20|20.\d) ms .* 2 ms"):
         check_torque_lag(motion, regressor(motion.v, motion.a))

@@ -28,9 +28,9 @@ from identification.model.base import BaseParameters
 from identification.model.dynamic_parameters import (
     LINK_PARAMETERS,
     PER_LINK,
-    moved,
     parameter_names,
     parameter_units,
+    transform_parameters,
 )
 from identification.model.subject import Subject
 from pfsc_drake.checks import require, require_numbers
@@ -72,12 +72,12 @@ def analytic_base(subject: Subject, friction: bool = True, coupling: bool = True
     moments = _collected(chain.links, len(names))
     rows, indices = [], []
     for i in range(n):
-        kept = _KEPT_PLANAR if i < parallel else _KEPT
+        base_names = _KEPT_PLANAR if i < parallel else _KEPT
         first_axis = chain.links[0].R_PF @ _Z
         if i == 0 and np.linalg.norm(np.cross(first_axis, chain.gravity)) <= _PARALLEL:
-            kept = kept[:1]
-        rows += list(moments[i][kept])
-        indices += [PER_LINK * i + k for k in kept]
+            base_names = base_names[:1]
+        rows += list(moments[i][base_names])
+        indices += [PER_LINK * i + k for k in base_names]
     mounts = subject.mounts if coupling else None
     for j in range(n):
         column = PER_LINK * n + j
@@ -120,7 +120,10 @@ def _collected(links: Sequence[ChainLink], size: int) -> list[np.ndarray]:
         on_axis[[_M, _MZ, _IXX, _IYY]] = own[[_M, _MZ, _IYY, _IYY]]
         moments[i] = own - on_axis
         if i > 0:
-            to_parent = [moved(unit, links[i].R_PF, links[i].p_PF) for unit in np.eye(PER_LINK)]
+            to_parent = [
+                transform_parameters(unit, links[i].R_PF, links[i].p_PF)
+                for unit in np.eye(PER_LINK)
+            ]
             moments[i - 1] = moments[i - 1] + np.transpose(to_parent) @ on_axis
     return moments
 
@@ -144,7 +147,7 @@ def _added_inertia(
 
     In the energy ``Izz_j`` has ``v_j^2 / 2`` as the rotor has ``ratio^2``, as long as no joint
     before turns about that axis. The coupling ``ratio v_j (axis . omega)`` of a rotor on its own
-    joint's link is that of products of inertia.
+    joint's link belongs to products of inertia.
     """
     if j not in (0, parallel) or (j > 0 and abs((links[j].R_PF @ _Z)[2]) > _PARALLEL):
         return {}

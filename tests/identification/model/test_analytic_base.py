@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.model.base import base_parameters
-from identification.model.dynamic_parameters import link_parameters, moved
+from identification.model.dynamic_parameters import link_parameters, transform_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
@@ -131,7 +131,7 @@ def test_parameters_about_another_frame():
 
     there = p + R @ center
     np.testing.assert_allclose(
-        moved(link_parameters(2.0, center, about(center, box)), R, p),
+        transform_parameters(link_parameters(2.0, center, about(center, box)), R, p),
         link_parameters(2.0, there, about(there, R @ box @ R.T)),
         atol=1e-12,
     )

@@ -52,7 +52,7 @@ def test_combinations_in_words(comau):
     assert units["link_2.mx"] == "kg m"
 
 
-def test_combination_leads_with_what_it_is_told():
+def test_combination_begins_with_the_requested_parameter():
     row = np.array([0.0, -0.5, 1.0, 2.0])
     names = ["a", "b", "c", "d"]
     assert combination(row, names) == "-0.5 b + c + 2 d"

@@ -60,10 +60,10 @@ def table_of(subject):
     dh, gear = load_parameters("comau_racer_1_4").denavit_hartenberg, subject.gear_ratio
     symbols = {f"a{i + 1}": a for i, a in enumerate(dh.a)} | {"d4": dh.d[3]}
     symbols |= {"n1": gear[0], "n2": gear[1]}
-    place = {name: i for i, name in enumerate(parameter_names(subject))}
+    index_of = {name: i for i, name in enumerate(parameter_names(subject))}
     rows = []
     for line in TABLE.split("\n")[1:-1]:
-        row = np.zeros(len(place))
+        row = np.zeros(len(index_of))
         for sign, term in re.findall(r"(^|[+-] )([^ ]+)", line):
             *factors, last = term.rsplit("*", 1)
             size = eval(factors[0], symbols.copy()) if factors else 1.0
@@ -73,9 +73,9 @@ def table_of(subject):
                 kind = "joint" if last.endswith("I_M") else "link"
                 names = [f"{kind}_{last[0]}.{last[1:]}"]
             for name in names:
-                row[place[name]] += -size if sign == "- " else size
+                row[index_of[name]] += -size if sign == "- " else size
         rows.append(row)
-    return np.vstack([*rows, np.eye(len(place))[66:]])
+    return np.vstack([*rows, np.eye(len(index_of))[66:]])
 
 
 def test_every_row_of_the_table(comau):

@@ -202,7 +202,7 @@ def test_bad_motions_are_refused(comau):
         Regressor(comau, sign_width=-1.0)
 
 
-def test_rotors_whose_place_is_unknown_do_not_couple(comau):
+def test_rotors_with_unknown_mounts_do_not_couple(comau):
     unknown = replace(comau, mounts=None)
     motion = random_motion(6)
     np.testing.assert_array_equal(

@@ -39,12 +39,12 @@ def test_a_urdf_with_rounded_angles(comau, tmp_path, monkeypatch, digits, rounde
         monkeypatch.setattr("identification.model.subject.TOLERANCE", -1.0)
     text = urdf_text(comau, true_parameters(comau))
 
-    def shortened(found):
+    def shorten(found):
         angles = [str(round(float(angle), digits)) for angle in found[1].split()]
         return f'rpy="{" ".join(angles)}"'
 
     file = tmp_path / "arm.urdf"
-    file.write_text(re.sub('rpy="([^"]*)"', shortened, text))
+    file.write_text(re.sub('rpy="([^"]*)"', shorten, text))
     subject = load_subject(file)
     assert bool(subject.note) == rounded_again
     if rounded_again:

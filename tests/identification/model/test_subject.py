@@ -11,7 +11,7 @@ from pfsc_drake.robot.models.robot_parameters import load_parameters
 COMAU = "comau_racer_1_4"
 
 
-def test_the_bare_robot_is_that_of_the_parameter_file(comau):
+def test_the_robot_without_tool_matches_the_parameter_file(comau):
     """Link 6 without the tool, whose frame differs from DH frame 6 by an offset along z only."""
     link, own = comau.chain.links[-1], load_parameters(COMAU).links[-1]
     np.testing.assert_allclose(link.mass, own.mass, rtol=1e-9)

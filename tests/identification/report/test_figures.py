@@ -1,4 +1,4 @@
-"""Figures of an identification: what is drawn is what is known."""
+"""Figures of an identification: the drawn values are the known ones."""
 
 import numpy as np
 import pytest

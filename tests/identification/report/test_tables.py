@@ -1,4 +1,4 @@
-"""Tables: what is not known has no column."""
+"""Tables: unknown values have no column."""
 
 import io
 from types import SimpleNamespace

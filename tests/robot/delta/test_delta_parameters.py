@@ -43,15 +43,15 @@ def test_a_file_is_loaded_by_its_path(tmp_path):
 @pytest.mark.parametrize(
     ("keys", "value", "message"),
     [
-        (("geometry", "l_BC"), -0.5, r"'geometry': l_BC = -0.5; allowed: a positive number"),
-        (("geometry", "l_EC"), 0.5, r"'geometry': l_EC = 0.5; allowed: less than l_A = 0.416"),
-        (("masses", "plate"), 0.0, r"'masses': plate = 0.0; allowed: a positive number"),
-        (("masses", "load"), -1.0, r"'masses': load = -1.0; allowed: zero or a positive number"),
+        (("geometry", "l_BC"), -0.5, r"geometry.l_BC = -0.5; allowed: a positive number"),
+        (("geometry", "l_EC"), 0.5, r"geometry.l_EC = 0.5; allowed: less than l_A = 0.416"),
+        (("masses", "plate"), 0.0, r"masses\.plate = 0.0; allowed: a positive number"),
+        (("masses", "load"), -1.0, r"masses\.load = -1.0; allowed: zero or a positive number"),
         (("gravity",), [0.0, 9.81], r"gravity = \[0.0, 9.81\]; allowed: 3 finite numbers"),
         (
             ("drives", "effort"),
             [200.0],
-            r"'drives': effort = \[200.0\]; allowed: 3 positive",
+            r"drives\.effort = \[200.0\]; allowed: 3 positive",
         ),
         (("drives", "velocity"), [1.0, 0.0, 1.0], r"velocity = .*; allowed: 3 positive numbers"),
         (
@@ -69,7 +69,7 @@ def test_a_file_is_loaded_by_its_path(tmp_path):
         (
             ("friction", "viscous"),
             [1.0, 2.0, -3.0],
-            r"'friction': viscous = .*; allowed: .*, none neg",
+            r"friction\.viscous = .*; allowed: .*, none neg",
         ),
         (
             ("workspace", "min_rod_independence"),

@@ -24,7 +24,7 @@ def fixture_comaus():
     written = MultibodyPlant(0.0)
     read_model(written, resolve_model("comau_racer_1_4_elastic"))
     parameters = load_parameters("comau_racer_1_4")
-    made = MultibodyPlant(0.0)
+    result = MultibodyPlant(0.0)
     joints = parameters.elasticities["elastic_6r"]
     elastic = ElasticJoints(
         joints.stiffness,
@@ -32,22 +32,22 @@ def fixture_comaus():
         parameters.rotors.inertia,
         parameters.rotors.gear_ratio,
     )
-    read_model(made, resolve_model("comau_racer_1_4"), ModelOptions(elastic=elastic))
-    return written, made
+    read_model(result, resolve_model("comau_racer_1_4"), ModelOptions(elastic=elastic))
+    return written, result
 
 
 def test_the_chain_of_a_model_that_was_written_elastic(comaus):
-    (written, _), (made, _) = (chain_of(plant, "tool_point") for plant in comaus)
-    assert made.names == [f"joint_{i}" for i in range(1, 7)]
-    assert made.is_elastic
+    (written, _), (result, _) = (chain_of(plant, "tool_point") for plant in comaus)
+    assert result.names == [f"joint_{i}" for i in range(1, 7)]
+    assert result.is_elastic
     for attribute in (
         *("R_PF", "p_PF", "axis", "mass", "p_LC", "I_C", "reflected_inertia", "stiffness"),
         *("damping", "effort_limit", "position_limits", "velocity_limit"),
     ):
         np.testing.assert_allclose(
-            made.gather(attribute), written.gather(attribute), rtol=1e-12, atol=1e-12
+            result.gather(attribute), written.gather(attribute), rtol=1e-12, atol=1e-12
         )
-    np.testing.assert_allclose(made.p_LT, written.p_LT, atol=1e-14)
+    np.testing.assert_allclose(result.p_LT, written.p_LT, atol=1e-14)
 
 
 def moved(plant, torque, duration):
@@ -75,9 +75,9 @@ def moved(plant, torque, duration):
 
 def test_the_motion_of_a_model_that_was_written_elastic(comaus):
     torque = np.array([50.0, -300.0, 200.0, 3.0, -5.0, 1.0])
-    written, made = (moved(plant, torque, 0.2) for plant in comaus)
-    np.testing.assert_allclose(made, written, atol=1e-8)
-    assert np.abs(made[:6] - made[12:18]).max() > 1e-3  # the joints do bend
+    written, result = (moved(plant, torque, 0.2) for plant in comaus)
+    np.testing.assert_allclose(result, written, atol=1e-8)
+    assert np.abs(result[:6] - result[12:18]).max() > 1e-3  # the joints do bend
 
 
 @pytest.fixture(name="elastic")

@@ -55,16 +55,16 @@ def test_joints_without_masses_follow_with_the_lag_of_their_servos(massless, rea
     """After k ticks they have 1 - exp(-k omega T) of the speed, whatever the links are like."""
     plant, _ = read(massless, by_velocity=True)
     chain, _ = chain_from_plant(plant, plant.GetFrameByName("tcp"))
-    omega, period, wanted = 80.0, 2e-3, np.array([0.3, -0.9])
+    omega, period, expected = 80.0, 2e-3, np.array([0.3, -0.9])
     gains = servo_gains(joint_inertia(chain, np.array([0.4, -0.7])), omega, period)
     law = VelocityServoLaw(gains, chain.gather("effort_limit"))
     context, v, x = plant.CreateDefaultContext(), np.zeros(2), np.zeros(2)
     for _ in range(7):
-        torque, x = (np.array(each).ravel() for each in law.torque(v, wanted, np.zeros(2), x))
+        torque, x = (np.array(each).ravel() for each in law.torque(v, expected, np.zeros(2), x))
         plant.get_actuation_input_port().FixValue(context, torque)
         v = v + period * plant.EvalTimeDerivatives(context).CopyToVector()[2:]
         plant.SetVelocities(context, v)
-    np.testing.assert_allclose(v, wanted * (1.0 - np.exp(-7 * omega * period)), rtol=1e-12)
+    np.testing.assert_allclose(v, expected * (1.0 - np.exp(-7 * omega * period)), rtol=1e-12)
 
 
 def test_torques_need_masses(massless, read, refused):

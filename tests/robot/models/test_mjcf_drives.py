@@ -61,7 +61,7 @@ def test_limits_are_those_of_mujoco(tmp_path):
 
 def test_a_plant_has_the_drives_of_the_model(tmp_path):
     plant, file = MultibodyPlant(0.0), write(tmp_path)
-    said = read_model(plant, file)
+    message = read_model(plant, file)
     theirs = mujoco.MjModel.from_xml_path(str(file))
     for i, name in enumerate(NAMES):
         joint = plant.GetJointByName(name)
@@ -70,22 +70,24 @@ def test_a_plant_has_the_drives_of_the_model(tmp_path):
         assert drive.default_reflected_inertia() == theirs.dof_armature[i]
         assert joint.default_damping() == theirs.dof_damping[i]
         assert not drive.has_controller()
-    (limits,) = [line for line in said if "torque limits" in line]
+    (limits,) = [line for line in message if "torque limits" in line]
     for words in ("j1 60 (ctrlrange x gear 40)", "j2 25 (actuatorfrcrange)", "j4 8 (ctrlrange)"):
         assert words in limits
     assert "j3 30 (forcerange x gear 2)" in limits and "j6 inf (no limit in the model)" in limits
-    assert any("dry friction in the model (j1, j2)" in line for line in said)
+    assert any("dry friction in the model (j1, j2)" in line for line in message)
 
 
 def test_joints_without_actuators_are_driven_without_a_limit_and_keep_their_rotors(tmp_path):
     plant = MultibodyPlant(0.0)
-    said = read_model(plant, write(tmp_path, actuators=""))
+    message = read_model(plant, write(tmp_path, actuators=""))
     inertia = [
         plant.get_joint_actuator(i).default_reflected_inertia()
         for i in plant.GetJointActuatorIndices()
     ]
     assert inertia == [0.2, 0.2, 0.03, 0.5, 0.03, 0.03]
-    assert any("j1 inf (no limit in the model), j2 25 (actuatorfrcrange)" in line for line in said)
+    assert any(
+        "j1 inf (no limit in the model), j2 25 (actuatorfrcrange)" in line for line in message
+    )
 
 
 def test_what_is_no_number_is_named(tmp_path):

@@ -159,7 +159,7 @@ def test_a_spring_behind_a_drive_is_an_elastic_joint(tmp_path):
     [
         ({"driven": "spring"}, "joint 'spring': stiffness = 700 beside an actuator; allowed: 0"),
         ({"name": ""}, "joint without a name: stiffness = 700; allowed: 0, or a joint with a name"),
-        ({"ref": 'springref="0.3"'}, "joint 'spring': springref = 0.3; allowed: that of ref"),
+        ({"ref": 'springref="0.3"'}, "joint 'spring': springref = 0.3; allowed: equal to ref"),
     ],
 )
 def test_springs_that_would_be_lost_are_refused(tmp_path, given, said):

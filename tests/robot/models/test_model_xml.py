@@ -7,7 +7,7 @@ import pytest
 from pfsc_drake.robot.models.model_xml import LARGEST_FILE, read_model_xml
 
 
-def test_elements_know_their_place(write):
+def test_elements_know_their_location(write):
     text = '<robot>\n <a/><b x="1>2"><a y="&lt;"/>word</b>\n</robot>'
     model = read_model_xml(write(text))
     spans = {e.line: [] for e in model.root.within()}
@@ -17,7 +17,7 @@ def test_elements_know_their_place(write):
     inner = model.root.first("b", "a")
     assert inner.attributes == {"y": "<"}
     assert model.root.first("b").text == "word"
-    assert model.place(inner) == f"{model.file}:2"
+    assert model.location(inner) == f"{model.file}:2"
     assert model.root.first("a", "b") is None
 
 

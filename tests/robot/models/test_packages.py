@@ -25,8 +25,8 @@ def package(tmp_path):
     return make
 
 
-def found(file, content=b"", **given):
-    packages = packages_for(file, content, given)
+def found(file, content=b"", **folders):
+    packages = packages_for(file, content, folders)
     names = set(packages.GetPackageNames())
     return {name: Path(packages.GetPath(name)) for name in names if not name.startswith("drake")}
 
@@ -45,10 +45,10 @@ def test_package_above_the_model(package, tmp_path, write):
 
 def test_the_nearest_package_and_those_given_come_first(package, write):
     package("ws", "arm")
-    near, given = package("ws/arm", "arm"), package("elsewhere", "arm")
+    near, folders = package("ws/arm", "arm"), package("elsewhere", "arm")
     file = write("", "ws/arm/arm.urdf")
     assert found(file)["arm"] == near
-    assert found(file, arm=given)["arm"] == given
+    assert found(file, arm=folders)["arm"] == folders
 
 
 def test_ros_package_path(package, write, monkeypatch):

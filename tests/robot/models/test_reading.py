@@ -61,7 +61,7 @@ def test_a_velocity_limit_of_zero_is_none(write, read, urdf_text):
     assert "(shoulder)" in warning and "velocity limits of 0" in warning
 
 
-def test_dry_friction_is_said(write, read, urdf_text):
+def test_dry_friction_is_reported(write, read, urdf_text):
     friction = '<dynamics damping="0.1" friction="2"/></joint>'
     file = write(urdf_text.replace("</joint>", friction, 1))
     (warning,) = read(file)[1]
@@ -104,7 +104,7 @@ def test_links_that_move_without_mass(write, read, refused, urdf_parts, sdf_text
     assert plant.num_positions() == 4
 
 
-def test_sdf_links_without_inertial_weigh_a_kilogram_nobody_wrote(write, read, refused, sdf_text):
+def test_sdf_links_without_inertial_get_a_default_mass(write, read, refused, sdf_text):
     tcp = (
         "<link name='tcp'/>\n<joint name='t' type='fixed'><parent>arm</parent><child>tcp</child>"
         "</joint></model>"
@@ -180,8 +180,8 @@ def test_what_follows_a_fixed_joint_stands_where_that_puts_it(write, read, refus
     def fingers(third='<mimic joint="b" multiplier="0.5"/>'):
         inside = ["", follows.format("a", -2, 0.05), third]
         joints = [
-            joint(name, "tcp", f"link_{name}", limit + said, "prismatic")
-            for name, said in zip("abc", inside, strict=True)
+            joint(name, "tcp", f"link_{name}", limit + message, "prismatic")
+            for name, message in zip("abc", inside, strict=True)
         ]
         return urdf(*[link(f"link_{name}") for name in "abc"], *joints)
 
@@ -303,7 +303,7 @@ def test_motors_of_elastic_joints_without_inertia(write, read, refused, old, new
     refused(lambda: read(file), file, "'motor_1'", "rotor_inertia", "positive")
 
 
-def test_moments_that_sdf_takes_for_granted_are_said(write, read, sdf_text):
+def test_default_moments_of_sdf_are_reported(write, read, sdf_text):
     moments = "<inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.01</izz></inertia>"
     first, second, third = sdf_text.split(moments)
     plant, (warning,) = read(write(first + moments + second + third, "arm.sdf"))

@@ -30,8 +30,8 @@ def test_shipped_files_are_what_the_writer_gives(tmp_path, monkeypatch):
     monkeypatch.setattr(writer, "models_directory", lambda: models)
     writer.main()
     # what has parameters is made of them; other models are what they are
-    made = [file.parent for file in shipped.glob("*/parameters.yaml")]
-    files = {file.relative_to(shipped) for folder in made for file in folder.glob("*.sdf")}
+    result = [file.parent for file in shipped.glob("*/parameters.yaml")]
+    files = {file.relative_to(shipped) for folder in result for file in folder.glob("*.sdf")}
     assert {file.relative_to(models) for file in models.glob("*/*.sdf")} == files
     for file in files:
         message = f"{file} is not up to date: run python -m pfsc_drake.robot.models.writer"
@@ -39,7 +39,7 @@ def test_shipped_files_are_what_the_writer_gives(tmp_path, monkeypatch):
         assert (shipped / file).read_text(encoding="utf-8") == text, message
 
 
-def test_no_collision_geometry_unless_asked_for():
+def test_no_collision_geometry_unless_requested():
     variant = VARIANTS["comau_racer_1_4_elastic"]
     assert "<collision" not in write_sdf(COMAU, variant, APPEARANCE)
     text = write_sdf(COMAU, variant, APPEARANCE, collisions=True)

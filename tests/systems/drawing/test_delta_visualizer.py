@@ -48,7 +48,7 @@ def test_parts_have_unique_names_and_known_carriers():
 
 
 class MeshcatSpy:
-    """Takes what is drawn; the last transform of every path with its time."""
+    """Records drawings; the last transform of every path with its time."""
 
     def __init__(self):
         self.objects, self.transforms = set(), {}

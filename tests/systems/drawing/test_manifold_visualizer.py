@@ -1,4 +1,4 @@
-"""Paths, surfaces and regions in Meshcat; surfaces coloured by what is felt on them."""
+"""Paths, surfaces and regions in Meshcat; colours of signed values."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ FOOT = ORIGIN + np.array([0.0, RADIUS, 0.1])
 
 
 class MeshcatSpy:
-    """Takes what is drawn; the last transform of every path with its time."""
+    """Records drawings; the last transform of every path with its time."""
 
     def __init__(self):
         self.meshes, self.lines, self.objects, self.transforms = {}, {}, {}, {}
@@ -64,7 +64,7 @@ def test_skin_and_lines_lie_on_the_surface(drawn):
     assert len(spy.lines) == 22
 
 
-def test_the_skin_is_closed_and_seen_from_both_sides(drawn):
+def test_the_skin_is_closed_and_visible_from_both_sides(drawn):
     spy, _ = drawn()
     ((vertices, faces),) = spy.meshes.values()
     corners = vertices.T[faces.T]

@@ -23,7 +23,7 @@ def length(strokes):
 
 
 @pytest.mark.parametrize("number", range(10))
-def test_a_digit_stands_on_its_place(number):
+def test_a_digit_stands_on_its_base(number):
     strokes = flat(number)
     assert strokes[..., 1].min() == pytest.approx(0.0, abs=1e-9)
     assert strokes[..., 1].max() == pytest.approx(1.0)
@@ -31,7 +31,7 @@ def test_a_digit_stands_on_its_place(number):
 
 
 def test_digits_are_those_of_seven_segments():
-    """An eight has all segments; what is left of it tells the others apart."""
+    """An eight has all segments; the other digits are parts of it."""
     sizes = {k: length(flat(k)) for k in range(10)}
     upright, level = 1.0, 0.55
     expected = {0: (2, 2), 1: (1, 0), 2: (1, 3), 3: (1, 3), 4: (1.5, 1), 5: (1, 3), 6: (1.5, 3)}
@@ -62,7 +62,7 @@ def test_strokes_are_as_bold_from_either_side():
     assert area == pytest.approx(2.0 * bold * (0.1 * length(flat(8)) + len(strokes[0]) * bold))
 
 
-def test_a_number_is_drawn_where_it_is_told():
+def test_a_number_is_drawn_at_its_path():
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     SceneNumber(17, PLACE, ACROSS, 0.1).draw(meshcat, "fixtures/3/number")
     assert meshcat.HasPath("/drake/fixtures/3/number")

@@ -1,4 +1,4 @@
-"""Obstacles in Meshcat: what is drawn, and where."""
+"""Obstacles in Meshcat: shapes and positions."""
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
@@ -11,11 +11,11 @@ def test_persons_and_spheres_are_where_they_should_be():
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     beam = Capsule((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), 0.05), Capsule((0, 0, 0), (0, 0, 0), 0.1)
     shapes = [ObstacleShape("column", 0.25), ObstacleShape("sphere", 0.1)]
-    shapes.append(ObstacleShape("capsules", 0.1, given=beam))
+    shapes.append(ObstacleShape("capsules", 0.1, capsules=beam))
     visualizer = ObstacleVisualizer(shapes, 0.15, meshcat, 0.032)
     context = visualizer.CreateDefaultContext()
-    places = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0])
-    visualizer.GetInputPort("positions").FixValue(context, places)
+    positions = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0])
+    visualizer.GetInputPort("positions").FixValue(context, positions)
     visualizer.ForcedPublish(context)
     visualizer._begin(context)
     for path in (

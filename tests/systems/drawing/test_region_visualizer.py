@@ -17,10 +17,10 @@ def meshcat():
 
 def test_regions_are_drawn_and_one_moves_by_the_clock(meshcat):
     grid = np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], [0.5], indexing="ij"), axis=-1)[:, :, 0]
-    told = []
+    messages = []
 
     def placement(clock):
-        told.append(clock)
+        messages.append(clock)
         return RigidTransform([clock, 0.0, 0.0])
 
     system = RegionVisualizer([(grid, [grid[0]])] * 2, {1: placement}, 9, meshcat, 0.1)
@@ -34,7 +34,7 @@ def test_regions_are_drawn_and_one_moves_by_the_clock(meshcat):
     for i in (0, 1):
         assert meshcat.HasPath(f"/drake/fixtures/{i}/skin")
     assert meshcat.HasPath("/drake/fixtures/frame")
-    assert set(told) == {0.7}
+    assert set(messages) == {0.7}
 
 
 class Scene:
@@ -55,18 +55,18 @@ class Scene:
         return lambda *arguments, **options: None
 
 
-@pytest.mark.parametrize("place", [np.nan, 0.3])
+@pytest.mark.parametrize("position", [np.nan, 0.3])
 @pytest.mark.parametrize("clock", [[], [0.7]])
-def test_nothing_moves_without_a_clock_or_a_place(place, clock):
+def test_nothing_moves_without_a_clock_or_a_position(position, clock):
     scene = Scene()
     system = RegionVisualizer([], {0: lambda _: RigidTransform()}, 5, scene, 0.1)
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
-    system.GetInputPort("manifold_point").FixValue(context, np.full(5, place))
+    system.GetInputPort("manifold_point").FixValue(context, np.full(5, position))
     if clock:
         system.GetInputPort("region_clock").FixValue(context, clock)
     simulator.AdvanceTo(0.15)
-    frame = ["fixtures/frame"] if np.isfinite(place) else []
+    frame = ["fixtures/frame"] if np.isfinite(position) else []
     assert set(scene.moved) == {*frame, *(["fixtures/0"] if clock else [])}
 
 

@@ -1,4 +1,4 @@
-"""What reaches Meshcat of a robot, and where."""
+"""Parts of a robot in Meshcat, and their poses."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ COLOR = Rgba(0.2, 0.4, 0.6)
 
 
 class MeshcatSpy:
-    """Takes what is drawn; the last transform of every path with its time."""
+    """Records drawings; the last transform of every path with its time."""
 
     def __init__(self):
         self.objects, self.meshes, self.transforms = {}, {}, {}

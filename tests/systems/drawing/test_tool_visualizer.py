@@ -14,7 +14,7 @@ COLOR = Rgba(0.2, 0.4, 0.6)
 
 
 class MeshcatSpy:
-    """Takes what is drawn; the last transform of every path with its time."""
+    """Records drawings; the last transform of every path with its time."""
 
     def __init__(self):
         self.objects, self.transforms = {}, {}

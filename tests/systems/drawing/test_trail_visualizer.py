@@ -1,4 +1,4 @@
-"""The way of a point, piece by piece."""
+"""The past path of a point, piece by piece."""
 
 import numpy as np
 from pydrake.geometry import Rgba
@@ -20,16 +20,16 @@ class Scene:
         pass
 
 
-def test_of_a_long_way_the_last_pieces_stay():
+def test_the_last_pieces_of_a_long_path_stay():
     scene = Scene()
     system = TrailVisualizer("way", Rgba(1.0, 0.0, 0.0), scene, 1.0, longest=3)
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
-    places = np.outer(np.arange(8.0), [1.0, 0.0, 0.0])
-    for time, place in enumerate(places):
-        system.GetInputPort("point").FixValue(context, place)
+    points = np.outer(np.arange(8.0), [1.0, 0.0, 0.0])
+    for time, point in enumerate(points):
+        system.GetInputPort("point").FixValue(context, point)
         simulator.AdvanceTo(float(time)) if time else simulator.Initialize()
         simulator.AdvanceTo(time + 0.5)  # when it is remembered
     assert len(scene.lines) == 3
     pieces = sorted(scene.lines.values())
-    assert pieces == [[places[i].tolist(), places[i + 1].tolist()] for i in (4, 5, 6)]
+    assert pieces == [[points[i].tolist(), points[i + 1].tolist()] for i in (4, 5, 6)]

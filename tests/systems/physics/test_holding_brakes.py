@@ -25,13 +25,13 @@ INERTIA, HOLDING = 2.0, 50.0  # kg m^2, Nm
 FAULT, DELAY, TICK = 0.1, 0.05, 1e-3  # s
 
 
-def _velocity(load, fault=FAULT, end=0.6, asked=0):
+def _velocity(load, fault=FAULT, end=0.6, requested=0):
     """Return times [s] and velocity [rad/s] of an inertia that a load [Nm] drives from rest."""
     builder = DiagramBuilder()
     friction = bristles_for_step(np.array([HOLDING]), np.zeros(1), np.array([INERTIA]), TICK)
     block = HoldingBrakes(friction.presliding, 2, DELAY, TICK)
     brakes = builder.AddSystem(BlockSystem(block, TICK))
-    held = builder.AddSystem(BrakeTorque(friction))
+    braked = builder.AddSystem(BrakeTorque(friction))
     motor = builder.AddSystem(Integrator(1))
     angle = builder.AddSystem(Integrator(1))
     # one rigid joint, whose links rest where the brakes do not look
@@ -43,19 +43,19 @@ def _velocity(load, fault=FAULT, end=0.6, asked=0):
     steps = PiecewisePolynomial.ZeroOrderHold([0.0, fault, 10.0], np.array([[-1.0, 0.0, 0.0]]))
     status = builder.AddSystem(TrajectorySource(steps))
     builder.Connect(weight.get_output_port(), torque.get_input_port(0))
-    builder.Connect(held.GetOutputPort("resistance"), torque.get_input_port(1))
+    builder.Connect(braked.GetOutputPort("resistance"), torque.get_input_port(1))
     builder.Connect(torque.get_output_port(), inertia.get_input_port())
     builder.Connect(inertia.get_output_port(), motor.get_input_port())
     builder.Connect(motor.get_output_port(), angle.get_input_port())
     for k, source in enumerate((elsewhere, elsewhere, angle, motor)):
         builder.Connect(source.get_output_port(), joint_state.get_input_port(k))
-    for system in (brakes, held):
+    for system in (brakes, braked):
         builder.Connect(joint_state.get_output_port(), system.GetInputPort("joint_state"))
     for name in ("anchor", "give"):
-        builder.Connect(brakes.GetOutputPort(name), held.GetInputPort(name))
+        builder.Connect(brakes.GetOutputPort(name), braked.GetInputPort(name))
     never = builder.AddSystem(ConstantVectorSource([2.0]))
     for k in range(2):
-        source = status if k == asked else never
+        source = status if k == requested else never
         builder.Connect(source.get_output_port(), brakes.GetInputPort(f"request_{k}"))
     log = LogVectorOutput(motor.get_output_port(), builder, TICK)
     simulator = Simulator(builder.Build())
@@ -71,9 +71,9 @@ def test_nothing_holds_before_they_close():
     np.testing.assert_allclose(v[t < open_until], 5.0 * t[t < open_until], atol=1e-9)
 
 
-@pytest.mark.parametrize("asked", [0, 1])
-def test_they_stop_what_moves_and_hold_it(asked):
-    t, v = _velocity(10.0, asked=asked)
+@pytest.mark.parametrize("requested", [0, 1])
+def test_they_stop_what_moves_and_hold_it(requested):
+    t, v = _velocity(10.0, requested=requested)
     # closed, they take away (50 - 10) / 2 rad/s each second
     closed = FAULT + DELAY + 0.02
     start = v[np.searchsorted(t, closed)]

@@ -188,7 +188,7 @@ def test_mass_pulled_by_a_spring():
 
 
 def test_sign_reversal():
-    """A sinusoidal force far above f_c: friction changes sign with the velocity, at once."""
+    """A sinusoidal force far above f_c: friction changes sign with the velocity, immediately."""
     t, _x, v, force = Slide(lambda t, x, v: 40.0 * np.cos(2.0 * np.pi * t)).run(3.0)
     crossings = np.flatnonzero(np.diff(np.sign(v)) != 0)
     crossings = crossings[t[crossings] > 0.05]
@@ -276,7 +276,7 @@ def test_ports():
 
 
 def test_it_is_the_law():
-    """Torque and rate of the system are those of the formulas, also of what is no number."""
+    """Torque and rate of the system are those of the formulas, also for NaN."""
     rng = np.random.default_rng(5)
     law = BristleFriction(
         *rng.uniform([[1.0], [0.0], [1e-6], [1e-3]], [[9.0], [5.0], [1e-4], [3e-3]], (4, 6))

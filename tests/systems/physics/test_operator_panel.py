@@ -14,16 +14,16 @@ def test_controls_count_from_the_next_tick_on():
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
 
-    def seen():
+    def samples():
         ports = (system.GetOutputPort(name) for name in PARTS)
         return np.concatenate([port.Eval(context) for port in ports]).tolist()
 
     simulator.AdvanceTo(2 * PERIOD)
-    assert seen() == [0.0, 0.0, -1.0]  # nobody is there
+    assert samples() == [0.0, 0.0, -1.0]  # nobody is there
     system.GetInputPort("controls").FixValue(context, [1.0, 2.0, 3.0])
-    assert seen() == [0.0, 0.0, -1.0]
+    assert samples() == [0.0, 0.0, -1.0]
     simulator.AdvanceTo(2.5 * PERIOD)
-    assert seen() == [1.0, 2.0, 3.0]
+    assert samples() == [1.0, 2.0, 3.0]
     system.GetInputPort("controls").FixValue(context, [4.0, 5.0, 6.0])
     simulator.AdvanceTo(2.9 * PERIOD)
-    assert seen() == [1.0, 2.0, 3.0]
+    assert samples() == [1.0, 2.0, 3.0]

@@ -1,4 +1,4 @@
-"""Noise of a sensor: that of the tick, whoever looks when."""
+"""Noise of a sensor depends on the tick, not on the order of evaluation."""
 
 import numpy as np
 import pytest

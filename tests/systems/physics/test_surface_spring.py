@@ -11,9 +11,9 @@ STIFFNESS = 3e4
 
 def touch(y_t, near):
     """Return height over a plane through the origin, its normal and where on it one is."""
-    foot = y_t - (NORMAL @ y_t) * NORMAL
+    closest = y_t - (NORMAL @ y_t) * NORMAL
     assert near is None or near.shape == (2,)
-    return float(NORMAL @ y_t), NORMAL, foot[:2]
+    return float(NORMAL @ y_t), NORMAL, closest[:2]
 
 
 @pytest.fixture(name="spring")
@@ -28,7 +28,7 @@ def wrench_at(spring, context, height):
     return spring.GetOutputPort("wrench").Eval(context)
 
 
-def test_it_bears_what_is_pressed_into_it_and_nothing_else(spring):
+def test_it_pushes_only_in_contact(spring):
     np.testing.assert_array_equal(wrench_at(*spring, 1e-3), 0.0)
     wrench = wrench_at(*spring, -1e-3)
     np.testing.assert_allclose(wrench[:3], 30.0 * NORMAL)
@@ -36,7 +36,7 @@ def test_it_bears_what_is_pressed_into_it_and_nothing_else(spring):
 
 
 @pytest.mark.parametrize("height", [-1e-3, 2e-3])
-def test_another_stiffness_bears_the_same_at_its_place(spring, height):
+def test_another_stiffness_has_the_same_force_at_the_same_position(spring, height):
     system, context = spring
     wrench_at(system, context, height)
     system.set_stiffness(context, 1e5, 12.0)

@@ -1,4 +1,4 @@
-"""What a velocity servo does when it is told what is not a number."""
+"""Velocity servo with inputs that are not finite."""
 
 import numpy as np
 import pytest
@@ -111,7 +111,7 @@ def test_the_first_ticks(bench):
 
 @pytest.mark.parametrize("by", [np.nan, np.inf])
 def test_without_a_reference_it_stops(bench, by):
-    """What the joints do is followed exactly: only the inverse dynamics of the stop are left."""
+    """The joints' motion is followed exactly: only the inverse dynamics of the stop remain."""
     for _ in range(5):  # the integral part fills
         bench.tick()
     bench.set(reference=spoiled(VELOCITY, 2, by))
@@ -123,7 +123,7 @@ def test_without_a_reference_it_stops(bench, by):
     np.testing.assert_allclose(bench.torque, expected, atol=1e-9)
 
 
-def test_a_joint_that_is_not_seen_is_borne(bench):
+def test_a_joint_without_valid_measurement_is_supported(bench):
     rest = np.zeros(6)
     bench.set(v=rest, reference=rest)
     bench.tick()
@@ -142,7 +142,7 @@ def test_a_silent_bus(silence, fault, fused):
 
 
 def test_the_root_cause_comes_first():
-    """No reference, a joint beyond its limits, a silent bus: each at once with the later ones."""
+    """No reference, a joint beyond its limits, a silent bus: each together with the later ones."""
     bench = Bench(silence=1.0, supervision=SupervisionParameters(), longest_silence=0.005)
     assert bench.fault is Fault.BUS_LOST
     bench.set(q=np.full(6, 10.0))

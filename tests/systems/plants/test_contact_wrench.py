@@ -64,19 +64,19 @@ def settle(ball_first):
     context = plant.GetMyMutableContextFromRoot(root)
     plant.SetFreeBodyPose(context, ball, RigidTransform([0.05, 0.02, RADIUS]))
     simulator.AdvanceTo(1.0)
-    place = plant.EvalBodyPoseInWorld(context, ball).translation()
-    return wrench.GetOutputPort("wrench").Eval(wrench.GetMyContextFromRoot(root)), place
+    position = plant.EvalBodyPoseInWorld(context, ball).translation()
+    return wrench.GetOutputPort("wrench").Eval(wrench.GetMyContextFromRoot(root)), position
 
 
 @pytest.mark.slow(but="True")
 @pytest.mark.parametrize("ball_first", [True, False])
 def test_carries_the_weight(ball_first):
     """Whichever of the two geometries Drake names first."""
-    wrench, place = settle(ball_first)
+    wrench, position = settle(ball_first)
     weight = np.array([0.0, 0.0, MASS * GRAVITY])
     np.testing.assert_allclose(wrench[:3], weight, atol=2e-3)
     # at rest the force's line of action goes through the ball's centre
-    np.testing.assert_allclose(wrench[3:], np.cross(place - TOOL, weight), atol=2e-3)
+    np.testing.assert_allclose(wrench[3:], np.cross(position - TOOL, weight), atol=2e-3)
 
 
 def test_without_contact_there_is_no_wrench():

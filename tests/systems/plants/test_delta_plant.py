@@ -53,13 +53,13 @@ def test_work_of_the_forces_becomes_energy(robot):
     force, f_ext = np.array([-12.0, -20.0, -9.0]), np.array([4.0, -3.0, 6.0])
     start = np.concatenate([[0.15, 0.2, 0.18], np.zeros(3)])
     state, y_t = simulate(DeltaPlant(robot), start[:3], None, force, f_ext, 0.4)
-    way, tool_way = state[:3] - start[:3], y_t - robot.tool_position(start[:3])
-    work = force @ way + f_ext @ tool_way
-    assert abs(f_ext @ tool_way) > 0.1 and abs(force @ way) > 0.1
+    travel, tool_travel = state[:3] - start[:3], y_t - robot.tool_position(start[:3])
+    work = force @ travel + f_ext @ tool_travel
+    assert abs(f_ext @ tool_travel) > 0.1 and abs(force @ travel) > 0.1
     assert energy(robot, state) - energy(robot, start) == pytest.approx(work, abs=2e-8)
 
 
-def test_holding_forces_keep_the_robot_in_place(robot):
+def test_holding_forces_keep_the_robot_at_rest(robot):
     """Weight at the tool is what J' m_y g says, found here by differences of the potential."""
     q = np.array([0.12, 0.2, 0.16])
     hold = [

@@ -64,8 +64,8 @@ def test_a_wrench_moves_the_robot_like_its_joint_torques(rigid):
         assert np.max(np.abs(pushed - free)) > 1.0
 
 
-def test_a_push_accelerates_the_tool_its_own_way(rigid):
-    """Mobility is positive: the tool point gives way in the direction of the force."""
+def test_a_push_accelerates_the_tool_in_its_direction(rigid):
+    """Mobility is positive: the tool point moves in the direction of the force."""
     q = np.array([0.2, 1.4, -0.5, 0.3, 1.0, -0.4])
     state = np.concatenate([q, np.zeros(6), q, np.zeros(6)])
     for i in range(6):

@@ -10,7 +10,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.serial.link_places import link_frames, place_on_link
+from pfsc_drake.robot.serial.link_points import link_frames, point_on_link
 from pfsc_drake.systems.plants.applied_wrenches import LinkPushes
 
 # links and frames, and points in their axes [m]
@@ -33,8 +33,8 @@ class Station:
         self.plant.Finalize()
         tool = self.plant.GetFrameByName("tool_point")
         self.chain, self.coordinates = chain_from_plant(self.plant, tool)
-        places = [self.place(name, point) for name, point in POINTS.items()]
-        self.system = builder.AddSystem(LinkPushes(self.chain, places))
+        points = [self.locate(name, point) for name, point in POINTS.items()]
+        self.system = builder.AddSystem(LinkPushes(self.chain, points))
         builder.Connect(
             self.system.GetOutputPort("applied_spatial_force"),
             self.plant.get_applied_spatial_force_input_port(),
@@ -43,8 +43,8 @@ class Station:
             builder.ExportInput(self.system.GetInputPort(name), name)
         self.diagram = builder.Build()
 
-    def place(self, name, point):
-        return place_on_link(self.plant, self.coordinates, name, point)
+    def locate(self, name, point):
+        return point_on_link(self.plant, self.coordinates, name, point)
 
     def contexts(self, wrenches, joint_state):
         root = self.diagram.CreateDefaultContext()
@@ -126,6 +126,6 @@ def test_link_frames_are_those_of_the_links_not_of_the_motors(station):
 @pytest.mark.parametrize("name", ["elbow", "base", "rotor_3", ""])
 def test_what_does_not_move_with_a_link_is_refused(name):
     with pytest.raises(InputError) as caught:
-        Station("comau_racer_1_4_elastic").place(name, np.zeros(3))
+        Station("comau_racer_1_4_elastic").locate(name, np.zeros(3))
     assert str(caught.value).startswith(f"'{name}' ")
     assert "allowed: link_1, link_2, link_3, link_4, link_5, link_6, tool" in str(caught.value)

@@ -1,4 +1,4 @@
-"""What a sensor bears, by Newton and Euler for the tool alone, against Drake's reactions."""
+"""Load of a sensor, by Newton-Euler for the tool alone, against Drake's reactions."""
 
 import numpy as np
 import pytest

@@ -34,7 +34,7 @@ static double within(double value, double bound)
     return value > bound ? bound : value < -bound ? -bound : value;
 }
 
-/* Speed of the fastest joint; no number where one of them is none. */
+/* Speed of the fastest joint; NaN if one of them is NaN. */
 static double fastest(const double v[N])
 {
     double most = 0.0;
@@ -122,7 +122,7 @@ void drive_stop(drive_state *drive)
     }
 }
 
-/* Ticks between the last that was answered and that of a status. */
+/* Number of ticks between the last answered one and a status. */
 static double missing(const drive_state *drive, const drive_status *status)
 {
     const int64_t passed = (int64_t)((uint64_t)status->utime - (uint64_t)drive->first);
@@ -134,7 +134,7 @@ int drive_is_old(const drive_state *drive, const drive_status *status)
     return missing(drive, status) < 0.0;
 }
 
-/* Take away positions that have jumped farther than joints can move. */
+/* Reject positions that have jumped farther than joints can move. */
 static void believe(drive_state *drive, double state[4 * N], double ticks)
 {
     int i, any = 0;
@@ -155,7 +155,7 @@ static void believe(drive_state *drive, double state[4 * N], double ticks)
     }
 }
 
-/* Let the controller see, tick by tick, what the robot may have done in between. */
+/* Advance the controller through missed ticks with interpolated states. */
 static void bridge(
     drive_state *drive, const double state[4 * N], const double torque[N], int missed)
 {
@@ -180,7 +180,7 @@ static void bridge(
     }
 }
 
-/* What is sent, and in how many joints that is less than what is wanted. */
+/* Command to be sent, and number of joints that were clipped. */
 static void limit(const drive_state *drive, const double wanted[N], drive_command *command)
 {
     int i;

@@ -1,14 +1,15 @@
-/* Drive a robot by the controller: one tick for each status that comes, over LCM's UDP multicast.
+/* Drive a robot by the controller: one tick for each status, over LCM's UDP multicast.
 
    usage: drive_lcm ADDRESS PORT TTL SECONDS RECORD [OVERRIDE]
           drive_lcm -r RECORD SECONDS OTHER
 
-   Ends when the robot has been driven for so long, in the time of its motion as planned, or has come
-   to rest after a fault, after SIGINT, or when whoever started it has closed the standard input,
-   where lines "o SHARE" set the pace of the reference and "s" asks for a stop; at once, when the robot is silent or
-   does not move any more. Its driver damps then. Everything goes into RECORD. With -r the statuses
-   of a record are answered again, as fast as that goes, and nothing is sent. Prints how far it is,
-   and as its last line why it ended. This is no safety function.
+   Ends after SECONDS of the planned motion's time, or when the robot has come to rest after a
+   fault, after SIGINT, or after the parent process has closed the standard input; immediately when
+   the robot is silent or has left its mode, in which case its driver damps. On the standard input,
+   lines "o SHARE" set the speed of the reference and "s" requests a stop. Everything goes into
+   RECORD. With -r the statuses of a record are answered again, as fast as possible, and nothing is
+   sent. Prints the progress, and as its last line the reason of the end. This is not a safety
+   function.
 */
 #define _DEFAULT_SOURCE
 
@@ -29,16 +30,16 @@
 #include "recorder.h"
 
 #define LARGEST_PACKET 65536
-#define MOST_PACKETS 1000 /* that are looked at before an answer */
-#define RECENT 64         /* commands that are told from those of others */
-#define STACK 262144      /* bytes that are there before they are needed */
+#define MOST_PACKETS 1000 /* handled before an answer */
+#define RECENT 64         /* own commands, to recognize them */
+#define STACK 262144      /* bytes, touched in advance */
 
 static const char *const reasons[] = {
     "duration", "rested", "mode", "not_finite", "clock", "faster"};
 
 static volatile sig_atomic_t is_interrupted;
 
-/* What has come last. */
+/* Last messages. */
 static struct {
     drive_status status;
     double wrench[6], received;
@@ -48,13 +49,13 @@ static struct {
 
 static struct {
     int in, out;
-    int is_led; /* whether somebody holds the standard input open */
+    int is_led; /* whether the standard input is open */
     int is_asked_to_stop;
-    double override; /* share of the planned pace that is asked for */
+    double override; /* requested speed as a share of the planned one */
     struct sockaddr_in group;
     uint32_t count;
-    unsigned char recent[RECENT][COMMAND_PACKET_SIZE]; /* commands that were sent */
-    unsigned long foreign; /* commands that others have sent */
+    unsigned char recent[RECENT][COMMAND_PACKET_SIZE]; /* sent commands */
+    unsigned long foreign; /* commands of other senders */
 } bus;
 
 static void interrupt(int number)
@@ -100,7 +101,7 @@ static int open_bus(const char *address, const char *port, const char *ttl)
            && setsockopt(bus.out, IPPROTO_IP, IP_MULTICAST_LOOP, &loop, sizeof loop) == 0;
 }
 
-/* Count a command on the bus that is none of those sent from here. */
+/* Count a command on the bus that was not sent from here. */
 static void compare_command(const unsigned char *message, size_t length)
 {
     const uint32_t known = bus.count < RECENT ? bus.count : RECENT;
@@ -116,7 +117,7 @@ static void compare_command(const unsigned char *message, size_t length)
     ++bus.foreign;
 }
 
-/* Look at all packets that have come. */
+/* Handle all waiting packets. */
 static void drain(void)
 {
     static unsigned char packet[LARGEST_PACKET];
@@ -144,7 +145,7 @@ static void drain(void)
     }
 }
 
-/* Hear what whoever started this asks for, line by line, and notice when it is gone. */
+/* Read the parent's requests line by line, and detect its end. */
 static void listen_to_leader(void)
 {
     char lines[4096], *line;
@@ -211,7 +212,7 @@ static void note(
     record->size = STATUS_SIZE;
 }
 
-/* Return what has happened since the last status. */
+/* Return the event since the last status. */
 static int look_around(void)
 {
     return (is_interrupted ? DRIVE_INTERRUPTED : 0) | (bus.is_led ? 0 : DRIVE_ALONE)
@@ -231,7 +232,7 @@ static const char *run(double seconds)
     static drive_state drive;
     static drive_command command;
     const double begin = now();
-    drain(); /* what came while nobody listened */
+    drain(); /* packets from before the start */
     heard.is_new = 0;
     bus.foreign = 0;
     if (!receive(DRIVE_SILENCE)) {
@@ -282,7 +283,7 @@ static const char *run(double seconds)
     }
 }
 
-/* Answer the statuses of a record again; return the reason to end, NULL if that cannot be done. */
+/* Answer the statuses of a record again; return the reason to end, NULL on failure. */
 static const char *repeat(const char *from, double seconds, const char *to)
 {
     static drive_state drive;
@@ -322,7 +323,7 @@ static const char *repeat(const char *from, double seconds, const char *to)
     return out != NULL && fclose(out) == 0 ? reason : NULL;
 }
 
-/* Go before others, and have all memory at hand, where that is allowed. */
+/* Use real-time priority and locked memory, where that is allowed. */
 static void go_first(void)
 {
     const struct sched_param priority = {.sched_priority = DRIVE_PRIORITY};
@@ -359,7 +360,7 @@ int main(int argc, char **argv)
     sigaction(SIGTERM, &caught, NULL);
     for (k = 0; k < sizeof of_terminals / sizeof of_terminals[0]; k++) {
         if (sigaction(of_terminals[k], NULL, &before) == 0 && before.sa_handler != SIG_IGN) {
-            sigaction(of_terminals[k], &caught, NULL); /* ignored, as by nohup, it stays so */
+            sigaction(of_terminals[k], &caught, NULL); /* ignored signals stay ignored, as under nohup */
         }
     }
     caught.sa_handler = SIG_IGN;

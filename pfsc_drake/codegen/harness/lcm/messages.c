@@ -3,8 +3,8 @@
 #include <string.h>
 
 #define HEAD 8     /* bytes of a packet before the channel */
-#define UTIME 8    /* where a message has its time, behind the fingerprint */
-#define JOINTS 16  /* where a status has the number of its joints */
+#define UTIME 8    /* offset of the time, behind the fingerprint */
+#define JOINTS 16  /* offset of the number of joints in a status */
 #define WRENCH_AT 16
 #define LARGEST_MODE 6
 

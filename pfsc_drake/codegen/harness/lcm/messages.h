@@ -8,14 +8,14 @@
 
 #include "drive_setup.h"
 
-/* What a robot tells at each of its ticks. */
+/* Status of a robot at one of its ticks. */
 typedef struct {
-    int64_t utime; /* its clock, us */
+    int64_t utime; /* clock of the robot, us */
     double q[DRIVE_JOINTS], v[DRIVE_JOINTS], torque[DRIVE_JOINTS];
     int robot_mode, control_mode;
 } drive_status;
 
-/* Return the message in a packet, NULL if it is on another channel or no short packet. */
+/* Return the message in a packet, NULL if it is on another channel or not a short packet. */
 const unsigned char *packet_message(
     const unsigned char *packet, size_t size, const char *channel, size_t *length);
 

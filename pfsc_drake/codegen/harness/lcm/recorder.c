@@ -6,14 +6,14 @@
 #include <semaphore.h>
 #include <string.h>
 
-#define ROOM 8192 /* records that wait */
+#define ROOM 8192 /* waiting records */
 #define LEAST_ROOM 3000 /* for those of a stop */
 #define TOLD 0.2 /* s */
 
 static const char magic[8] = "PFSCDRV1";
 
 static drive_record records[ROOM], nowhere;
-static sem_t written, free_places; /* both count; no thread ever waits for free places */
+static sem_t written, free_places; /* counters; no thread ever waits for free places */
 static size_t next;
 static int has_place;
 static volatile int is_broken;
@@ -35,7 +35,7 @@ int read_head(FILE *file)
            && sizes[1] == DRIVE_JOINTS;
 }
 
-/* Write records until an empty one comes; say now and then how far it is. */
+/* Write records until an empty one; print the progress from time to time. */
 static void *write_records(void *unused)
 {
     size_t at = 0;

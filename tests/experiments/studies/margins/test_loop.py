@@ -11,7 +11,7 @@ from experiments.scenario_file import read_scenario
 from experiments.studies.margins.box import Error, smooth, without_error
 from experiments.studies.margins.loop import StationLoop, linearize
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
-from pfsc_drake.control.margins import BrokenLoop, delay_margin, delayed, disc_margins, modes
+from pfsc_drake.control.margins import BrokenLoop, delay_margin, disc_margins, modes, with_delay
 from pfsc_drake.yaml.typed import load_typed
 
 # ticks at rest, after which the law extrapolates
@@ -154,10 +154,10 @@ def test_the_loop_at_rest_is_that_of_the_whole_station(name, overrides):
     linear = linearize(loop, section, loop.variables_in_loop([section]))
     station, period = loop.station, loop.map.period
     rest = RestPosture(station.start_posture, station.task.point(station.task.start(np.zeros(3))))
-    robot, ticks = station.part.belief.robot, wrong.driver.ticks(period)
+    robot, ticks = station.part.nominal_model.robot, wrong.driver.ticks(period)
     at_start = LoopAtRest(robot, station.law.linearization, rest, period, ticks=ticks)
     expected = modes(linear.A, period)
-    found = modes(at_start.closed(station.law.gains, mass=1.0 / factor), period)
+    found = modes(at_start.closed_loop(station.law.gains, mass=1.0 / factor), period)
     slow = np.sum(expected.rate > -400.0)
     assert slow >= 6
     # poles that are close together part at the least difference: compare what they are together
@@ -208,7 +208,7 @@ def test_the_delay_margin_is_what_the_station_bears(three):
             return waiting.pop(0)
 
         distance = simulated(three, 500, later)
-        rate = modes(delayed(linear.A, linear.holds, margin + extra), period).slowest
+        rate = modes(with_delay(linear.A, linear.holds, margin + extra), period).slowest
         assert (rate > 0.0) == bool(extra)
         late, early = distance[-100:].max(), distance[-300:-200].max()
         assert (late > early) == bool(extra)

@@ -12,7 +12,7 @@ from experiments.scenario_file import read_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Error, ErrorBox, corners, single_errors, smooth
 from experiments.studies.margins.result import MarginAnalysis
-from experiments.studies.margins.words import one_line, sentences
+from experiments.studies.margins.texts import one_line, sentences
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 from reporting.progress import NoProgress
@@ -103,13 +103,13 @@ def test_the_command_writes_a_page(tmp_path, capsys):
     assert status == 0
     text = capsys.readouterr().out
     assert "the loop is stable" in text
-    assert "What hurts most, by itself, is an error of" in text
+    assert "The most critical single error is that in" in text
     assert "The weakest drive is" in text
     data = json.loads((out / "margins.json").read_text(encoding="utf-8"))
     assert len(data["loops"]) == 1 + 4 + 4
     assert data["loops"][0]["stable"]
     assert len(data["margins"]) == len(data["loops"][0]["places"]) >= 5
-    speeds = [place["speed"] for place in data["margins"]]
+    speeds = [point["speed"] for point in data["margins"]]
     assert speeds[0] == speeds[-1] == 0.0
     assert min(map(abs, speeds[1:-1])) > 0.01
     assert all(margin["delay_margin_samples"] >= 1 for margin in data["margins"])
@@ -162,8 +162,8 @@ def test_what_has_no_slope_is_taken_off():
 def test_the_box():
     singles = list(single_errors(ErrorBox(0.05, 0.1, 0.0, 0.2), elastic=True))
     assert [key for key, _ in singles] == ["mass"] * 2 + ["stiffness"] * 2 + ["tool_mass"] * 2
-    assert str(singles[0][1]) == "masses believed 5 % too low"
-    assert str(singles[5][1]) == "tool believed 0.2 kg too heavy"
+    assert str(singles[0][1]) == "nominal masses 5 % too low"
+    assert str(singles[5][1]) == "nominal tool 0.2 kg too heavy"
     assert len(list(corners(ErrorBox(), elastic=True))) == 8
     assert len(list(corners(ErrorBox(), elastic=False))) == 4
     assert list(corners(ErrorBox(0.05, 0.0, 0.0, 0.0), elastic=True)) == []
@@ -188,7 +188,7 @@ def test_margins_along_a_surface():
     )
     assert analysis.nominal.is_stable
     assert analysis.tightest.smallest > 0.1
-    instants = [place.instant for place in analysis.nominal.places]
+    instants = [point.instant for point in analysis.nominal.points]
     eta = np.array([instant.eta for instant in instants])
     np.testing.assert_allclose(eta[0], 0.0, atol=1e-4)
     np.testing.assert_allclose(eta[-1], [-0.15, 0.2], atol=1e-4)
@@ -197,8 +197,8 @@ def test_margins_along_a_surface():
     speeds = [instant.speed for instant in instants]
     assert speeds[0] == speeds[-1] == 0.0
     assert 0.5 < max(speeds) <= 1.0
-    assert "eta = (-0.15, 0.2) m" in instants[-1].place
-    assert all(place.modes is not None for place in analysis.nominal.places)
+    assert "eta = (-0.15, 0.2) m" in instants[-1].location
+    assert all(point.modes is not None for point in analysis.nominal.points)
 
 
 @pytest.fixture(scope="module")

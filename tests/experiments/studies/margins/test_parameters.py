@@ -43,7 +43,9 @@ def test_a_parametric_loop_is_the_one_built_for_a_belief(name):
     section = walk(walked, 0.05, lambda _: None, only_start=True).instants[0].section
     rest = walked.derivative.at(section).rest
     wrong = WRONG.applied_to(settings)
-    own, other = (walked.believing(belief, folder).parameters for belief in (settings, wrong))
+    own, other = (
+        walked.with_nominal_model(belief, folder).parameters for belief in (settings, wrong)
+    )
     found = walked.derivative.at(section, None, rest, other).A
     built = StationLoop(wrong, folder, walked)
     expected = built.derivative.at(built.map.adopted(section), None, rest).A

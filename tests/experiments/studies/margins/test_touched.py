@@ -30,10 +30,10 @@ def test_the_stiffest_that_is_borne(limit, monkeypatch):
     found = touched_surface(loop, None, None, np.zeros(0), lambda phase: None)
     assert (found.stiffness, found.force) == (STIFFNESS, 20.0)
     if limit < 1.0:
-        assert found.borne == 0.0
+        assert found.largest_factor == 0.0
     elif limit > STIFFEST:
-        assert found.borne == np.inf
+        assert found.largest_factor == np.inf
         return
     else:
-        assert limit / 1.1 < found.borne <= limit
+        assert limit / 1.1 < found.largest_factor <= limit
     assert found.frequency == pytest.approx(FREQUENCY)
