@@ -1,6 +1,7 @@
-"""What a run leaves when its simulation is over: log, metrics, figures, recording and report."""
+"""Results of a completed simulation: log, metrics, figures, recording and report."""
 
 import gc
+import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -11,12 +12,14 @@ from numpy.typing import NDArray
 
 from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
+from diagrams.drawing.legend import recording_legend, with_legend
 from diagrams.drawing.recorded import RecordedMotion
 from diagrams.drawing.replay import record
 from diagrams.tasks.task_drawing import drawing_of
 from experiments.preparation import PreparedRun
 from experiments.results.features import FEATURES, render_figures
 from experiments.results.joint_limits_feature import DriveLimitsOfRun
+from experiments.results.key_results import key_facts, key_metrics
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.requirements import (
     leave_unjudged,
@@ -29,9 +32,11 @@ from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
 from experiments.simulation import SimulationResult, measure_tick
 from experiments.studies.margins.result import MarginAnalysis
-from experiments.studies.margins.words import metrics_of, one_line
+from experiments.studies.margins.texts import metrics_of, one_line
 from pfsc_drake.robot.coordinate_text import posture_text
 from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
+from pfsc_drake.yaml.dumping import changed_data
+from pfsc_drake.yaml.reading import dump_yaml
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
 from reporting.page import Page
@@ -43,18 +48,18 @@ _MESHCATS = 3  # of a recording, at most
 
 @dataclass
 class RunOutcome:
-    """What a run left.
+    """Outcome of a run.
 
     Attributes:
         fault: Why the run was stopped, or None if it was not.
-        report: The page to open; None if it could not be written.
+        report: The report page; None if it could not be written.
         metrics: Its metrics.
-        warnings: What may not have gone as well as hoped, one sentence each.
+        warnings: Warnings, one sentence each.
         interrupted: Whether the user stopped it.
-        problem: Which results could not be written, why, and where they are instead; or None.
-        margins: What the loop bears at the start, in one line; None if nobody asked.
-        broken: What was promised and not kept, one phrase each.
-        stop: How the robot moved after a fault, in words; empty without one.
+        problem: Results that could not be written, with reason and substitute; or None.
+        margins: Stability margins at the start, in one line; None if not requested.
+        broken: Violated requirements, one phrase each.
+        stop: Description of the motion after a fault; empty without one.
     """
 
     fault: str | None
@@ -70,16 +75,16 @@ class RunOutcome:
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """A run whose simulation is over.
+    """A run whose simulation is complete.
 
     Attributes:
-        prepared: What was simulated.
+        prepared: The prepared run that was simulated.
         name: Name of its scenario.
-        result: What came of it.
-        analysis: What the loop bears at the start, if somebody asked.
-        attributes: What else to note in the log.
-        further: Adds what the station does not know to the log.
-        simulated: Whether the robot was simulated in here, not driven elsewhere.
+        result: Result of the simulation.
+        analysis: Margins of the loop at the start, if requested.
+        attributes: Further attributes of the log.
+        further: Adds signals from outside the station to the log.
+        simulated: Whether the robot was simulated in this process, not driven over a link.
     """
 
     prepared: PreparedRun
@@ -100,13 +105,13 @@ def write_outcome(
     figures: bool,
     recording: bool,
 ) -> RunOutcome:
-    """Write everything that a run leaves but its scenario.
+    """Write all results of a run except its scenario.
 
     Args:
         run: The run.
         results: The folder.
-        progress: Told what goes on.
-        interrupted: Whether to leave out what takes long.
+        progress: Progress listener.
+        interrupted: Whether to skip slow steps.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
     """
@@ -131,10 +136,12 @@ def write_outcome(
     )
     if "fault_time" in log.attributes and log.time.size:
         outcome.stop = MotionAfterFault(log, DriveLimitsOfRun.of(station.robot)).sentence()
-    page = None
+    page, legend = None, recording_legend(drawing_of(station.task), motion)
     if recording and len(motion.times) > 1 and not interrupted():
         progress(end, "recording")
-        page = results.write("recording.html", _recording(run.prepared, motion))
+        page = results.write(
+            "recording.html", with_legend(_recording(run.prepared, motion), legend)
+        )
     drawn = figures and not interrupted()
     if drawn:
         progress(end, "drawing")
@@ -147,7 +154,10 @@ def write_outcome(
             "interrupted": outcome.interrupted,
         }
     )
-    report = _report_page(run, log, outcome, drawn, _link(page, results.path)).write(results)
+    content = _report_page(run, log, outcome, results.path, figures=drawn)
+    if page is not None:
+        content.recording, content.legend = _link(page, results.path), legend
+    report = content.write(results)
     progress(end, "done")
     outcome.report, outcome.problem, outcome.interrupted = (
         report.path,
@@ -158,7 +168,7 @@ def write_outcome(
 
 
 def _collect_log(run: FinishedRun, end: float, interrupted: bool) -> RunLog:
-    """Return the log of a run that ended at a time [s], with what identifies it."""
+    """Return the log of a run that ended at a time [s], with identifying attributes."""
     prepared, result, station = run.prepared, run.result, run.prepared.station
     log = collect_log(station, result.root)
     run.further(log)
@@ -204,40 +214,56 @@ def _metrics(run: FinishedRun, log: RunLog, tick: NDArray[np.float64]) -> Metric
 
 
 def _warnings(run: FinishedRun, log: RunLog, metrics: Metrics) -> list[str]:
-    """Return what may not have gone as well as hoped, one sentence each."""
+    """Return warnings about a run, one sentence each."""
     settings, station = run.prepared.settings, run.prepared.station
     own = [x for feature in FEATURES for x in feature.warnings(log, station, settings)]
     return [*run.prepared.warnings, *own, *unjudged_distance(metrics, settings.controller.law)]
 
 
 def _report_page(
-    run: FinishedRun, log: RunLog, outcome: RunOutcome, drawn: bool, recording: str | None
+    run: FinishedRun, log: RunLog, outcome: RunOutcome, out: Path, *, figures: bool
 ) -> Page:
-    """Return the page that a person opens, with figures if they are to be drawn."""
-    prepared, task = run.prepared, run.prepared.station.task
-    figures = render_figures(log, drawing_of(task).outline(), task.fit) if drawn else []
+    """Return the report page without recording, with figures if requested."""
+    prepared, task, metrics = run.prepared, run.prepared.station.task, outcome.metrics
+    settings = prepared.settings
+    drawn = render_figures(log, drawing_of(task).outline(), task.fit) if figures else []
     return Page(
         title=run.name,
         kind="Simulation run" if run.simulated else "Robot driven",
-        description=prepared.settings.description,
+        description=settings.description,
         fault=outcome.fault,
         broken=outcome.broken,
         interrupted=outcome.interrupted,
         warnings=outcome.warnings,
-        metrics=outcome.metrics,
-        recording=recording,
-        figures=figures,
+        metrics=metrics,
+        cards=key_metrics(metrics),
+        facts=key_facts(log, metrics, settings.duration, simulated=run.simulated),
+        figures=drawn,
+        brief=True,
+        commands=_further_commands(out, simulated=run.simulated),
+        commands_title="Compare",
+        changed_yaml_text=dump_yaml(changed_data(settings)),
         scenario_yaml_text=prepared.text,
-        diagram_svg=block_diagram_svg(prepared.station.diagram) if figures else None,
+        diagram_svg=block_diagram_svg(prepared.station.diagram) if drawn else None,
         log_attributes=log.attributes,
     )
 
 
+def _further_commands(out: Path, *, simulated: bool) -> dict[str, str]:
+    """Return command lines that repeat a run and compare it, by their purpose."""
+    folder, scenario = (shlex.quote(str(path)) for path in (out, out / "scenario.yaml"))
+    again = "Run it again as resolved, or with changes by --set KEY=VALUE, into a folder OTHER."
+    commands = {again: f"pfsc run {scenario} --out OTHER"} if simulated else {}
+    return commands | {
+        "Compare it with that run, or with any other.": f"pfsc compare {folder} OTHER"
+    }
+
+
 def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:
-    """Return the recording as a page of its own; a Meshcat that is ended from outside is replaced.
+    """Return the recording as a self-contained page; a Meshcat that is shut down is replaced.
 
     Raises:
-        RuntimeError: If it was ended again and again.
+        RuntimeError: If it was shut down repeatedly.
     """
     settings = prepared.settings
     for left in reversed(range(_MESHCATS)):
@@ -253,16 +279,14 @@ def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:
     raise AssertionError("the last failure is raised in the loop")
 
 
-def _link(recording: Path | None, out: Path) -> str | None:
-    """Return where the report, in its folder, finds the recording."""
-    if recording is None:
-        return None
+def _link(recording: Path, out: Path) -> str:
+    """Return the link from the report, in its folder, to the recording."""
     return recording.name if recording.parent == out else str(recording)
 
 
 @contextmanager
 def steady_clock() -> Iterator[None]:
-    """Keep the garbage collector from walking, amid the measured time, through all made before."""
+    """Exclude existing objects from garbage collection during the measured time."""
     gc.freeze()
     try:
         yield

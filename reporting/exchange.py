@@ -1,8 +1,8 @@
-"""Exchange of a folder's results for those of a new run, all at once also through a crash.
+"""Exchange of a folder's results for those of a new run, as a whole even after a crash.
 
-New results are written into a folder of their own within that of the results, which is in the
-same file system and under the same lock. When they are complete its name changes, once, and from
-then on whoever opens the folder next ends the exchange; before, the results are the earlier ones.
+New results are written into a folder of their own within the results folder, i.e. in the same file
+system and under the same lock. When they are complete, one renaming commits the exchange, and the
+next process that opens the folder finishes it if necessary; before, the earlier results remain.
 """
 
 import shutil
@@ -30,7 +30,7 @@ def begin_exchange(folder: Path, kind: str) -> Path:
     """
     end_exchange(folder)
     staged = folder / STAGED
-    if staged.exists():  # of a process that was killed
+    if staged.exists():  # left by a killed process
         shutil.rmtree(staged)
     staged.mkdir()
     (staged / MANIFEST).write_text(manifest_text(kind, []), encoding="utf-8")
@@ -38,7 +38,7 @@ def begin_exchange(folder: Path, kind: str) -> Path:
 
 
 def complete_exchange(folder: Path) -> None:
-    """Replace earlier results by those that are staged.
+    """Replace earlier results by the staged ones.
 
     Args:
         folder: Folder of the results, locked.
@@ -51,7 +51,7 @@ def complete_exchange(folder: Path) -> None:
 
 
 def end_exchange(folder: Path) -> None:
-    """End an exchange that was complete when its process ended; nothing to do without one.
+    """Finish an exchange that was committed when its process ended; do nothing without one.
 
     Args:
         folder: Folder of the results, locked.
@@ -62,7 +62,7 @@ def end_exchange(folder: Path) -> None:
     kind = kind_of_results(ready)
     if kind is not None:
         old, new = listed_results(folder), listed_results(ready)
-        # all are known as results whenever the process ends
+        # all files are listed as results whenever the process ends
         _replace(folder, manifest_text(kind, [*dict.fromkeys([*old, *new])]))
         for name in old:
             if name not in new:
@@ -73,7 +73,7 @@ def end_exchange(folder: Path) -> None:
                 (ready / name).replace(folder / name)
         (ready / MANIFEST).replace(folder / MANIFEST)
     shutil.rmtree(ready)
-    with suppress(OSError):  # is not empty, or not there
+    with suppress(OSError):  # not empty, or missing
         (folder / FIGURES).rmdir()
 
 

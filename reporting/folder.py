@@ -1,4 +1,4 @@
-"""The folder that results are written into: taken by one process, never a user's own files."""
+"""Results folder: locked by one process, without overwriting a user's own files."""
 
 import errno
 import fcntl
@@ -25,14 +25,14 @@ from reporting.provenance import (
     manifest_text,
 )
 
-# copies of inputs, which are no results yet
+# copies of inputs, which are not results
 _INPUTS = frozenset({"scenario.yaml"})
-# where a file system knows no locks on folders, nothing is locked
+# on file systems without locks for folders, nothing is locked
 _NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP)
 
 
 class ResultsFolder:
-    """A folder that this process alone writes results into; from :func:`open_results`.
+    """A folder into which only this process writes results; from :func:`open_results`.
 
     Attributes:
         path: The folder.
@@ -45,42 +45,42 @@ class ResultsFolder:
             path: Path of the folder.
             kind: Kind of results, e.g. ``run``.
             handle: Descriptor of the open folder.
-            resume: Whether results replace earlier ones one by one, at once; else all together, by
-                :meth:`exchange`.
+            resume: Whether results replace earlier ones one by one, immediately; otherwise all
+                together, by :meth:`exchange`.
         """
         self.path = path
         self._kind = kind
         self._handle = handle
         end_exchange(path)
         (path / UNFINISHED).unlink(missing_ok=True)
-        self._earlier = {name: _version(path / name) for name in listed_results(path)}
+        self._earlier = {name: _fingerprint(path / name) for name in listed_results(path)}
         self._files = [*self._earlier] if resume else []
         self._home = path if resume else begin_exchange(path, kind)
-        self._inputs: dict[str, bytes] = {}  # small, and kept for a folder that is removed
+        self._inputs: dict[str, bytes] = {}  # small, and stored in case the folder is removed
         self._elsewhere: Path | None = None
-        self._reasons: dict[str, str] = {}  # why a file could not be written here
-        self._lost: list[str] = []  # what could not be written elsewhere either
+        self._reasons: dict[str, str] = {}  # reasons why files could not be written here
+        self._lost: list[str] = []  # files that could not be written elsewhere either
         self._outcome: Mapping[str, Any] | None = None
         self._write_manifest()
 
     def write(self, name: str, content: str | bytes) -> Path | None:
-        """Write one result, whole or not at all; it is in the folder from the exchange on.
+        """Write one result as a whole; it is in the folder after the exchange.
 
-        One that is replaced is there at every moment, as it was or as it is now.
+        A result that is replaced exists at every moment, in its old or its new version.
 
-        What cannot be written here is written into a temporary folder instead, see
+        If a file cannot be written here, it is written into a temporary folder instead, see
         :meth:`explain_problems`.
 
         Args:
-            name: See :mod:`reporting.provenance`: a result's, or ``figures/NAME.png``.
+            name: Name of a result, see :mod:`reporting.provenance`, or ``figures/NAME.png``.
             content: Content of the file; text becomes UTF-8.
 
         Returns:
-            The file as it is called after the exchange; None if it could not be written anywhere.
+            Path of the file after the exchange; None if it could not be written anywhere.
         """
         assert is_result(name), name
         if isinstance(content, str):
-            content = content.encode("utf-8", "backslashreplace")  # names of files may be no text
+            content = content.encode("utf-8", "backslashreplace")  # file names may be no valid text
         if name in _INPUTS:
             self._inputs[name] = content
         try:
@@ -90,14 +90,14 @@ class ResultsFolder:
         return self._write_elsewhere(name, content)
 
     def exchange(self) -> None:
-        """Replace the earlier results by the new ones; what cannot be is written elsewhere."""
+        """Replace the earlier results by the new ones; write the rest elsewhere."""
         if self._home == self.path:
             return
         home, self._home = self._home, self.path
         try:
             self._require_same_folder()
             for name in (name for name in self._files if self._is_foreign(name)):
-                self._move_elsewhere(STAGED, name, f"somebody else has made {name} meanwhile")
+                self._move_elsewhere(STAGED, name, f"another process has created {name} meanwhile")
             own = [name for name in self._earlier if not self._is_foreign(name)]
             if len(own) < len(self._earlier):
                 text = manifest_text(self._kind, own)
@@ -110,17 +110,17 @@ class ResultsFolder:
             began = (self.path / READY).exists()
             for name in self._files:
                 if began and not _exists(self.path / READY / name):
-                    continue  # it has been exchanged
+                    continue  # already exchanged
                 if name not in self._reasons:
                     self._move_elsewhere(READY if began else STAGED, name, _reason(error))
 
     def _is_foreign(self, name: str) -> bool:
-        """Return whether a file of a result's name has been made or changed since the beginning."""
-        version = _version(self.path / name)
+        """Return whether a result's file has been created or changed by others meanwhile."""
+        version = _fingerprint(self.path / name)
         return version is not None and version != self._earlier.get(name)
 
     def close(self, *, failed: bool) -> None:
-        """End the writing: exchange, but for a failure before there was a result.
+        """Finish writing: exchange, unless it failed before there was a result.
 
         Args:
             failed: Whether an exception ends it.
@@ -131,34 +131,34 @@ class ResultsFolder:
             shutil.rmtree(self._home, ignore_errors=True)
 
     def tell(self, outcome: Mapping[str, Any]) -> None:
-        """Note how it ended, so that it is known to whoever reads the results.
+        """Store the outcome in the manifest.
 
         Args:
-            outcome: Of numbers, texts and lists of these, by name.
+            outcome: Numbers, texts and lists of these, by name.
         """
         self._outcome = outcome
-        with suppress(OSError):  # the files themselves say what could not be written
+        with suppress(OSError):  # explain_problems reports the files
             self._write_manifest()
 
     def explain_problems(self) -> str | None:
-        """Exchange the results, and return what could not be written, why, and where it is instead.
+        """Exchange the results, and describe files that could not be written: reason and place.
 
-        None if all was.
+        None if all were written.
         """
         self.exchange()
         if not self._reasons:
             return None
         reasons = " and ".join(dict.fromkeys(self._reasons.values()))
-        text = f"cannot write {_listed(self._reasons)} into {self.path}: {reasons}"
+        text = f"cannot write {_join_names(self._reasons)} into {self.path}: {reasons}"
         if len(self._lost) < len(self._reasons):
-            text += f"; kept in {self._elsewhere}"
-        return f"{text}; lost: {_listed(self._lost)}" if self._lost else text
+            text += f"; saved in {self._elsewhere}"
+        return f"{text}; lost: {_join_names(self._lost)}" if self._lost else text
 
     def _write_here(self, name: str, content: bytes) -> Path:
         self._require_same_folder()
         if name not in self._files:
             if self._is_foreign(name):
-                raise FileExistsError(errno.EEXIST, f"somebody else has made {name} meanwhile")
+                raise FileExistsError(errno.EEXIST, f"another process has created {name} meanwhile")
             # listed first, so that a file is known as a result whenever the process ends
             self._files.append(name)
             self._write_manifest()
@@ -179,14 +179,14 @@ class ResultsFolder:
             return None
 
     def _move_elsewhere(self, staged: str, name: str, reason: str) -> None:
-        """Take a staged result out of those to be exchanged, also from a folder that was moved."""
+        """Remove a staged result from the exchange, also from a folder that was moved."""
         self._reasons[name] = reason
         try:
             with open(
                 f"{staged}/{name}", "rb", opener=partial(os.open, dir_fd=self._handle)
             ) as file:
-                kept = self._write_elsewhere(name, file.read())
-            if kept is not None:
+                saved = self._write_elsewhere(name, file.read())
+            if saved is not None:
                 os.unlink(f"{staged}/{name}", dir_fd=self._handle)
         except OSError:
             if name not in self._inputs:
@@ -203,31 +203,31 @@ class ResultsFolder:
 def open_results(
     path: Path, kind: str, inputs: Sequence[Path] = (), resume: bool = False
 ) -> Iterator[ResultsFolder]:
-    """Take a folder for results until the end of the context.
+    """Open a folder for results until the end of the context.
 
     The folder is created if it is missing and locked against other processes; the lock ends with
-    the process, also if that crashes. Earlier results of the same kind stay until the end, or until
-    :meth:`ResultsFolder.explain_problems`, and are then exchanged for the new ones all at once; if
-    the process is killed before, or fails without a result, they stay whole.
+    the process, also after a crash. Earlier results of the same kind stay until the end, or until
+    :meth:`ResultsFolder.explain_problems`, and are then replaced by the new ones as a whole; if the
+    process is killed before, or fails without a result, they stay complete.
 
     Args:
         path: Path of the folder.
         kind: Kind of results, e.g. ``run``.
-        inputs: Files that the results are made from.
+        inputs: Input files of the results.
         resume: Whether earlier results stay until others replace them.
 
     Raises:
-        InputError: If the folder cannot be written, is in use, or holds something else where
-            results belong; one line. Nothing in it has been changed then.
+        InputError: If the folder cannot be written, is in use, or contains other files in place of
+            results; one line. Nothing in it has been changed then.
     """
     check_folder(path, kind, inputs)
-    with _naming(path):
+    with _name_in_errors(path):
         path.mkdir(parents=True, exist_ok=True)
         handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        with _naming(path):
+        with _name_in_errors(path):
             _lock(path, handle)
-            check_folder(path, kind, inputs)  # as it is now that nobody else writes
+            check_folder(path, kind, inputs)  # again, now that no other process writes
             results = ResultsFolder(path, kind, handle, resume=resume)
         try:
             yield results
@@ -240,17 +240,17 @@ def open_results(
 
 
 def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:
-    """Refuse a folder that results must not be written into; changes nothing.
+    """Refuse a folder that results must not be written into; change nothing.
 
     Args:
         path: Path of the folder, which may be missing.
         kind: Kind of results.
-        inputs: Files that the results are made from.
+        inputs: Input files of the results.
 
     Raises:
-        InputError: If the folder is in use, or holds something else than results.
+        InputError: If the folder is in use, or contains anything but results.
     """
-    with _naming(path):
+    with _name_in_errors(path):
         exists = _exists(path)
         if exists and not path.is_dir():
             raise InputError(f"--out {path}: is no folder; allowed: a folder")
@@ -260,8 +260,8 @@ def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Turn what the system says against a folder into one line that names it."""
+def _name_in_errors(path: Path) -> Iterator[None]:
+    """Turn errors of the system about a folder into one line that names it."""
     try:
         yield
     except InputError:
@@ -286,7 +286,7 @@ def _lock(path: Path, handle: int) -> None:
 
 
 def _write_whole(folder: Path, name: str, content: bytes) -> Path:
-    """Write a file under another name, which it changes for its own when it is complete."""
+    """Write a file under another name, and rename it when it is complete."""
     target, unfinished = folder / name, folder / UNFINISHED
     try:
         unfinished.write_bytes(content)
@@ -301,7 +301,7 @@ def _write_whole(folder: Path, name: str, content: bytes) -> Path:
 
 
 def _exists(path: Path) -> bool:
-    """Whether something has this name, be it a link that leads nowhere."""
+    """Return whether the name exists, possibly as a broken link."""
     try:
         path.lstat()
     except FileNotFoundError:
@@ -309,8 +309,8 @@ def _exists(path: Path) -> bool:
     return True
 
 
-def _version(file: Path) -> tuple[int, int, int] | None:
-    """Return what changes when a file does; None if there is none."""
+def _fingerprint(file: Path) -> tuple[int, int, int] | None:
+    """Return values that change with the file; None if there is none."""
     try:
         status = file.lstat()
     except FileNotFoundError:
@@ -319,11 +319,11 @@ def _version(file: Path) -> tuple[int, int, int] | None:
 
 
 def _reason(error: OSError) -> str:
-    """What the system says, without the names of files."""
+    """Return the system's message without file names."""
     return error.strerror or type(error).__name__
 
 
-def _listed(names: Sequence[str] | dict[str, str]) -> str:
-    """Names for people, figures as one."""
+def _join_names(names: Sequence[str] | dict[str, str]) -> str:
+    """Return names in words, all figures as one."""
     shown = [FIGURES if name.startswith(f"{FIGURES}/") else name for name in names]
     return ", ".join(dict.fromkeys(shown))

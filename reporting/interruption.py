@@ -1,8 +1,8 @@
 """Interruptions of a process: Ctrl-C, a request to end, a terminal that closes.
 
-SIGINT, SIGTERM and SIGHUP mean the same to every command: bring to rest what moves, save what was
-done, print one line, exit with INTERRUPTED. A signal that was ignored when the process began stays
-ignored, such as SIGHUP under ``nohup`` and SIGINT in the background of a script.
+SIGINT, SIGTERM and SIGHUP have the same effect in every command: stop all motion, save the results
+so far, print one line, exit with INTERRUPTED. A signal that was ignored when the process began
+stays ignored, such as SIGHUP under ``nohup`` and SIGINT in the background of a script.
 """
 
 import os
@@ -21,27 +21,28 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 def leave_when_interrupted() -> None:
     """End the process with one line and INTERRUPTED at an interruption, until further notice."""
-    for number in _obeyed():
+    for number in _signals():
         signal.signal(number, _leave)
 
 
 @contextmanager
-def raised_interruption() -> Iterator[None]:
+def raise_on_interruption() -> Iterator[None]:
     """Let an interruption raise KeyboardInterrupt; a library that swallows it only delays it."""
     handler = _Raise()
-    with _handled(handler):
+    with _handle(handler):
         yield
 
 
 @contextmanager
-def noticed_interruption() -> Iterator[Callable[[], bool]]:
-    """Give a function that returns whether there was an interruption since the context began.
+def watch_interruption() -> Iterator[Callable[[], bool]]:
+    """Return a function that reports whether there was an interruption since the context began.
 
-    The first one is only noticed; a Ctrl-C after it raises KeyboardInterrupt. What programs send
-    may come several times, as from ``timeout`` or from a terminal that closes, and is only noticed.
+    The first interruption is only recorded; a Ctrl-C after it raises KeyboardInterrupt. Signals of
+    programs may come several times, as from ``timeout`` or a closing terminal, and are only
+    recorded.
 
-    A program that does not handle SIGTERM or SIGHUP itself gets it at the end of the context, so
-    that a script ends after the run that is saved.
+    If the program does not handle SIGTERM or SIGHUP itself, the signal is raised again at the end
+    of the context, so that a script ends after the run that is saved.
 
     Raises:
         KeyboardInterrupt: If there was one before, and a library swallowed the exception.
@@ -54,10 +55,10 @@ def noticed_interruption() -> Iterator[Callable[[], bool]]:
             raise KeyboardInterrupt
         noticed.append(signal.Signals(number))
 
-    before = {number: signal.getsignal(number) for number in _obeyed()}
+    before = {number: signal.getsignal(number) for number in _signals()}
     if any(isinstance(handler, _Raise) and handler.has_raised for handler in before.values()):
         raise KeyboardInterrupt
-    with _handled(notice):
+    with _handle(notice):
         yield lambda: bool(noticed)
     for number in dict.fromkeys(noticed):
         if before[number] is signal.SIG_DFL:
@@ -65,9 +66,9 @@ def noticed_interruption() -> Iterator[Callable[[], bool]]:
 
 
 @contextmanager
-def _handled(handler: Callable[[int, FrameType | None], Any]) -> Iterator[None]:
+def _handle(handler: Callable[[int, FrameType | None], Any]) -> Iterator[None]:
     """Handle interruptions in a context."""
-    before = {number: signal.signal(number, handler) for number in _obeyed()}
+    before = {number: signal.signal(number, handler) for number in _signals()}
     try:
         yield
     finally:
@@ -87,8 +88,8 @@ class _Raise:
         raise KeyboardInterrupt
 
 
-def _obeyed() -> list[signal.Signals]:
-    """Return the signals that are this thread's business and not ignored."""
+def _signals() -> list[signal.Signals]:
+    """Return the signals that this thread handles and that are not ignored."""
     if threading.current_thread() is not threading.main_thread():
         return []
     return [number for number in SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
@@ -96,13 +97,13 @@ def _obeyed() -> list[signal.Signals]:
 
 def _leave(_number: int, _frame: FrameType | None) -> None:
     newline = "\n" if sys.stderr.isatty() else ""  # after the ^C of the terminal
-    with suppress(OSError):  # of a terminal that has closed
+    with suppress(OSError):  # the terminal may be closed
         os.write(sys.stderr.fileno(), f"{newline}interrupted\n".encode())
     os._exit(INTERRUPTED)
 
 
 def _forget_closed_terminal() -> None:
-    """Write to nowhere what a terminal that has closed can no longer show."""
+    """Discard output that a closed terminal can no longer show."""
     for descriptor in (1, 2):
         with suppress(OSError):
             is_device = stat.S_ISCHR(os.fstat(descriptor).st_mode)

@@ -1,4 +1,4 @@
-"""Metrics: named numbers with unit and target, the file they are kept in, and their spelling."""
+"""Metrics: named numbers with unit and target, their file, and their text form."""
 
 import json
 import math
@@ -12,7 +12,7 @@ from typing import Any, Self
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import read_text
-from reporting.registry import known_metric
+from reporting.registry import find_metric
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -24,26 +24,24 @@ _TARGET = re.compile(r"\s*(<=|>=|<|>)\s*(\S+)\s*")
 NOT_A_NUMBER = "\u2013"
 NARROW_SPACE = "\u202f"
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
-# Lowest and highest power of ten a prefix may stand for, for units that take one.
+# lowest and highest power of ten of a prefix, for units with prefixes
 _PREFIX_RANGE = {"m": (-9, 0), "rad": (-9, 0), "m/s": (-6, 0), "s": (-9, 0), "N": (-3, 3)}
-# Below it a value is what rounding leaves, by unit; of others nothing is known.
-_NOISE = {
-    **dict.fromkeys(("m", "rad", "s", "m/s", "rad/s", "J"), 1e-12),
-    **dict.fromkeys(("rad/m", "1/m", "m/s^2", "N", "Nm", "N/m"), 1e-9),
-}
-_SPELLINGS = {"us": "µs", "Nm": "N\u2009m", "1": "", "-": ""}
+# values below are rounding errors, by unit
+_ROUNDING = 1e-12
+_ROUNDING_OF = dict.fromkeys(("rad/m", "1/m", "m/s^2", "N", "Nm", "N m", "N/m"), 1e-9)
+_SPELLINGS = {"us": "µs", "Nm": "N\u2009m", "N m": "N\u2009m", "1": "", "-": ""}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass
 class Metric:
-    """One number that a run is judged by.
+    """A number for the assessment of a run.
 
     Attributes:
-        value: In ``unit``; NaN where the run gave none (e.g. it never settled).
+        value: In ``unit``; NaN if the run has none (e.g. it never settled).
         unit: SI unit, e.g. ``"m"``; ``"1"`` without unit.
-        target: What it should be, ``"< 0.05e-3"`` (in ``unit``; also ``<= > >=``) or free text.
-        source: Where the target or the definition comes from, e.g. ``"Sec. 3.8.3"``.
+        target: Target, ``"< 0.05e-3"`` (in ``unit``; also ``<= > >=``) or free text.
+        source: Source of the target or the definition, e.g. ``"Sec. 3.8.3"``.
         judged: Whether the run was long enough for the target.
     """
 
@@ -98,26 +96,26 @@ class Metrics(UserDict[str, Metric]):
         """Add or replace a metric.
 
         Args:
-            name: Its name.
-            value: In ``unit``.
-            unit: SI unit; by default that of the registry, as is the source then.
-            target: Largest value that is wanted; None without one.
-            source: Where the target comes from.
+            name: Name of the metric.
+            value: Value in ``unit``.
+            unit: SI unit; unit and source are those of the registry by default.
+            target: Largest allowed value; None without one.
+            source: Source of the target.
         """
         if unit is None:
-            known = known_metric(name)
+            known = find_metric(name)
             if known is None:
                 raise KeyError(f"no such metric {name!r} in the registry, and no unit")
             unit, source = known.unit, source or known.source
         self[name] = Metric(float(value), unit, target, source)
 
     def set_target(self, name: str, target: str, source: str | None = None) -> None:
-        """Gives an existing metric its target.
+        """Set the target of an existing metric.
 
         Args:
             name: Name of the metric.
-            target: Largest value that is wanted; None without one.
-            source: Where the target comes from; None keeps the metric's source.
+            target: Target; None without one.
+            source: Source of the target; None keeps the metric's source.
 
         Raises:
             InputError: If there is no metric of this name.
@@ -130,7 +128,7 @@ class Metrics(UserDict[str, Metric]):
         self[name].source = source or self[name].source
 
     def write(self, path: Path) -> None:
-        """Writes the metrics, see :meth:`to_json`, to a file, which is replaced if it exists."""
+        """Writes the metrics to a file, see :meth:`to_json`; an existing file is replaced."""
         path.write_text(self.to_json(), encoding="utf-8")
 
     def to_json(self) -> str:
@@ -138,12 +136,12 @@ class Metrics(UserDict[str, Metric]):
         return json.dumps(self.to_data(), indent=2, allow_nan=False) + "\n"
 
     def to_data(self) -> dict[str, Any]:
-        """Returns what :meth:`to_json` writes, as data."""
+        """Returns the content of :meth:`to_json` as data."""
         return {name: _to_json(metric) for name, metric in self.items()}
 
     @classmethod
     def from_data(cls, flat: dict[str, Any]) -> Self:
-        """Returns the metrics of what :meth:`to_data` gave; null becomes NaN.
+        """Returns the metrics of data from :meth:`to_data`; null becomes NaN.
 
         Raises:
             ValueError, KeyError, TypeError, AttributeError: If it is something else.
@@ -152,7 +150,7 @@ class Metrics(UserDict[str, Metric]):
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Reads what :meth:`write` wrote; null becomes NaN.
+        """Reads a file of :meth:`write`; null becomes NaN.
 
         Args:
             path: JSON file.
@@ -161,7 +159,7 @@ class Metrics(UserDict[str, Metric]):
             The metrics.
 
         Raises:
-            InputError: If the file cannot be read or is no such file.
+            InputError: If the file cannot be read or is not such a file.
         """
         try:
             return cls.from_data(json.loads(read_text(path)))
@@ -195,16 +193,16 @@ def format_quantity(value: float, unit: str) -> str:
 
     Args:
         value: In ``unit``.
-        unit: ``"m"``, ``"rad"``, ``"m/s"``, ``"s"``, ``"N"`` get an SI prefix, others stay as is;
-            ``"1"``, ``"-"`` and ``""`` are no unit.
+        unit: ``"m"``, ``"rad"``, ``"m/s"``, ``"s"``, ``"N"`` get an SI prefix, others are
+            unchanged; ``"1"``, ``"-"`` and ``""`` are no unit.
 
     Returns:
         Text with a narrow no-break space before the unit; an en dash for NaN and infinity; 0 for
-        what is left by rounding.
+            rounding errors.
     """
     if not math.isfinite(value):
         return NOT_A_NUMBER
-    if abs(value) < _NOISE.get(unit, 0.0):
+    if abs(value) < _ROUNDING_OF.get(unit, _ROUNDING):
         value = 0.0
     exponent = _prefix_exponent(value, unit)
     number = _format_number(value / 10.0**exponent)
@@ -212,8 +210,13 @@ def format_quantity(value: float, unit: str) -> str:
     return f"{number}{NARROW_SPACE}{symbol}" if symbol else number
 
 
+def format_cell(value: float) -> str:
+    """Format a number of a table: four significant digits, 0 for a rounding error."""
+    return f"{0.0 if abs(value) < _ROUNDING else value:.4g}"
+
+
 def _prefix_exponent(value: float, unit: str) -> int:
-    """Power of ten of the prefix that suits a value, 0 for units without prefixes."""
+    """Return the power of ten of a suitable prefix for a value, 0 for units without prefixes."""
     if unit not in _PREFIX_RANGE or value == 0.0 or not math.isfinite(value):
         return 0
     lowest, highest = _PREFIX_RANGE[unit]
@@ -223,7 +226,7 @@ def _prefix_exponent(value: float, unit: str) -> int:
 
 
 def _format_number(value: float) -> str:
-    """Four significant digits without trailing zeros; whole numbers in full up to a million."""
+    """Return four significant digits without trailing zeros; integers in full up to a million."""
     if float(value).is_integer() and abs(value) < 1e6:
         return f"{value:.0f}"
     if 1e-3 <= abs(value) < 1e6:

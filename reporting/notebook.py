@@ -1,4 +1,4 @@
-"""What a notebook shows of results: short tables, recordings in frames, how far a run is."""
+"""Results in a notebook: short tables, recordings in frames, progress."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -12,17 +12,17 @@ from reporting.metrics import Metric
 from reporting.page import fill
 
 _SHOWN = 8  # metrics of a short table
-_PARTS = 200  # of a whole, between two looks at its progress
+_PARTS = 200  # of the whole, between two updates of the progress
 
 
 def in_notebook() -> bool:
-    """Return whether a kernel of Jupyter runs this, which shows more than text."""
+    """Return whether a Jupyter kernel runs this, which shows more than text."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     return type(shell).__name__ == "ZMQInteractiveShell"
 
 
 def show_html(content: str) -> None:
-    """Show HTML beneath the cell that runs.
+    """Show HTML below the running cell.
 
     Args:
         content: The HTML.
@@ -35,13 +35,13 @@ def show_html(content: str) -> None:
 def page_frame(page: Path, height: int, title: str) -> str:
     """Return a frame that shows a page, as HTML.
 
-    A page beneath the current folder stays a file, which the frame loads when it comes into sight;
-    another one, which a notebook could not reach, is put into the frame.
+    A page below the current folder stays a file, which the frame loads when it becomes visible;
+    another one, which a notebook could not reach, is embedded in the frame.
 
     Args:
         page: The page, self-contained.
         height: Height of the frame [pixels].
-        title: What it shows.
+        title: Title of the frame.
     """
     here, file = Path.cwd().resolve(), page.resolve()
     if file.is_relative_to(here):
@@ -57,13 +57,13 @@ def page_frame(page: Path, height: int, title: str) -> str:
 def short_table(
     title: str, ends: Sequence[str], warnings: Sequence[str], metrics: Mapping[str, Metric]
 ) -> str:
-    """Return what to know of a run first, as HTML: how it ended, metrics, warnings.
+    """Return the essentials of a run as HTML: outcome, metrics, warnings.
 
     Args:
         title: Name of the run.
-        ends: Why it did not end well, one phrase each; none if it did.
-        warnings: What may not have gone as well as hoped, one sentence each.
-        metrics: All of them; those with a target are shown, or the first few, others are folded.
+        ends: Reasons why it did not end well, one phrase each; none if it did.
+        warnings: Warnings, one sentence each.
+        metrics: All metrics; those with a target are shown, or the first few; others are folded.
     """
     targeted = [name for name, metric in metrics.items() if metric.target is not None]
     chosen = (targeted or list(metrics))[:_SHOWN]
@@ -82,17 +82,17 @@ def metrics_table(metrics: Mapping[str, Metric], names: Sequence[str] | None = N
 
     Args:
         metrics: The metrics.
-        names: Names of those that are shown; by default all.
+        names: Names of the metrics to show; by default all.
     """
     shown = {name: metrics[name] for name in (metrics if names is None else names)}
     return fill("notebook.html", title=None, metrics=shown, folded={})
 
 
 class NotebookProgress:
-    """Shows how far a run is, in one line beneath its cell that is gone at the end."""
+    """Shows the progress of a run in one line below its cell, which is removed at the end."""
 
     def __init__(self, title: str) -> None:
-        """Begin at nothing.
+        """Begin at zero.
 
         Args:
             title: Name of the run.
@@ -117,15 +117,15 @@ class NotebookProgress:
         self._show("")
 
     def expect(self, duration: float) -> None:
-        """Take the simulated time at the end [s], once it is known."""
+        """Set the simulated time at the end [s], once it is known."""
         self._duration = duration
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """Show simulated time and phase, where that differs from what is shown.
+        """Show simulated time and phase, if the display changes.
 
         Args:
             simulated_time: Simulated time [s].
-            phase: What goes on.
+            phase: Current phase.
         """
         share = simulated_time / self._duration if self._duration else 0.0
         shown = phase, int(_PARTS * share)
@@ -141,5 +141,5 @@ class NotebookProgress:
 
 
 def _bundle(content: str) -> dict[str, str]:
-    """Return HTML as the kernel sends it; as text there is nothing to see."""
+    """Return HTML in the kernel's format; its text form is empty."""
     return {"text/html": content, "text/plain": ""}

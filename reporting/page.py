@@ -1,4 +1,4 @@
-"""Self-contained HTML pages from templates in this folder; text that is filled in is escaped."""
+"""Self-contained HTML pages from templates in this folder; inserted text is escaped."""
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -10,12 +10,13 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from reporting.folder import ResultsFolder
-from reporting.metrics import Metric, Metrics, format_quantity
+from reporting.metrics import Metric, Metrics, format_cell, format_quantity
 from reporting.provenance import FIGURES
-from reporting.registry import known_metric
+from reporting.registry import find_metric
 from reporting.style import Figure
 
 MAX_CARDS = 8
+KEY_FIGURES = 4  # of a brief page, unfolded
 _SYMBOLS = {"<=": "≤", ">=": "≥"}
 _SIGNS = {"met": "✓", "missed": "✗", "no value": "✗"}
 
@@ -25,7 +26,7 @@ def fill(template: str, **values: Any) -> str:
 
     Args:
         template: Name of its file.
-        values: What it is filled with.
+        values: Values by name.
     """
     return _environment().get_template(template).render(values)
 
@@ -42,15 +43,16 @@ def _environment() -> Environment:
     environment.filters |= {
         "base64": lambda data: b64encode(data.encode() if isinstance(data, str) else data).decode(),
         "bound": _bound,
-        "spoken": _spoken,
+        "cell": format_cell,
+        "in_words": _in_words,
         "value": lambda metric: format_quantity(metric.value, metric.unit),
     }
-    environment.globals |= {"known_metric": known_metric, "signs": _SIGNS}
+    environment.globals |= {"find_metric": find_metric, "signs": _SIGNS}
     return environment
 
 
 def _bound(metric: Metric, space: str) -> str:
-    """Return the target in the unit of the metric, as text where it is no comparison."""
+    """Return the target in the unit of the metric, as text if it is not a comparison."""
     if metric.bound is None:
         return metric.target or ""
     comparison, number = metric.bound
@@ -58,8 +60,8 @@ def _bound(metric: Metric, space: str) -> str:
     return f"{symbol}{space}{format_quantity(number, metric.unit)}"
 
 
-def _spoken(name: str, unit: str = "") -> str:
-    """``controller_tick_us_p99`` in ``us`` as ``Controller tick p99``; a torque in N is a force."""
+def _in_words(name: str, unit: str = "") -> str:
+    """Return ``controller_tick_us_p99`` as ``Controller tick p99``; a torque in N is a force."""
     words = " ".join(word for word in name.split("_") if word and word != unit)
     if unit == "N":
         words = words.replace("torque", "force")
@@ -71,10 +73,10 @@ class Table:
     """A table of a page.
 
     Attributes:
-        title: A few words.
-        caption: What to see in it, one or two sentences.
+        title: Title.
+        caption: Explanation, one or two sentences.
         head: Names of the columns.
-        rows: Their cells; those that are numbers are set as such.
+        rows: Cells; numbers are right-aligned.
     """
 
     title: str
@@ -84,19 +86,34 @@ class Table:
 
     @property
     def columns(self) -> list[tuple[str, bool]]:
-        """Name of each column, and whether it holds nothing but numbers."""
+        """Name of each column, and whether it contains only numbers."""
         cells = list(zip(*self.rows, strict=True)) or [()] * len(self.head)
         are_numbers = [bool(own) and not any(isinstance(x, str) for x in own) for own in cells]
         return list(zip(self.head, are_numbers, strict=True))
 
 
-@dataclass
-class Report:
-    """A report as written.
+@dataclass(frozen=True)
+class Fact:
+    """A key result that is not a metric.
 
     Attributes:
-        path: The page to open; None if it could not be written.
-        problem: What could not be written, or None; see ``ResultsFolder.explain_problems``.
+        name: Name.
+        value: Value with its unit, as text.
+        note: Remark.
+    """
+
+    name: str
+    value: str
+    note: str = ""
+
+
+@dataclass
+class Report:
+    """A written report.
+
+    Attributes:
+        path: Page; None if it could not be written.
+        problem: Files that could not be written, or None; see ``ResultsFolder.explain_problems``.
     """
 
     path: Path | None
@@ -105,26 +122,31 @@ class Report:
 
 @dataclass
 class Page:
-    """The page of a run; figures and diagram are inside, only the recording is beside it.
+    """Page of a run with embedded figures and diagram; only the recording is a file of its own.
 
     Attributes:
         title: Name of the scenario.
-        kind: What the page is about, above its title.
-        description: What was run, plain text.
-        fault: Why the run was stopped; None if it completed.
-        broken: Targets that were missed, one phrase each.
+        kind: Subject of the page, above its title.
+        description: Description of the run, plain text.
+        fault: Reason why the run was stopped; None if it completed.
+        broken: Missed targets, one phrase each.
         interrupted: Whether the user stopped it.
-        warnings: What may not have gone as well as hoped, one sentence each.
-        metrics: All of them. Those with a target become cards, or the first few if none has one.
+        warnings: Warnings, one sentence each.
+        metrics: All metrics. Those with a target become cards, or the first few if none has one.
         cards: Names of the metrics that become cards, instead.
+        facts: Further cards.
         recording: Path of the Meshcat page, relative to this one.
-        figures: In reading order.
-        tables: In reading order, after the figures.
-        commands: Command lines worth repeating, by what they are good for.
-        details: What ``scenario_yaml_text`` is.
-        scenario_yaml_text: The scenario as resolved.
-        diagram_svg: The block diagram as SVG text.
-        log_attributes: What identifies the run, see :mod:`reporting.provenance`.
+        legend: Colours in the recording, ``#rrggbb``, by the description of their parts.
+        figures: Figures in reading order.
+        tables: Tables in reading order, after the figures.
+        brief: Whether only the key results and the first figures are unfolded.
+        commands: Useful command lines, by their purpose.
+        commands_title: Title of the commands.
+        changed_yaml_text: Keys of the scenario that differ from the defaults.
+        details: Title of ``scenario_yaml_text``.
+        scenario_yaml_text: Scenario as resolved.
+        diagram_svg: Block diagram as SVG text.
+        log_attributes: Provenance of the run, see :mod:`reporting.provenance`.
     """
 
     title: str
@@ -136,10 +158,15 @@ class Page:
     warnings: Sequence[str] = ()
     metrics: Metrics = field(default_factory=Metrics)
     cards: Sequence[str] | None = None
+    facts: Sequence[Fact] = ()
     recording: str | None = None
+    legend: Mapping[str, str] = field(default_factory=dict)
     figures: Sequence[Figure] = ()
     tables: Sequence[Table] = ()
+    brief: bool = False
     commands: Mapping[str, str] = field(default_factory=dict)
+    commands_title: str = "Runs to look at"
+    changed_yaml_text: str = ""
     details: str = "Scenario as resolved"
     scenario_yaml_text: str = ""
     diagram_svg: str | None = None
@@ -162,10 +189,10 @@ class Page:
 
     @property
     def badges(self) -> list[tuple[str, str]]:
-        """Class and text of each badge: how the run ended, and how many targets were met."""
+        """Class and text of each badge: outcome, and number of targets met."""
         end = ("bad", "✗ interrupted") if self.interrupted else ("good", "✓ completed")
         if self.broken and not self.interrupted:
-            end = ("bad", "✗ ended, with promises broken")
+            end = ("bad", "✗ ended, requirements violated")
         if self.fault:
             end = ("bad", "✗ stopped by fault")
         passed = [metric.passed for metric in self.metrics.values() if metric.judged]
@@ -177,9 +204,15 @@ class Page:
 
     @property
     def key_metrics(self) -> dict[str, Metric]:
-        """The metrics to look at first."""
+        """Most important metrics."""
         chosen = self.cards
         if chosen is None:
             chosen = [name for name, metric in self.metrics.items() if metric.target is not None]
         names = (chosen or list(self.metrics))[:MAX_CARDS]
         return {name: self.metrics[name] for name in names}
+
+    @property
+    def figure_groups(self) -> tuple[Sequence[Figure], Sequence[Figure]]:
+        """Unfolded and folded figures."""
+        count = KEY_FIGURES if self.brief else len(self.figures)
+        return self.figures[:count], self.figures[count:]

@@ -1,4 +1,4 @@
-"""Processes of this machine that work side by side."""
+"""Parallel processes on this machine."""
 
 import logging
 import signal
@@ -19,40 +19,40 @@ Result = TypeVar("Result")
 
 _LOOPBACK = "127.0.0.1"
 _SETTINGS = {
-    # what watches the processes takes time from them
+    # monitoring of the processes takes time from them
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
-    # nothing to look at from elsewhere
+    # no dashboard for other machines
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
 }
 
 
 class SideBySide(Protocol):
-    """Runs tasks, each in a process of its own."""
+    """Runs tasks in parallel processes."""
 
     def __call__(
         self, function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
     ) -> Iterator[Result]:
-        """Yield results in the order in which they are ready.
+        """Yield results in the order of completion.
 
         Args:
             function: Function of a module, to be called with ``common`` and each task.
-            common: Sent with each of them.
-            tasks: What to do.
+            common: Argument that is sent with each of them.
+            tasks: Tasks.
         """
 
 
 @contextmanager
 def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
-    """Give what runs tasks, until the end of the context.
+    """Return a runner of tasks, until the end of the context.
 
     Args:
-        workers: Number of processes; one for each core by default, 1 for no others than this.
-        most: Number of processes that there is work for; of 1 there are no others than this.
+        workers: Number of processes; one for each core by default; with 1, this process.
+        most: Largest useful number of processes; with 1, this process.
 
     Raises:
-        InputError: If there are to be processes and Dask is not installed, or their number is
+        InputError: If several processes are requested and Dask is not installed, or their number is
             below 1.
     """
     if workers is not None and workers < 1:
@@ -67,8 +67,9 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
         def run(
             function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
         ) -> Iterator[Result]:
-            # sent with each task: data that are scattered are gone with the process that has them,
-            # and one that ends meanwhile is waited for for ever
+            # sent with each task: scattered data are lost with their process, and Dask waits
+            # forever for
+            # a process that ends meanwhile
             futures = [client.submit(function, common, task, pure=False) for task in tasks]
             for future in as_completed(futures, loop=client.loop):
                 try:
@@ -86,9 +87,9 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
 def local_cluster(
     workers: int, preload: str, settings: Mapping[str, Any] = MappingProxyType({})
 ) -> Iterator["Client"]:
-    """Give a client of processes of this machine, which listen on its loopback address alone.
+    """Return a client of processes on this machine, which listen on its loopback address only.
 
-    They take work from nobody but each other: their certificate exists only as long as they do.
+    They accept work from each other only: their certificate exists as long as they do.
 
     Args:
         workers: Number of processes.
@@ -124,13 +125,13 @@ def count_cores(instead: str = "") -> int:
     """Return the number of cores that this process may use.
 
     Args:
-        instead: What else is allowed than to install Dask.
+        instead: Alternative to the installation of Dask, for the message.
 
     Raises:
         InputError: If Dask is not installed.
     """
     try:
-        import cryptography  # noqa: F401  of the cluster's certificate
+        import cryptography  # noqa: F401  for the cluster's certificate
         import distributed  # noqa: F401
         from dask.system import CPU_COUNT
     except ImportError as error:
@@ -143,7 +144,7 @@ def count_cores(instead: str = "") -> int:
 
 def dask_setup(_worker: Any) -> None:
     """Prepare a process before it takes tasks; called by Dask."""
-    # these reach every process of a terminal; the one that leads ends the others, by SIGTERM
+    # signals of a terminal reach all its processes; the first process ends the others, by SIGTERM
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -1,4 +1,4 @@
-"""Progress of a run, or of many, on the terminal: a bar, or plain lines where there is none."""
+"""Progress of one or more runs on the terminal: a bar, or plain lines without a terminal."""
 
 import time
 from collections import Counter
@@ -26,11 +26,11 @@ _UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"))
 
 
 def make_bar(console: Console, *further: ProgressColumn) -> Progress:
-    """Returns a bar that is gone when it stops; its tasks have the field ``status``.
+    """Returns a bar that is removed when it stops; its tasks have the field ``status``.
 
     Args:
-        console: Where to write.
-        further: What is behind the status.
+        console: Console to write to.
+        further: Columns behind the status.
     """
     return Progress(
         SpinnerColumn("dots" if console.encoding.startswith("utf") else "line"),
@@ -44,27 +44,27 @@ def make_bar(console: Console, *further: ProgressColumn) -> Progress:
 
 
 class ProgressListener(Protocol):
-    """Who wants to know how far a run is."""
+    """Listener to the progress of a run."""
 
     def expect(self, duration: float) -> None:
-        """Told the simulated time at the end [s], once it is known."""
+        """Set the simulated time at the end [s], once it is known."""
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """Told the simulated time [s] and what goes on, e.g. ``simulating``."""
+        """Report the simulated time [s] and the phase, e.g. ``simulating``."""
 
 
 class NoProgress:
-    """Tells nobody how far a run is."""
+    """Listener that ignores the progress."""
 
     def expect(self, duration: float) -> None:
-        """Tell nothing."""
+        """Do nothing."""
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """Tell nothing."""
+        """Do nothing."""
 
 
 class _Display:
-    """A bar while something is under way; none where there is no terminal."""
+    """A bar during an activity; nothing without a terminal."""
 
     def __init__(self, console: Console, title: str) -> None:
         self._console, self._title = console, title
@@ -97,7 +97,7 @@ class ProgressDisplay(_Display):
     """Shows simulated time, real-time factor and remaining time; call it with each advance.
 
     Attributes:
-        simulated_time: s, the largest so far.
+        simulated_time: Largest simulated time so far [s].
     """
 
     def __init__(
@@ -106,14 +106,14 @@ class ProgressDisplay(_Display):
         """Starts at zero.
 
         Args:
-            console: Where to write.
+            console: Console to write to.
             title: Name of the run.
-            duration: s, simulated time at the end; None if unknown.
-            paced: Whether the time is simulated step by step, so that its pace tells something;
-                else it is where the work is, and each phase begins anew.
+            duration: Simulated time at the end [s]; None if unknown.
+            paced: Whether the time is simulated step by step, so that its rate is meaningful;
+                otherwise it is the position of the work, and each phase begins anew.
         """
         super().__init__(console, title)
-        self.simulated_time = self._time = 0.0  # the latter where the phase is
+        self.simulated_time = self._time = 0.0  # the latter within a phase
         self._duration = duration
         self._paced = paced
         self._phase = ""
@@ -125,17 +125,17 @@ class ProgressDisplay(_Display):
         return self
 
     def expect(self, duration: float) -> None:
-        """Takes the simulated time at the end [s], once it is known."""
+        """Set the simulated time at the end [s], once it is known."""
         self._duration = duration
         if self._bar is not None:
             self._bar.update(self._task, total=duration)
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """Shows how far the run is.
+        """Show the progress of the run.
 
         Args:
-            simulated_time: s.
-            phase: What goes on, e.g. ``"simulating"``.
+            simulated_time: Simulated time [s].
+            phase: Current phase, e.g. ``"simulating"``.
         """
         new_phase = phase != self._phase
         if new_phase:
@@ -156,7 +156,7 @@ class ProgressDisplay(_Display):
             self._next_line = (simulated_time / step + ROUNDING) // 1.0 * step + step
 
     def _status(self) -> str:
-        """Phase, simulated time and, once time advances, how much faster than real time."""
+        """Phase, simulated time and, once time advances, real-time factor."""
         wall = time.monotonic() - self._phase_start[0]
         advanced = self._time - self._phase_start[1]
         if advanced <= 0.0 or wall <= 0.0:
@@ -169,17 +169,17 @@ class ProgressDisplay(_Display):
 
 
 class CountDisplay(_Display):
-    """Shows how many runs are done and how they ended: a bar on a terminal, ten lines elsewhere."""
+    """Shows completed runs and their outcomes: a bar on a terminal, ten lines elsewhere."""
 
     def __init__(self, console: Console, title: str, total: int, done: int, usual: str) -> None:
-        """Starts with what earlier sessions have done.
+        """Begin with the runs of earlier sessions.
 
         Args:
-            console: Where to write.
-            title: Name of it all.
+            console: Console to write to.
+            title: Name of the series.
             total: Number of runs.
-            done: Number of those that are there already.
-            usual: The end that needs no word.
+            done: Number of completed runs.
+            usual: Outcome that is not mentioned.
         """
         super().__init__(console, title)
         self._total, self._usual = total, usual
@@ -194,7 +194,7 @@ class CountDisplay(_Display):
         return self
 
     def advance(self, status: str) -> None:
-        """Takes the end of one run."""
+        """Count the outcome of one run."""
         self._done += 1
         self._ends[status] += 1
         is_due = self._done - self._said >= self._total / PLAIN_LINES or self._done == self._total
@@ -204,11 +204,11 @@ class CountDisplay(_Display):
         self._show()
 
     def processes(self, number: int) -> None:
-        """Takes the number of processes that run."""
+        """Set the number of running processes."""
         if not number and self._processes != number and self._bar is None:
             self._console.print(f"{self._title}: no worker is left; waiting for one")
         if not self._processes:
-            # starting them is no part of a run's time, nor are runs from before
+            # their start does not count as time of a run, nor do earlier runs
             self._begin, self._before = time.monotonic(), self._done
         self._processes = number
         self._show()
@@ -223,19 +223,19 @@ class CountDisplay(_Display):
         )
 
     def _status(self) -> str:
-        """Runs done and how, and the time left."""
+        """Completed runs with outcomes, and the time left."""
         parts = [f"{self._done} of {self._total} runs"]
         parts += [f"{n} {end}" for end, n in sorted(self._ends.items()) if end != self._usual]
         fresh = self._done - self._before
         if fresh > 0 and self._done < self._total:
             left = (time.monotonic() - self._begin) / fresh * (self._total - self._done)
-            parts.append(f"{spoken_time(left)} left")
+            parts.append(f"{format_time(left)} left")
         elif not fresh and self._done < self._total:
             parts.append("starting" if not self._processes else f"{self._processes} at a time")
         return ", ".join(parts)
 
 
-def spoken_time(seconds: float) -> str:
+def format_time(seconds: float) -> str:
     """Returns a time in its two largest units, e.g. ``1 h 20 min``; seconds below a minute."""
     for i, (length, unit) in enumerate(_UNITS):
         if seconds >= length:
@@ -247,11 +247,11 @@ def spoken_time(seconds: float) -> str:
 
 @contextmanager
 def fraction_display(console: Console, title: str) -> Iterator[Callable[[float, str], None]]:
-    """Give a function that shows the fraction done and what is done.
+    """Return a function that shows a fraction and a phase.
 
     Args:
-        console: Where to write.
-        title: What it is all about.
+        console: Console to write to.
+        title: Title of the display.
     """
     if not console.is_terminal:
         yield _plain(console, title)
@@ -262,13 +262,13 @@ def fraction_display(console: Console, title: str) -> Iterator[Callable[[float, 
 
 
 def _plain(console: Console, title: str) -> Callable[[float, str], None]:
-    said, reached = "", -1.0
+    last_words, reached = "", -1.0
 
-    def tell(fraction: float, phase: str) -> None:
-        nonlocal said, reached
+    def show(fraction: float, phase: str) -> None:
+        nonlocal last_words, reached
         words = phase.split(",", maxsplit=1)[0]
-        if words != said or fraction >= reached + _PLAIN_STEP:
-            said, reached = words, fraction
+        if words != last_words or fraction >= reached + _PLAIN_STEP:
+            last_words, reached = words, fraction
             console.print(f"{title}: {phase}, {fraction:.0%}", highlight=False, markup=False)
 
-    return tell
+    return show

@@ -1,4 +1,4 @@
-"""What identifies a run: scenario, sources, libraries; and which files it left."""
+"""Provenance of a run: scenario, sources, libraries; and the list of its files."""
 
 import json
 import os
@@ -19,14 +19,14 @@ PROJECT_ROOT = Path(__file__).resolve().parents[1]
 
 
 def standard_attributes(scenario_name: str) -> dict[str, str]:
-    """Attributes that every log and report carries.
+    """Return the attributes of every log and report.
 
     Args:
-        scenario_name: Name of the scenario that is run.
+        scenario_name: Name of the scenario.
 
     Returns:
         ``scenario``, ``git_revision`` and one ``<library>_version`` each for pfsc_drake, drake,
-        casadi and numpy (``unknown`` where not installed).
+        casadi and numpy (``unknown`` if not installed).
     """
     versions = {
         f"{library}_version": _version(library)
@@ -36,14 +36,14 @@ def standard_attributes(scenario_name: str) -> dict[str, str]:
 
 
 def version_line() -> str:
-    """Return versions and revision in one line, as ``--version`` tells them."""
+    """Return versions and revision in one line, for ``--version``."""
     known = standard_attributes("")
     libraries = f"Drake {known['drake_version']}, CasADi {known['casadi_version']}"
     return f"{_PROGRAM} {known['pfsc_drake_version']}, {libraries}, git {known['git_revision']}"
 
 
 def git_revision(root: Path = PROJECT_ROOT) -> str:
-    """Revision of the clone in ``root``.
+    """Return the revision of the clone in ``root``.
 
     Args:
         root: Top folder of the clone.
@@ -61,7 +61,7 @@ def git_revision(root: Path = PROJECT_ROOT) -> str:
 
 
 def _git(root: Path, *arguments: str) -> str | None:
-    """Output of a git command in ``root``, None if it failed."""
+    """Return the output of a git command in ``root``, None if it failed."""
     try:
         result = subprocess.run(
             ["git", "-C", str(root), *arguments],
@@ -76,7 +76,7 @@ def _git(root: Path, *arguments: str) -> str | None:
 
 
 def _version(distribution: str) -> str:
-    """Installed version of a distribution."""
+    """Return the installed version of a distribution."""
     try:
         return metadata.version(distribution)
     except metadata.PackageNotFoundError:
@@ -112,7 +112,7 @@ def listed_results(folder: Path) -> list[str]:
     """Return the names of the files that the manifest of a folder lists; none without one.
 
     Args:
-        folder: That :func:`find_obstacle` has nothing to say against.
+        folder: Folder accepted by :func:`find_obstacle`.
     """
     manifest = _read_manifest(folder)
     return [] if manifest is None else manifest[1]
@@ -125,19 +125,19 @@ def kind_of_results(folder: Path) -> str | None:
 
 
 def is_result(name: str) -> bool:
-    """Return whether a file of a folder of results may have a name."""
+    """Return whether a name is allowed for a file of results."""
     return name in RESULTS or _FIGURE.fullmatch(name) is not None
 
 
 def read_outcome(folder: Path, kind: str) -> dict[str, Any]:
-    """Return how what left its results in a folder ended; empty where nobody told.
+    """Return the outcome stored in a folder of results; empty if there is none.
 
     Args:
         folder: The folder.
         kind: Kind of results, e.g. ``run``.
 
     Raises:
-        InputError: If the folder holds no results of this kind.
+        InputError: If the folder contains no results of this kind.
     """
     manifest = _read_manifest(folder)
     if manifest is None or manifest[0] != kind:
@@ -153,7 +153,7 @@ def find_obstacle(folder: Path, kind: str, inputs: Sequence[Path]) -> str | None
     Args:
         folder: An existing folder.
         kind: Kind of results.
-        inputs: Files that the results are made from.
+        inputs: Input files of the results.
 
     Raises:
         OSError: If the folder cannot be read.
@@ -178,7 +178,7 @@ def find_obstacle(folder: Path, kind: str, inputs: Sequence[Path]) -> str | None
 
 
 def _is_staging(folder: Path, kind: str) -> bool:
-    """Return whether a folder holds nothing but new results of a kind."""
+    """Return whether a folder contains nothing but new results of a kind."""
     if folder.is_symlink() or not folder.is_dir():
         return False
     known = {MANIFEST, UNFINISHED, FIGURES, *listed_results(folder)}
@@ -190,7 +190,7 @@ def _is_staging(folder: Path, kind: str) -> bool:
 
 
 def _named_like_results(folder: Path, names: Sequence[str]) -> list[str]:
-    """Everything of a folder that stands where results do."""
+    """Return all entries of a folder with names of results."""
     found = [name for name in (*RESULTS, MANIFEST, UNFINISHED) if name in names]
     if FIGURES in names:
         figures = folder / FIGURES
@@ -201,17 +201,17 @@ def _named_like_results(folder: Path, names: Sequence[str]) -> list[str]:
 
 
 def _read_manifest(folder: Path) -> tuple[str, list[str]] | None:
-    """Kind of results and names of their files; None without manifest of this program."""
+    """Return the kind of results and the names of their files; None without a valid manifest."""
     manifest = read_manifest(folder)
     if manifest is None:
         return None
-    # a manifest is a file like any other: it cannot name what no result is called
+    # a manifest is a file like any other: names that no result has are ignored
     kind, names = manifest
     return kind, [name for name in names if is_result(name)]
 
 
 def _names(folder: Path) -> list[str]:
-    """Names of everything in a folder."""
+    """Return the names of all entries of a folder."""
     return [entry.name for entry in folder.iterdir()]
 
 
@@ -220,6 +220,6 @@ def _is_regular(file: Path) -> bool:
 
 
 def _is_same(file: Path, other: Path) -> bool:
-    """Whether both names stand for one file; names that no file can have stand for none."""
+    """Return whether both names are the same file; names that no file can have are none."""
     one, two = find_status(file), find_status(other)
     return one is not None and two is not None and os.path.samestat(one, two)

@@ -1,7 +1,7 @@
-"""The signals, metrics and figures that a run may have, told once, in ``registry.toml``.
+"""Registry of the possible signals, metrics and figures of a run, from ``registry.toml``.
 
-From here come units and labels of a log, units and sources of metrics, what a target may name, when
-a figure is drawn, ``list --signals``, and ``docs/reference/signals.md``, which this module prints.
+It provides units and labels of a log, units and sources of metrics, allowed names of targets,
+conditions of figures, ``list --signals``, and ``docs/reference/signals.md``, which it prints.
 """
 
 import re
@@ -15,28 +15,28 @@ from typing import Any
 _NUMBER = re.compile(r"_\d+$")  # of a drive
 _INTRODUCTION = """# Signals, metrics and figures
 
-What a run may leave: signals in `log.h5`, each a dataset `[samples, components]` at 1 kHz with
-attributes `unit` and `labels`; metrics in `metrics.json`, which are there if a run has what they
-need, N being the number of a drive; pictures in `figures/`. Units are SI; where there are two, the
-second is that of joints that slide, and r is the relative degree.
+Possible results of a run: signals in `log.h5`, each a dataset `[samples, components]` at 1 kHz with
+attributes `unit` and `labels`; metrics in `metrics.json`, if the run has what they need, N being
+the number of a drive; figures in `figures/`. Units are SI; of two units, the second is for
+prismatic joints, and r is the relative degree.
 
-`python -m experiments list --signals` prints the same, with `--json` as data. `make signals` writes
-this page from `reporting/registry.toml`."""
+`pfsc list --signals` prints the same, with `--json` as data. `make signals`
+generates this page from `reporting/registry.toml`."""
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
 class KnownSignal:
-    """A signal that a log may have.
+    """A possible signal of a log.
 
     Attributes:
         name: Name in the log.
-        unit: Unit of all components, of several kinds with a comma between; ``rad|m`` stands for
-            joints that turn, or slide.
-        text: What it is.
-        when: When a log has it; always where empty.
-        labels: Names of the components with a space between, or one for all with ``{}`` for a
-            number; the signal's own name where empty.
+        unit: Unit of all components; several kinds are separated by commas; ``rad|m`` stands for
+            revolute or prismatic joints.
+        text: Description.
+        when: Condition of a log with it; always if empty.
+        labels: Names of the components, separated by blanks, or one for all with ``{}`` for a
+            number; the signal's own name if empty.
         figures: Figures that show it.
     """
 
@@ -48,10 +48,10 @@ class KnownSignal:
     figures: tuple[str, ...] = ()
 
     def unit_of(self, turning: Sequence[bool]) -> str:
-        """Return the unit on a robot.
+        """Return the unit for a robot.
 
         Args:
-            turning: Whether each joint turns, else it slides.
+            turning: Whether each joint is revolute, otherwise prismatic.
         """
         turns, _, slides = self.unit.partition("|")
         if not slides or all(turning):
@@ -59,7 +59,7 @@ class KnownSignal:
         return f"{turns} or {slides}" if any(turning) else slides
 
     def labels_of(self, count: int) -> list[str]:
-        """Return the names of so many components."""
+        """Return the names of a number of components."""
         if self.labels and "{}" not in self.labels:
             return self.labels.split()
         if not self.labels and count == 1:
@@ -70,14 +70,14 @@ class KnownSignal:
 
 @dataclass(frozen=True)
 class KnownMetric:
-    """A metric that a run may have.
+    """A possible metric of a run.
 
     Attributes:
-        name: Its name, with ``{}`` for the number of a drive where each has one.
-        unit: SI unit; ``Nm|N`` stands for joints that turn, or slide.
-        text: What it is.
-        needs: Signals, or properties of a run, without which there is no such metric.
-        source: Where the number comes from, if that needs a word.
+        name: Name, with ``{}`` for the number of a drive if each has one.
+        unit: SI unit; ``Nm|N`` stands for revolute or prismatic joints.
+        text: Description.
+        needs: Required signals or properties of a run.
+        source: Source of the number, if any.
     """
 
     name: str
@@ -87,7 +87,7 @@ class KnownMetric:
     source: str | None = None
 
     def names(self, drives: int) -> list[str]:
-        """Return the names that it has on a robot with so many drives."""
+        """Return its names for a robot with a number of drives."""
         if "{}" not in self.name:
             return [self.name]
         return [self.name.format(number) for number in range(1, drives + 1)]
@@ -95,12 +95,12 @@ class KnownMetric:
 
 @dataclass(frozen=True)
 class KnownFigure:
-    """A figure that may be drawn of a run.
+    """A possible figure of a run.
 
     Attributes:
         name: Name of its file, without suffix.
-        text: What it shows.
-        needs: Signals without which it is not drawn.
+        text: Description.
+        needs: Required signals.
     """
 
     name: str
@@ -119,16 +119,16 @@ METRICS = {row["name"]: KnownMetric(**row) for row in _rows("metrics")}
 FIGURES = {row["name"]: KnownFigure(**row) for row in _rows("figures")}
 
 
-def known_metric(name: str) -> KnownMetric | None:
-    """Return what is known of a metric, perhaps with the number of a drive; None if nothing is."""
+def find_metric(name: str) -> KnownMetric | None:
+    """Return the entry of a metric, also with the number of a drive; None for an unknown name."""
     return METRICS.get(name) or METRICS.get(_NUMBER.sub("_{}", name))
 
 
 def possible_metrics(known: Collection[str], drives: int) -> list[str]:
-    """Return the names of the metrics that a run may have.
+    """Return the names of the possible metrics of a run.
 
     Args:
-        known: Its signals, what else it has of what metrics need, and metrics known beforehand.
+        known: Its signals, its other properties that metrics need, and metrics known in advance.
         drives: Number of drives.
     """
     return [
@@ -149,7 +149,7 @@ def as_data() -> dict[str, list[dict[str, Any]]]:
 
 
 def as_tables() -> dict[str, tuple[Sequence[str], list[Sequence[str]]]]:
-    """Return head and rows, of text, of the tables of signals, metrics and figures."""
+    """Return head and rows of the tables of signals, metrics and figures, as text."""
     return {
         "signals": (
             ("Signal", "Unit", "What it is", "When", "Figures"),
@@ -166,7 +166,7 @@ def as_tables() -> dict[str, tuple[Sequence[str], list[Sequence[str]]]]:
             ],
         ),
         "figures": (
-            ("Figure", "What it shows", "Needs"),
+            ("Figure", "Content", "Needs"),
             [(f.name, f.text, ", ".join(f.needs)) for f in FIGURES.values()],
         ),
     }

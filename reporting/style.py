@@ -1,6 +1,6 @@
-"""How the project's figures look: colours, sizes, grid, panels, and the picture of each.
+"""Style of the project's figures: colours, sizes, grid, panels, and rendering.
 
-Matplotlib is imported when something is drawn.
+Matplotlib is imported with the first drawing.
 """
 
 from collections.abc import Iterator
@@ -19,21 +19,22 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-# Okabe and Ito's palette: told apart with any colour vision, and in this order by lightness.
+# Okabe and Ito's palette: distinguishable with any colour vision, and in this order by lightness
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195")
 REFERENCE = "#6B7280"
 INK = "#1F2937"
 GRID = "#E5E7EB"
 ALERT = "#B91C1C"
 
-# A reference, drawn first: what follows it stays visible on top, and where it does not.
+# a reference, drawn first: the signal stays visible on top, and the reference where they differ
 BROAD: dict[str, Any] = {"color": "#9CA3AF", "linewidth": 4.0, "alpha": 0.6}
 
 WIDTH = 9.0  # inches; at DPI 200 the page shows it at half size on screens of double density
 DPI = 200
 TITLE_SIZE, LEGEND_SIZE = 11.0, 10.0  # points
-LINE_WIDTH = 560.0  # points, what title and legend share above a panel
+LINE_WIDTH = 560.0  # points, shared by title and legend above a panel
 MICRO_BELOW = 1e-4  # m or rad
+_ROUNDING = 1e-9  # units of an axis, such as mm; smaller values are rounding errors
 
 STYLE: Any = {  # Any: matplotlib's own type of the keys changes with its version
     "axes.edgecolor": "#9CA3AF",
@@ -69,13 +70,13 @@ STYLE: Any = {  # Any: matplotlib's own type of the keys changes with its versio
 
 @dataclass
 class Figure:
-    """A figure as a picture.
+    """A figure as an image.
 
     Attributes:
         name: Name of its file, without suffix.
-        title: A few words.
-        caption: What to see in it, one or two sentences.
-        png: The picture.
+        title: Title.
+        caption: Explanation, one or two sentences.
+        png: Image.
     """
 
     name: str
@@ -84,19 +85,19 @@ class Figure:
     png: bytes = field(repr=False)
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
-        """Return the picture for a notebook, and how wide it is shown [pixels]."""
+        """Return the image for a notebook, and its displayed width [pixels]."""
         return self.png, {"width": round(WIDTH * DPI / 2)}
 
 
 @dataclass
 class Drawing:
-    """A figure as drawn.
+    """A drawn figure.
 
     Attributes:
         name: Name of its file, without suffix.
-        title: A few words.
-        caption: What to see in it, one or two sentences.
-        canvas: The drawing.
+        title: Title.
+        caption: Explanation, one or two sentences.
+        canvas: Drawing.
     """
 
     name: str
@@ -106,7 +107,7 @@ class Drawing:
 
 
 @contextmanager
-def styled() -> Iterator[None]:
+def project_style() -> Iterator[None]:
     """Draw in the project's style."""
     from matplotlib import rc_context
 
@@ -124,12 +125,12 @@ def make_canvas(width: float, height: float) -> "Canvas":
 def make_panels(
     count: int, height: float = 2.3, common_time: bool = True
 ) -> "tuple[Canvas, list[Axes]]":
-    """A canvas with panels one above the other, on a common time axis unless told otherwise.
+    """Return a canvas with panels one above the other, by default on a common time axis.
 
     Args:
         count: Number of panels.
         height: Height of one panel [inches].
-        common_time: Whether time is the horizontal axis of all.
+        common_time: Whether all have time as their horizontal axis.
 
     Returns:
         The canvas and its panels from top to bottom.
@@ -147,9 +148,9 @@ def draw_components(
     """Draws the columns of a signal, always in the same colours.
 
     Args:
-        panel: Where to draw.
-        time: [samples] s.
-        values: [samples, dim] in the panel's unit.
+        panel: Panel to draw in.
+        time: Times [s], shape (samples,).
+        values: Values in the panel's unit, shape (samples, dim).
         labels: One per column.
         style: Line style.
     """
@@ -158,12 +159,12 @@ def draw_components(
 
 
 def draw_reference(panel: "Axes", time: ArrayLike, values: ArrayLike, label: str) -> None:
-    """Draws the columns of a reference broad and pale, each in its component's colour.
+    """Draws the columns of a reference as wide, pale lines, each in its component's colour.
 
     Args:
-        panel: Where to draw, before what follows the reference.
-        time: [samples] s.
-        values: [samples, dim] in the panel's unit.
+        panel: Panel to draw in, before the signal that follows the reference.
+        time: Times [s], shape (samples,).
+        values: Values in the panel's unit, shape (samples, dim).
         label: One entry of the legend for all columns, in grey.
     """
     for index, column in enumerate(np.asarray(values).T):
@@ -172,12 +173,12 @@ def draw_reference(panel: "Axes", time: ArrayLike, values: ArrayLike, label: str
 
 
 def add_entry(panel: "Axes", label: str, **line: Any) -> None:
-    """Add an entry to a panel's legend that stands for several lines.
+    """Add one legend entry for several lines.
 
     Args:
         panel: The panel.
         label: Text of the entry.
-        line: Properties of its line, as matplotlib has them.
+        line: Properties of its line, as in matplotlib.
     """
     from matplotlib.lines import Line2D
 
@@ -192,17 +193,18 @@ def shade(
     colour: str,
     hatch: str = "",
 ) -> None:
-    """Shade the times at which something holds, from sample to sample.
+    """Shade the times at which a condition holds, from sample to sample.
 
-    Gaps that no screen shows are shaded, too: what flickers has as many intervals as samples.
+    Gaps too small for a screen are shaded, too: a flickering condition has as many intervals as
+    samples.
 
     Args:
-        panels: All of them are shaded; the first gets an entry for the legend.
-        time: [samples] s.
-        where: [samples] bool.
-        label: Name of what holds.
+        panels: Panels to shade; the first gets an entry in the legend.
+        time: Times [s], shape (samples,).
+        where: Condition, bool, shape (samples,).
+        label: Name of the condition.
         colour: Colour of the shade.
-        hatch: Pattern, where colour alone could be mistaken.
+        hatch: Pattern, if colour alone is ambiguous.
     """
     from matplotlib.collections import PolyCollection
 
@@ -226,31 +228,31 @@ def shade(
 
 
 def _visible_spans(time: FloatArray, where: ArrayLike) -> FloatArray:
-    """Return beginnings and ends of intervals with gaps that can be seen, [intervals, 2] s."""
+    """Return the starts and ends [s] of intervals with visible gaps, shape (intervals, 2)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(where, dtype=int), [0]])))
     if not edges.size:
         return np.zeros((0, 2))
     begins, ends = time[edges[::2]], time[np.minimum(edges[1::2], len(time) - 1)]
-    seen = begins[1:] - ends[:-1] > (time[-1] - time[0]) / (WIDTH * DPI)
-    return np.column_stack([begins[np.r_[True, seen]], ends[np.r_[seen, True]]])
+    visible = begins[1:] - ends[:-1] > (time[-1] - time[0]) / (WIDTH * DPI)
+    return np.column_stack([begins[np.r_[True, visible]], ends[np.r_[visible, True]]])
 
 
 def late_samples(time: FloatArray) -> NDArray[np.bool_]:
-    """Which samples are of the last three quarters of a run, [samples] bool.
+    """Return a flag for each sample in the last three quarters of a run, shape (samples,).
 
     Args:
-        time: [samples] s.
+        time: Times [s], shape (samples,).
     """
     return np.asarray(time >= time[0] + 0.25 * (time[-1] - time[0]))
 
 
 def scale_to_late(panel: "Axes", time: FloatArray, values: FloatArray) -> None:
-    """Scales a panel, zero in the middle, to the last three quarters of what it shows.
+    """Scales a panel, zero in the middle, to the last three quarters of its signals.
 
     Args:
-        panel: To scale.
-        time: [samples] s.
-        values: [samples, dim] in the panel's unit.
+        panel: Panel to scale.
+        time: Times [s], shape (samples,).
+        values: Values in the panel's unit, shape (samples, dim).
     """
     span = 1.2 * largest(values[late_samples(time)])
     if span > 0.0:
@@ -258,18 +260,18 @@ def scale_to_late(panel: "Axes", time: FloatArray, values: FloatArray) -> None:
 
 
 def is_dwarfed(time: FloatArray, values: FloatArray, ratio: float = 1.2) -> bool:
-    """Whether the last three quarters of a run are dwarfed by what comes before.
+    """Return whether the last quarters of a run are much smaller than the first one.
 
     Args:
-        time: [samples] s.
-        values: [samples, dim] in any unit.
-        ratio: Ratio of the largest magnitudes, from which on it counts.
+        time: Times [s], shape (samples,).
+        values: Values in any unit, shape (samples, dim).
+        ratio: Ratio of the largest magnitudes from which on they are.
     """
     return 0.0 < ratio * largest(values[late_samples(time)]) < largest(values)
 
 
 def largest(values: FloatArray) -> float:
-    """Largest finite magnitude, 0 of none.
+    """Return the largest finite magnitude, 0 if there is none.
 
     Args:
         values: Any shape.
@@ -278,23 +280,25 @@ def largest(values: FloatArray) -> float:
 
 
 def fitting_unit(values: FloatArray, unit: str) -> tuple[float, str]:
-    """Milli, or micro where milli would leave nothing but decimals.
+    """Return milli, or micro if milli would leave nothing but decimals.
 
     Args:
         values: Any shape, in ``unit``.
         unit: Unit of the values.
 
     Returns:
-        Factor from ``unit`` to the one for the axis, and its name.
+        Factor from ``unit`` to the unit of the axis, and its name.
     """
-    return (1e6, f"µ{unit}") if 0.0 < largest(values) < MICRO_BELOW else (1e3, f"m{unit}")
+    rounding_error = 1e-3 * _ROUNDING
+    micro = rounding_error < largest(values) < MICRO_BELOW
+    return (1e6, f"µ{unit}") if micro else (1e3, f"m{unit}")
 
 
-def place_legend(panel: "Axes", columns: int | None = None) -> None:
-    """Legend above the panel's right end, and above its title too where both are long.
+def add_legend(panel: "Axes", columns: int | None = None) -> None:
+    """Add a legend above the panel's right end, or above its title if both are long.
 
     Args:
-        panel: Whose legend; titles and lines are there already.
+        panel: Panel with title and lines.
         columns: Number of columns, by default all entries in one row.
     """
     labels = panel.get_legend_handles_labels()[1]
@@ -313,7 +317,7 @@ def place_legend(panel: "Axes", columns: int | None = None) -> None:
 
 @cache
 def _text_width(text: str, size: float, weight: str = "normal") -> float:
-    """Width of a line of text [points]."""
+    """Return the width of a line of text [points]."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
@@ -323,8 +327,21 @@ def _text_width(text: str, size: float, weight: str = "normal") -> float:
     return float(TextPath((0.0, 0.0), text, size=size, prop=font).get_extents().width)
 
 
+def flatten_rounding_errors(panel: "Axes") -> None:
+    """Scale a panel whose values are rounding errors so that they are drawn as zero.
+
+    Args:
+        panel: Panel with a linear vertical axis.
+    """
+    low, high = panel.get_ylim()
+    if panel.get_yscale() == "linear" and max(abs(low), abs(high)) < _ROUNDING:
+        panel.set_ylim(-1.0, 1.0)
+
+
 def render(drawing: Drawing) -> Figure:
-    """Returns the picture of a drawing."""
+    """Return the image of a drawing; rounding errors in it are drawn as zero."""
+    for panel in drawing.canvas.axes:
+        flatten_rounding_errors(panel)
     drawing.canvas.align_ylabels()
     picture = BytesIO()
     drawing.canvas.savefig(picture, format="png", dpi=DPI, facecolor="white")

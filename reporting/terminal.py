@@ -1,4 +1,4 @@
-"""Commands and what they write: options by groups, errors of one line, tables, exit status."""
+"""Command lines and their output: options in groups, errors of one line, tables, exit status."""
 
 import codecs
 import dataclasses
@@ -19,14 +19,14 @@ from rich.console import Console
 from rich.markup import escape
 
 from pfsc_drake.errors import InputError, WriteError
-from reporting.interruption import INTERRUPTED, raised_interruption
+from reporting.interruption import INTERRUPTED, raise_on_interruption
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from reporting.page import Report, Table
 
-# characters of results that no decomposition makes plain
+# characters of results without a plain decomposition
 _PLAIN = {
     "≤": "<=",
     "≥": ">=",
@@ -41,9 +41,9 @@ _POWER = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 
 
 def prepare_streams() -> None:
-    """Lets stdout and stderr write any text on any terminal, in its own characters.
+    """Lets stdout and stderr write any text on any terminal, in its own encoding.
 
-    What the terminal's encoding lacks is written in plain characters (``um`` for micrometres).
+    Characters outside the terminal's encoding are replaced by plain ones (``um`` for micrometres).
     """
     codecs.register_error("plain", _plain_characters)
     for stream in (sys.stdout, sys.stderr):
@@ -52,9 +52,9 @@ def prepare_streams() -> None:
 
 
 def silence_libraries() -> None:
-    """Keeps warnings of Python's libraries off the terminal, unless they were asked for.
+    """Keeps warnings of Python's libraries off the terminal, unless they were requested.
 
-    What matters to the user of a run is said by the run itself, in a line of its own.
+    A run prints its own warnings, in lines of their own.
     """
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
@@ -64,8 +64,8 @@ def print_error(line: str, after_echo: bool = False) -> None:
     """Writes one line to stderr, whatever the terminal's width.
 
     Args:
-        line: To write.
-        after_echo: Whether a terminal stands behind the ^C that it has just shown.
+        line: Line to write.
+        after_echo: Whether the terminal has just shown ^C.
     """
     newline = "\n" if after_echo and sys.stderr.isatty() else ""
     sys.stderr.write(f"{newline}{one_line(line)}\n")
@@ -73,23 +73,23 @@ def print_error(line: str, after_echo: bool = False) -> None:
 
 
 def one_line(message: str) -> str:
-    """Returns a message without line breaks and whatever else a terminal would obey."""
+    """Return a message without line breaks and other control characters."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(message.split()))
 
 
 def _plain_characters(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Writes in ASCII what an encoding lacks; a handler of encoding errors."""
+    """Replace characters outside an encoding by ASCII; a handler of encoding errors."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     missing = error.object[error.start : error.end]
     if all("\udc80" <= character <= "\udcff" for character in missing):
-        return missing.encode("utf-8", "surrogateescape"), error.end  # the bytes of a file's name
+        return missing.encode("utf-8", "surrogateescape"), error.end  # bytes of a file name
     missing = _POWER.sub(lambda power: "^" + power[0], missing)
     return "".join(map(_plain_character, missing)), error.end
 
 
 def _plain_character(character: str) -> str:
-    """ASCII for one character, ``?`` where there is none."""
+    """Return ASCII for one character, ``?`` if there is none."""
     if character in _PLAIN:
         return _PLAIN[character]
     plain = unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode("ascii")
@@ -100,19 +100,21 @@ def print_table(console: "Console", table: "Table", most: int | None = None) -> 
     """Print a table.
 
     Args:
-        console: Where.
-        table: Which.
-        most: Rows to print at most; None for all.
+        console: Console to print to.
+        table: Table to print.
+        most: Largest number of rows; None for all.
     """
     from rich.markup import escape
     from rich.table import Table as TerminalTable
+
+    from reporting.metrics import format_cell
 
     shown = TerminalTable(title=table.title, title_justify="left", box=None, padding=(0, 2, 0, 0))
     numbers = {k for row in table.rows for k, cell in enumerate(row) if not isinstance(cell, str)}
     for k, name in enumerate(table.head):
         shown.add_column(name, justify="right" if k in numbers else "left")
     for row in table.rows[:most]:
-        shown.add_row(*(escape(x) if isinstance(x, str) else f"{x:.4g}" for x in row))
+        shown.add_row(*(escape(x) if isinstance(x, str) else format_cell(x) for x in row))
     console.print(shown)
     if most is not None and len(table.rows) > most:
         console.print(f"... {len(table.rows) - most} more on the page", style="dim")
@@ -124,8 +126,8 @@ FAULT = 3
 NOT_WRITTEN = 4
 
 
-def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """Return a command with the fields of its groups as options of its own.
+def flatten_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command whose groups are expanded into single options.
 
     Args:
         command: A function; each parameter that is a dataclass is a group.
@@ -147,7 +149,7 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
             values[name] = group(**{option: values.pop(option) for option in own})
         command(**values)
 
-    # arguments first, as they are shown
+    # arguments first, in the displayed order
     options.sort(key=lambda option: option.default is not option.empty)
     flat = [option.replace(kind=option.KEYWORD_ONLY) for option in options]
     called.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
@@ -159,9 +161,9 @@ def run_app(app: typer.Typer, program: str, arguments: Sequence[str] | None = No
     """Run a command line, and return its exit status.
 
     Args:
-        app: Its commands.
-        program: How it is called.
-        arguments: Without the program's name; by default those of the process.
+        app: Application.
+        program: Name of the program.
+        arguments: Arguments without the program's name; by default those of the process.
     """
     usage_error: Any = typer.BadParameter.__base__
     try:
@@ -183,7 +185,7 @@ def run_app(app: typer.Typer, program: str, arguments: Sequence[str] | None = No
 
 
 def _refuse_empty_out(arguments: Sequence[str]) -> None:
-    """Refuse a folder without a name, which a path takes for the current folder."""
+    """Refuse an empty folder name, which a path takes for the current folder."""
     for number, word in enumerate(arguments):
         if word == "--out=" or (word == "--out" and [*arguments[number + 1 : number + 2]] == [""]):
             raise InputError("--out '': no name of a folder; allowed: a folder, '.' for this one")
@@ -191,9 +193,9 @@ def _refuse_empty_out(arguments: Sequence[str]) -> None:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """End the command with one line at Ctrl-C; up to here the process has just ended."""
+    """End the command with one line at Ctrl-C; before, the process would just have ended."""
     try:
-        with raised_interruption():
+        with raise_on_interruption():
             yield
     except KeyboardInterrupt:
         print_error("interrupted", after_echo=True)
@@ -207,7 +209,7 @@ def fail(message: str) -> int:
 
 
 def show_page(what: str, report: "Report") -> int:
-    """Say where a page is, or that it could not be written; return the exit status."""
+    """Print the path of a page, or that it could not be written; return the exit status."""
     print_page(Console(), f"Open the {what}", report.path)
     if report.problem is None:
         return 0
@@ -216,7 +218,7 @@ def show_page(what: str, report: "Report") -> int:
 
 
 def print_page(console: Console, invitation: str, page: Path | None) -> None:
-    """Say where a page is, if there is one."""
+    """Print the path of a page, if there is one."""
     if page is not None:
-        # Soft wrap: a path broken into two lines cannot be clicked.
+        # soft wrap: a path broken into two lines cannot be clicked
         console.print(f"{invitation}: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""A station that runs in steps, with a person at its controls, as fast as a clock or slower."""
+"""Stepwise simulation of a station with an operator, synchronized with a clock."""
 
 import time
 from collections import deque
@@ -14,25 +14,25 @@ from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.live.takes import Pen
 from experiments.simulation import SimulationResult, chunk_ticks, configure
-from pfsc_drake.controller.fault_description import FoundFault
-from pfsc_drake.physics.operator_hand import ASKED, HOLD, TARGET
+from pfsc_drake.controller.fault_description import FaultReport
+from pfsc_drake.physics.operator_hand import HOLD, REQUEST_SIZE, TARGET
 from pfsc_drake.robot.robot_model import pose_function
 
-# the longest time between two looks at the controls [s]
+# longest time between two reads of the controls [s]
 _STEP = 0.01
-# how far simulated time may lag and still catch up [s]; beyond, it stays behind
+# largest lag of simulated time that is caught up [s]
 _SLACK = 0.1
-# over which the real-time factor is taken [s]
+# window of the real-time factor [s]
 _WINDOW = 1.0
 _MOMENT = 0.03  # s
 
 
 class LiveSimulation:
-    """A station from its start on.
+    """Stepwise simulation of a station.
 
     Args:
-        station: The station, with an operator whose controls nobody has recorded.
-        settings: How it is simulated.
+        station: The station, with a live operator.
+        settings: Its scenario.
     """
 
     def __init__(self, station: Station, settings: Scenario) -> None:
@@ -43,14 +43,14 @@ class LiveSimulation:
         self.restart()
 
     def restart(self) -> None:
-        """Put everything back to the start."""
+        """Reset the simulation to its start."""
         station, parameters = self._station, self._settings.simulation
         self._simulator = Simulator(station.diagram)
         configure(self._simulator, parameters.integrator, parameters.max_step, parameters.accuracy)
         station.set_start(self.root)
         self._simulator.Initialize()
-        self.tick, self._wall, self._pull = 0, 0.0, np.zeros(ASKED)
-        self.fault: FoundFault | None = None
+        self.tick, self._wall, self._pull = 0, 0.0, np.zeros(REQUEST_SIZE)
+        self.fault: FaultReport | None = None
 
     @property
     def root(self) -> Context:
@@ -63,26 +63,26 @@ class LiveSimulation:
         return float(self.root.get_time())
 
     def set(self, controls: np.ndarray) -> None:
-        """Set what the person does from this tick on.
+        """Set the operator's controls from this tick on.
 
         Args:
-            controls: What the operator's hand and switches do.
+            controls: Controls of the operator's hand and switches.
         """
         assert self._station.operator is not None
         self._station.operator.fix(self.root, controls)
         self._pull = controls[PULL]
 
-    def tell_way_points(self, pen: Pen) -> None:
-        """Tell what a person has drawn, from this tick on.
+    def send_waypoints(self, pen: Pen) -> None:
+        """Send drawn waypoints from this tick on.
 
         Args:
-            pen: What makes way points of it.
+            pen: Source of the waypoints.
         """
         taken = self._station.blocks.output(self.root, "controller.waypoint_intake.stream")[1]
-        self._station.tell_way_points(self.root, pen.message(self.tick, int(taken)))
+        self._station.send_waypoints(self.root, pen.message(self.tick, int(taken)))
 
     def step(self) -> None:
-        """Go on by a step, and look for faults."""
+        """Advance by a step, and check for faults."""
         begin = time.perf_counter()
         failed = None
         try:
@@ -93,14 +93,14 @@ class LiveSimulation:
         self._wall += time.perf_counter() - begin
         self.fault = self._station.found_fault(self.root)
         if self.fault is None and failed is not None:
-            self.fault = FoundFault(failed, self.time)
+            self.fault = FaultReport(failed, self.time)
 
     def signals(self) -> dict[str, np.ndarray]:
-        """Return what is logged, as it is now."""
+        """Return the current values of the logged signals."""
         return self._station.log.now(self._station.blocks, self.root)
 
     def frame(self, signals: dict[str, np.ndarray]) -> LiveFrame:
-        """Return what there is to see.
+        """Return the current frame for drawing.
 
         Args:
             signals: From :meth:`signals`.
@@ -113,7 +113,7 @@ class LiveSimulation:
         return LiveFrame(positions, pose, point, force, target, signals.get("led_point"))
 
     def result(self) -> SimulationResult:
-        """Return what came of it so far, in a context of its own."""
+        """Return the result so far, with a copy of the context."""
         factor = self.time / max(self._wall, 1e-9)
         sentence = None if self.fault is None else self.fault.sentence
         since = None if self.fault is None else self.fault.time
@@ -121,10 +121,10 @@ class LiveSimulation:
 
 
 def _ticks_per_step(period: float) -> int:
-    """Return how many ticks there are between two looks at the controls.
+    """Return the number of ticks between two reads of the controls.
 
-    They divide those between a run's looks at faults: then a run that repeats a session does not
-    end before it.
+    It divides the interval of a run's checks for faults, so that a replay of a session does not end
+    before it.
 
     Args:
         period: Sampling time of the controller [s].
@@ -133,15 +133,14 @@ def _ticks_per_step(period: float) -> int:
     return max(n for n in range(1, most + 1) if chunk_ticks(period) % n == 0)
 
 
-class RealTimePace:
-    """Lets simulated time wait for the clock, and never run after it.
+class RealTimeClock:
+    """Synchronization of simulated time with a clock.
 
-    A lag of up to 0.1 s, as of a computer that was busy for a moment, is caught up. What lags more
-    was simulated too slowly: then time goes on from there, slower than the clock, as
-    :attr:`factor` tells.
+    A lag of up to 0.1 s, e.g. of a computer that is busy for a moment, is caught up. After a larger
+    lag simulated time continues from there, slower than the clock, see :attr:`factor`.
 
     Args:
-        clock: Tells the time [s].
+        clock: Returns the time [s].
         sleep: Waits [s].
     """
 
@@ -155,20 +154,20 @@ class RealTimePace:
         self._past: deque[tuple[float, float]] = deque()
 
     def restart(self, simulated: float) -> None:
-        """Begin anew, after time has stood still.
+        """Restart after a pause.
 
         Args:
-            simulated: Simulated time now [s].
+            simulated: Current simulated time [s].
         """
         now = self._clock()
         self._origin = now - simulated
         self._past = deque([(now, simulated)])
 
-    def keep(self, simulated: float) -> None:
-        """Wait until the clock has come to a simulated time, if it has not.
+    def wait_until(self, simulated: float) -> None:
+        """Wait until the clock reaches a simulated time.
 
         Args:
-            simulated: Simulated time now [s].
+            simulated: Current simulated time [s].
         """
         early = self._origin + simulated - self._clock()
         if early > 0.0:
@@ -180,7 +179,7 @@ class RealTimePace:
             self._past.popleft()
 
     def wait(self) -> None:
-        """Let a moment pass in which simulated time stands still."""
+        """Wait for a moment during a pause of simulated time."""
         self._sleep(_MOMENT)
 
     @property

@@ -1,4 +1,4 @@
-"""What a person sees and sets in a live session: controls, and a scene that only draws."""
+"""Controls of a live session, and its Meshcat scene."""
 
 import enum
 from collections.abc import Callable, Sequence
@@ -16,18 +16,18 @@ from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.systems.drawing.hidden_meshcat import hidden_meshcat
 
 _DEAD_ZONE = 0.12  # of a stick
-_FARTHEST = 0.3  # m, of the place to hold at from where the hand took hold
-_DRAGGED = 0.15  # m, by the half of a handle
+_FARTHEST = 0.3  # m, largest displacement of the held position from the grasp
+_DRAGGED = 0.15  # m, travel for half of a handle
 _FREE_DAMPING = 90.0  # N s/m, where it varies along the manifold: Tab. 4.3
 _AXES = "xyz"
 _KEYS = (("KeyW", "KeyS"), ("KeyA", "KeyD"), ("KeyR", "KeyF"))
 _STRENGTH, _GUIDE, _HOLD = "key force [N]", "guide (K, J)", "hold (T, G)"
-# how often a scene begins anew
+# largest number of restarts of a scene
 _MOST = 10
 
 
 class Command(enum.Enum):
-    """What a person can ask of the session, with the label and key of its button."""
+    """Commands to the session, with label and key of their buttons."""
 
     LET_GO = "let go (space)", "Space"
     RECORD = "record (C)", "KeyC"
@@ -36,20 +36,20 @@ class Command(enum.Enum):
 
 
 class Panel:
-    """What the page that leads sets, read as the controls of an operator.
+    """Controls of an operator from the input of the controlling page.
 
-    Sliders and switches keep what they were set to. The hand itself is nothing but what the page
-    says at this moment, see :class:`Pages`; whenever that has to let go, a hold opens, too.
+    Sliders and switches retain their values. The hand follows the current input, see
+    :class:`Pages`; when it lets go, a hold opens, too.
 
-    A device far away is dragged: its handles say how far from where the hand took hold of it, and
-    do not pull.
+    A teleoperated leader device is dragged: its handles give a displacement from the grasp instead
+    of a force.
 
     Args:
-        pages: Who sets it.
+        pages: Source of the input.
         force_limit: Force limit of the hand [N].
-        tuned: What of the impedance can be changed.
-        regions: Names of what can be switched on and off.
-        drags: Whether a device far away is led.
+        tuned: Tunable impedance parameters.
+        regions: Names of regions that can be switched.
+        drags: Whether a teleoperated leader device is dragged.
     """
 
     def __init__(
@@ -78,9 +78,9 @@ class Panel:
             for i, axis in enumerate(_AXES)
             for sign, key in zip("+-", _KEYS[i], strict=True)
         }
-        # commands wait here until they are asked for
+        # commands are queued here
         self._buttons, self._commands = dict(c.value for c in Command), list[Command]()
-        self._hand, self._drawn = dict[str, float](), list[list[float]]()
+        self._hand, self._strokes = dict[str, float](), list[list[float]]()
         self._held_from: np.ndarray | None = None
         self._dragged_from: np.ndarray | None = None
         pages.expect(
@@ -100,8 +100,8 @@ class Panel:
         return found
 
     def look(self) -> None:
-        """Take over what was set and pressed since the last look, and what the hand does."""
-        heard = self._pages.heard()
+        """Update settings, commands and hand from the input since the last call."""
+        heard = self._pages.collect()
         if heard.let_go:
             self._open()
         for name, value in heard.settings:
@@ -110,22 +110,22 @@ class Panel:
             elif value > 0.5:
                 self._commands += [command for command in Command if command.value[0] == name]
         self._hand = heard.hand
-        self._drawn += heard.drawn
+        self._strokes += heard.strokes
 
-    def drawn(self) -> list[list[float]]:
-        """Return places of a pen that were drawn and not yet told, see :class:`Message`."""
-        drawn, self._drawn = self._drawn, []
-        return drawn
+    def take_strokes(self) -> list[list[float]]:
+        """Return the points of a pen since the last call, see :class:`PageInput`."""
+        strokes, self._strokes = self._strokes, []
+        return strokes
 
     def commands(self) -> list[Command]:
-        """Return what was asked for and not yet told."""
-        asked, self._commands = self._commands, []
-        if Command.LET_GO in asked:
+        """Return the commands since the last call."""
+        commands, self._commands = self._commands, []
+        if Command.LET_GO in commands:
             self.let_go()
-        return asked
+        return commands
 
     def let_go(self) -> None:
-        """Take the hand off the tool, until it is heard again."""
+        """Release the tool until the next input."""
         self._pages.open_hand()
         self._hand = {}
         self._open()
@@ -134,11 +134,10 @@ class Panel:
         self._values[_HOLD], self._held_from, self._dragged_from = 0.0, None, None
 
     def content(self) -> dict[str, object]:
-        """Return what there is to set, for JSON.
+        """Return the controls as JSON content.
 
-        Sliders with their values, and buttons and pushes with their keys; what the hand does now,
-        by name of what pulls or pushes, with how much a handle can pull [N], and how far it can
-        drag [m], if it does that instead.
+        It has sliders with values, buttons and pushes with keys, current actions of the hand by
+        name, the largest force of a handle [N], or its largest displacement [m] if it drags.
         """
         rigid = {p.slider.name for p in self._tuned if p.top_is_rigid}
         sliders = [
@@ -156,13 +155,13 @@ class Panel:
         }
 
     def read(self, y_t: np.ndarray) -> np.ndarray:
-        """Return the controls as they are set now, see :class:`Operator`.
+        """Return the current controls, see :class:`Operator`.
 
         Args:
-            y_t: Where the tool point is [m], shape (3,); from there a hand that takes hold moves.
+            y_t: Tool point [m], shape (3,); origin of displacements of a new grasp.
         """
         controls = self._idle.copy()
-        controls[PULL] = self._asked(y_t)
+        controls[PULL] = self._hand_controls(y_t)
         controls[REQUEST] = self._requests()
         if self._regions:
             controls[REGIONS] = [self._value(name) for name in self._regions]
@@ -171,7 +170,7 @@ class Panel:
     def _value(self, name: str) -> float:
         return self._values[name]
 
-    def _asked(self, y_t: np.ndarray) -> np.ndarray:
+    def _hand_controls(self, y_t: np.ndarray) -> np.ndarray:
         """Return push, hold and target, shape (7,)."""
         limit = self._force_limit
         pull = [self._hand.get(name, 0.0) for name in self._pull]
@@ -190,7 +189,7 @@ class Panel:
         return np.concatenate([push, [1.0], moved])
 
     def _dragged(self, y_t: np.ndarray) -> np.ndarray | None:
-        """Return where a hand that drags wants the tool to be, shape (3,), if it does."""
+        """Return the desired position of a dragged tool, shape (3,), or None."""
         if not any(name in self._hand for name in self._drag):
             self._dragged_from = None
             return None
@@ -198,8 +197,8 @@ class Panel:
             self._dragged_from = y_t.copy()
         if self._dragged_from is None:
             return None
-        way = [self._hand.get(name, 0.0) for name in self._drag]
-        return self._dragged_from + np.clip(way, -_FARTHEST, _FARTHEST)
+        offset = [self._hand.get(name, 0.0) for name in self._drag]
+        return self._dragged_from + np.clip(offset, -_FARTHEST, _FARTHEST)
 
     def _key_push(self) -> np.ndarray:
         push, strength = np.zeros(3), self._value(_STRENGTH)
@@ -224,35 +223,34 @@ class Panel:
         return requests
 
     def _damping_along(self, index: int) -> float:
-        """Return the damping of the tangential coordinates, in which free ones move [N s/m]."""
+        """Return the damping of the tangential coordinates, also used for free ones [N s/m]."""
         sliders = (p.slider for p in self._tuned if p.index == index)
         return next((self._value(slider.name) for slider in sliders), _FREE_DAMPING)
 
 
 class Scene:
-    """Draws a station in Meshcat, for the page to show in a frame.
+    """Drawing of a station in Meshcat, shown by the page in a frame.
 
-    Meshcat asks nobody who they are and where they come from, and one message that is none ends it.
-    So nothing that is done in it is listened to; it has an address on this machine that only the
-    page is told, one of 16 million and 28 thousand ports, where the system has so many; and when it
-    was ended all the same, there is a new one elsewhere.
+    Meshcat has no access control, and a malformed message terminates it. Its input is therefore
+    ignored; its local address is random, one of 16 million and 28 thousand ports if available, and
+    known to the page only; after a termination it is restarted at another address.
 
     Attributes:
-        url: Where it is.
+        url: Its address.
 
     Args:
-        view: Returns what draws a station there, from a first frame on.
+        view: Returns the drawing of a station, from a first frame on.
         first: The first frame.
-        tell: Told in words what happens.
+        notify: Receives lines about events.
     """
 
     def __init__(
         self,
         view: Callable[[LiveFrame, Meshcat], LiveView],
         first: LiveFrame,
-        tell: Callable[[str], None],
+        notify: Callable[[str], None],
     ) -> None:
-        self._make, self._tell, self._losses = view, tell, 0
+        self._make, self._notify, self._losses = view, notify, 0
         self._begin(first)
 
     def _begin(self, frame: LiveFrame) -> None:
@@ -266,7 +264,7 @@ class Scene:
         Args:
             frame: The frame.
             factor: Simulated over real time.
-            interrupted: Whether the tool's way does not lead there from the last one.
+            interrupted: Whether the tool's trace is not continued from the last frame.
         """
         if self._losses > _MOST:
             return
@@ -279,8 +277,8 @@ class Scene:
     def _begin_anew(self, frame: LiveFrame) -> None:
         self._losses += 1
         if self._losses > _MOST:
-            self._tell("the scene was ended from outside too often; it is drawn no more")
+            self._notify("the scene was terminated too often; it is no longer drawn")
             return
-        self._tell("the scene was ended from outside, and begins anew")
-        with suppress(RuntimeError):  # that it is ended at once, too, the next frame finds
+        self._notify("the scene was terminated and has been restarted")
+        with suppress(RuntimeError):  # an immediate termination is found with the next frame
             self._begin(frame)

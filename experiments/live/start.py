@@ -1,4 +1,4 @@
-"""From a scenario to a live session, and how it ended."""
+"""Start of a live session from a scenario."""
 
 from collections.abc import Callable
 from contextlib import closing, suppress
@@ -11,12 +11,11 @@ from experiments.live.status import LiveStatus
 from experiments.live.takes import TakeFolders
 from experiments.preparation import prepare
 from experiments.scenario_file import ScenarioFile
-from pfsc_drake.errors import InputError
 from pfsc_drake.physics.operator_hand import LiveHandParameters
 from pfsc_drake.yaml.typed import load_typed
-from reporting.interruption import noticed_interruption
+from reporting.interruption import watch_interruption
 
-# what a written hand and a live one have in common
+# parameters shared by a simulated and a live operator
 _HAND = ("stiffness", "damping", "rotational_damping", "force_limit", "torque_limit")
 
 
@@ -24,30 +23,30 @@ def run_live(
     scenario: ScenarioFile,
     port: int,
     duration: float | None,
-    tell: Callable[[str], None],
+    notify: Callable[[str], None],
     *,
     out: Path,
     figures: bool,
     recording: bool,
 ) -> LiveSession:
-    """Let a person guide a scenario's robot until they end it.
+    """Run a live session in which a person guides a scenario's robot.
 
     Args:
-        scenario: The scenario as read; its written hand, if any, gives way to the person's.
-        port: Port of the page; 0 for any that is free.
+        scenario: The scenario as read; its operator model, if any, is replaced by the person.
+        port: Port of the page; 0 for any free port.
         duration: Simulated time after which the session ends [s]; by default
             LONGEST_SESSION or what the memory allows.
-        tell: Told in words what is prepared, happens, and is written.
-        out: Folder in which takes get folders of their own.
+        notify: Receives lines about progress and events.
+        out: Folder of the takes' folders.
         figures: Whether takes get figures.
         recording: Whether takes get a recording.
 
     Raises:
-        InputError: If the scenario is wrong or has nothing to guide, the folder cannot be used, or
-            the port is taken.
+        InputError: If the scenario is wrong or has no compliance, the folder cannot be used, or the
+            port is taken.
     """
-    tell = _audible(tell)
-    progress = _ToldProgress(tell)
+    notify = _audible(notify)
+    progress = _ProgressLines(notify)
     progress(0.0, "preparing")
     guided = with_operator(scenario)
     folders = TakeFolders(
@@ -56,57 +55,59 @@ def run_live(
     status, pages = LiveStatus(scenario.name), Pages()
     with closing(PageServer(port, pages, status.content)) as server:
         prepared = prepare(guided, duration, recording=True, progress=progress, live=True)
-        session = LiveSession(prepared, pages, status, folders, tell)
+        session = LiveSession(prepared, pages, status, folders, notify)
         for warning in prepared.warnings:
-            tell(f"warning: {warning}")
-        tell(f"open {server.url}")
-        with noticed_interruption() as interrupted:
+            notify(f"warning: {warning}")
+        notify(f"open {server.url}")
+        with watch_interruption() as interrupted:
             session.run(interrupted, progress)
     return session
 
 
-def _audible(tell: Callable[[str], None]) -> Callable[[str], None]:
-    """Return a teller whom it does not disturb that the terminal has gone."""
+def _audible(notify: Callable[[str], None]) -> Callable[[str], None]:
+    """Return a function that prints lines and ignores a closed terminal."""
 
-    def told(line: str) -> None:
+    def print_safely(line: str) -> None:
         with suppress(OSError):
-            tell(line)
+            notify(line)
 
-    return told
+    return print_safely
 
 
-class _ToldProgress:
-    """Tells in words what is prepared and written."""
+class _ProgressLines:
+    """Progress listener that reports each phase as a line."""
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self._tell, self._phase = tell, ""
+    def __init__(self, notify: Callable[[str], None]) -> None:
+        self._notify, self._phase = notify, ""
 
     def expect(self, duration: float) -> None:
-        """Leave it to the person when it ends."""
+        """Ignore the duration, which the person decides."""
 
     def __call__(self, simulated_time: float, phase: str) -> None:
         if phase != self._phase:
             self._phase = phase
-            self._tell(phase)
+            self._notify(phase)
 
 
 def with_operator(scenario: ScenarioFile) -> ScenarioFile:
-    """Return a scenario with a person at its controls, in place of its written hand.
+    """Return a scenario with a live operator in place of its operator model.
 
     Args:
         scenario: The scenario as read.
 
     Raises:
-        InputError: If it is wrong, or has nothing to guide.
+        InputError: If it is wrong, or has no compliance.
     """
-    settings = load_typed(Scenario, scenario.data, str(scenario.path))
+    settings = load_typed(Scenario, scenario.data, scenario.source)
     shape = settings.path.shape
     draws = isinstance(shape, Streamed) and shape.plane is not None
     if not settings.compliance.is_given and not settings.switched_regions and not draws:
-        raise InputError(
-            f"{scenario.path}: compliance = not given: nothing yields to a hand; allowed in a live "
-            "session: a scenario with compliance, such as vf_soft_circle, or with a plane to draw "
-            "in, such as pfc_draw_6r"
+        raise scenario.source.refusal(
+            [
+                "compliance = not given: the robot cannot be guided; allowed in a live session: "
+                "a scenario with compliance, such as vf_soft_circle, or with a plane to draw in, "
+                "such as pfc_draw_6r"
+            ]
         )
     data = dict(scenario.data)
     operator = dict(data.get("operator") or {})
@@ -119,4 +120,5 @@ def with_operator(scenario: ScenarioFile) -> ScenarioFile:
         path = dict(data["path"])
         path["shape"] = dict(path["shape"]) | {"inputs": ""}
         data["path"] = path
-    return ScenarioFile(scenario.path, data | {"operator": operator, "hand": None})
+    data |= {"operator": operator, "hand": None}
+    return ScenarioFile(scenario.path, data, scenario.locations)

@@ -1,24 +1,27 @@
-"""What a live session tells the person, ten times a second."""
+"""Status of a live session for its page, updated ten times a second."""
 
+import re
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
 from diagrams.live_view import felt_force
 from diagrams.station import Station
+from experiments.live.controls import KIND_WORDS
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.guides import GuideRecord
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.manifolds.coordinate import Kind
-from pfsc_drake.control.manifolds.manifold import indices
+from pfsc_drake.control.manifolds.manifold import Manifold, indices
+from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.controller.tasks.space_task import SpaceTask
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import singular_posture, singularity_name
 
-# below it, time is said to be slower than the clock
+# real-time factor below which the simulation counts as slow
 _SLOW = 0.95
-# what there is of each region comes behind these
+# fields before those of each region
 _RECORD = GuidanceRecord(0).fields
 _NEAR_SINGULAR = {
     "elbow": "elbow nearly stretched or folded",
@@ -31,33 +34,35 @@ POSTURES = (*_NEAR_SINGULAR.values(), _NO_NAME)
 
 @dataclass
 class LiveStatus:
-    """What a session is doing.
+    """Status of a session.
 
     Attributes:
-        scenario: Its name.
-        scene: Where it is drawn.
-        phase: ``running``, ``fault``, ``saving``, ``ended``; of a robot that is watched
-            ``driving``, ``paused``, ``stopping``, ``ended``, ``no controller``.
+        scenario: Name of the scenario.
+        scene: Address of the scene.
+        phase: ``running``, ``fault``, ``saving``, ``ended``; of a monitored robot ``driving``,
+            ``paused``, ``stopping``, ``ended``, ``no controller``.
         time: Simulated time [s].
         factor: Simulated over real time.
-        mode: Which mode the law is in, if it has several.
-        limit: Which limit of the robot itself holds the hand, if one does.
-        deviation: Transversal coordinates, by name [m]; in space the distance from the path that
-            pulls, by its name, or from the nearest region, if one is near.
+        mode: Mode of the law, if it has several.
+        limit: Active limit of the robot itself, or null.
+        deviation: Transversal coordinates, by name [m]; in space the distance from the active
+            guide, by its name, or from the nearest region, if one is near.
         progress: Tangential coordinates, by name [m].
+        labels: Descriptions of coordinates by name.
+        tool_point: Position of the tool point in the world [m]; empty if unknown.
         angles: Rotational coordinates, by name [rad].
-        force: On the tool, or what a hand feels that is far away, world axes [N].
-        measured: What the sensor makes of it along the coordinates, by name [N, Nm].
-        stiffness: By coordinate [N/m, Nm/rad]; null where rigid.
-        damping: By coordinate [N s/m, Nm s/rad].
-        tank: Energy that stiffening springs may still take [J].
-        ready: Whether anything yields yet: a sensor is tared first.
-        recording: Since when a recording runs [s], or null.
-        kept: What was kept so far, by name of its folder.
-        message: What else there is to say: why it stopped, or what comes next.
-        override: Of a robot that is watched: share of the planned pace; else null.
-        controls: What can be set and how it is, see :class:`Panel`.
-        plane: Where a person draws, see :meth:`Pen.content`; null where nobody does.
+        force: Force on the tool, or on the operator of a leader device, world axes [N].
+        measured: Measured forces along the coordinates, by name [N, Nm].
+        stiffness: Stiffness by coordinate [N/m, Nm/rad]; null where rigid.
+        damping: Damping by coordinate [N s/m, Nm s/rad].
+        tank: Energy available for stiffening springs [J].
+        ready: Whether the reference complies; a sensor is tared first.
+        recording: Begin of the current recording [s], or null.
+        takes: Saved takes, by names of their folders.
+        message: Further message, e.g. the reason of a stop.
+        override: Speed scaling of a monitored robot; else null.
+        controls: Controls with their values, see :class:`Panel`.
+        plane: Plane to draw in, see :meth:`Pen.content`; or null.
     """
 
     scenario: str
@@ -69,6 +74,8 @@ class LiveStatus:
     limit: str | None = None
     deviation: dict[str, float] = field(default_factory=dict)
     progress: dict[str, float] = field(default_factory=dict)
+    labels: dict[str, str] = field(default_factory=dict)
+    tool_point: list[float] = field(default_factory=list)
     angles: dict[str, float] = field(default_factory=dict)
     force: list[float] = field(default_factory=list)
     measured: dict[str, float] = field(default_factory=dict)
@@ -77,7 +84,7 @@ class LiveStatus:
     tank: float | None = None
     ready: bool = True
     recording: float | None = None
-    kept: list[str] = field(default_factory=list)
+    takes: list[str] = field(default_factory=list)
     message: str = ""
     override: float | None = None
     controls: dict[str, object] = field(default_factory=dict)
@@ -89,18 +96,19 @@ class LiveStatus:
         return self.factor < _SLOW
 
     def content(self) -> dict[str, object]:
-        """Return all of it for JSON, without numbers that JSON does not know."""
+        """Return the status as JSON content, with null for infinity and NaN."""
         return {**{key: _plain(value) for key, value in asdict(self).items()}, "slow": self.is_slow}
 
     def observe(self, station: Station, signals: dict[str, np.ndarray]) -> None:
-        """Take over what a station's signals say.
+        """Update from a station's signals.
 
         Args:
             station: The station.
-            signals: Values now, by signal, as of :meth:`SignalLog.now`.
+            signals: Current values by signal, see :meth:`SignalLog.now`.
         """
         coordinates = station.law.linearization.manifold.coordinates
         names = [coordinate.name for coordinate in coordinates]
+        self.labels = coordinate_labels(station.law.linearization.manifold)
         y = signals["law"][station.law.layout.manifold_state][: len(names)].tolist()
 
         def of(kind: Kind, values: list[float]) -> dict[str, float]:
@@ -128,22 +136,22 @@ class LiveStatus:
             self.mode = station.mode_name(int(signals["mode"][0]))
 
     def _observe_guidance(self, row: np.ndarray) -> None:
-        """Take over what leads a tool through space, see :class:`GuidanceRecord`."""
+        """Update from guidance through space, see :class:`GuidanceRecord`."""
         axes = list(self.progress)
-        # new ones: pages read the old ones in their threads
+        # new dictionaries: pages read the old ones in their threads
         forces = zip(axes, row[_RECORD["force"]].tolist(), strict=True)
         self.measured = self.measured | dict(forces)
         self.damping = self.damping | dict.fromkeys(axes, float(row[_RECORD["damping"]][0]))
         near = row[_RECORD["near"]].reshape(-1, len(SLOT))
         index = near[:, SLOT.index("index")]
-        # behind the regions are limits of the robot
+        # after the regions follow limits of the robot
         is_region = (index >= 0.0) & (index < GuidanceRecord.regions_in(row.size))
         distances = near[is_region, SLOT.index("h")]
         if distances.size:
             self.deviation = {"nearest region": float(distances.min())}
 
     def _observe_guides(self, station: Station, row: np.ndarray) -> None:
-        """Take over which of several paths pulls the tool, see :class:`GuideRecord`."""
+        """Update from the active one of several guides, see :class:`GuideRecord`."""
         assert isinstance(station.task, SpaceTask)
         names = list(station.task.guides)
         fields, active = GuideRecord(len(names)).fields, row[0]
@@ -152,7 +160,7 @@ class LiveStatus:
             self.deviation = {names[int(active)]: float(distances[int(active)])}
 
     def _observe_limit(self, station: Station, signals: dict[str, np.ndarray]) -> None:
-        """Take over what of the robot itself holds the hand."""
+        """Update the active limit of the robot itself."""
         if not {"guidance", "limit_force"} & signals.keys():
             return
         n = station.robot.dimension
@@ -164,8 +172,31 @@ class LiveStatus:
             self.limit = None
         elif kind != "singular":
             self.limit = joint_text(kind)
-        elif self.limit not in POSTURES:  # its name takes a while to find
+        elif self.limit not in POSTURES:  # its name is expensive to compute
             self.limit = posture_text(station, signals["joint_state"][:n])
+
+
+_ABOUT = re.compile("phi_([xyz])")
+
+
+def coordinate_labels(manifold: Manifold) -> dict[str, str]:
+    """Return the descriptions of a manifold's coordinates by their names.
+
+    Args:
+        manifold: The manifold; coordinates of space are x, y and z.
+    """
+    in_space = manifold.name == SpaceManifold.name
+    axes, labels = iter("xyz"), {}
+    for coordinate in manifold.coordinates:
+        name, kind = coordinate.name, coordinate.kind
+        about = _ABOUT.fullmatch(name)
+        if in_space and kind is Kind.TANGENTIAL:
+            labels[name] = next(axes)
+        elif about is not None:
+            labels[name] = f"rotation about {about[1]} ({name})"
+        else:
+            labels[name] = f"{KIND_WORDS[kind]} ({name})"
+    return labels
 
 
 def _plain(value: object) -> object:
@@ -180,7 +211,7 @@ def _plain(value: object) -> object:
 
 
 def holding_limit(row: np.ndarray, joints: int) -> str | None:
-    """Return the kind of limit that holds the tool most, see :func:`limit_kinds`, if one does.
+    """Return the kind of limit with the largest force, see :func:`limit_kinds`, or None.
 
     Args:
         row: A record of guidance, see :class:`GuidanceRecord`.
@@ -198,10 +229,10 @@ def holding_limit(row: np.ndarray, joints: int) -> str | None:
 
 
 def hardest_limit(forces: np.ndarray, joints: int) -> str | None:
-    """Return the kind of limit that holds a tool on a path or surface most, if one does.
+    """Return the kind of limit with the largest force on a path or surface, or None.
 
     Args:
-        forces: By kind [N].
+        forces: Forces by kind [N].
         joints: N.
     """
     hardest = int(np.argmax(forces))
@@ -209,7 +240,7 @@ def hardest_limit(forces: np.ndarray, joints: int) -> str | None:
 
 
 def joint_text(kind: str) -> str:
-    """Return what a limit of a joint is called for people.
+    """Return the text of a joint's limit.
 
     Args:
         kind: ``speed_3`` or ``end_3``.
@@ -219,16 +250,17 @@ def joint_text(kind: str) -> str:
 
 
 def posture_text(station: Station, q: np.ndarray) -> str:
-    """Return what a posture that is nearly singular is called for people, one of ``POSTURES``.
+    """Return the text of a nearly singular posture, one of ``POSTURES``.
 
     Args:
         station: The station.
         q: Joint coordinates, shape (N,).
     """
-    robot, place, tool = station.part.belief.robot, station.task.place, station.task.place.tool
+    robot, manifold = station.part.nominal_model.robot, station.task.projected_manifold
+    tool = manifold.tool
     if not isinstance(robot, SerialChain):
         return _NO_NAME
     posture = singular_posture(
-        robot, q, oriented=place.is_oriented, tool_axis=tool.tool_axis, yaw_axis=tool.yaw_axis
+        robot, q, oriented=manifold.is_oriented, tool_axis=tool.tool_axis, yaw_axis=tool.yaw_axis
     )
     return _NEAR_SINGULAR.get(singularity_name(robot, q, posture) or "", _NO_NAME)

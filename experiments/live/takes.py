@@ -1,4 +1,4 @@
-"""Takes: what a person did at the controls since the last reset, and what is left of it."""
+"""Takes: recorded controls of a person since the last reset, and their results."""
 
 import dataclasses
 import os
@@ -11,14 +11,14 @@ import numpy as np
 from diagrams.environment.operator import Operator, controls_text
 from diagrams.scenario import Streamed
 from diagrams.station import Station
-from diagrams.tasks.arrivals import END, NEW_PATH, WAY_POINT, Event, drawn_text, tell
+from diagrams.tasks.arrivals import END, NEW_PATH, WAYPOINT, Event, drawn_text, send_event
 from diagrams.tasks.drawn_plane import plane_axes
 from diagrams.tasks.streaming import ScenarioStream
 from experiments.finished_run import FinishedRun, RunOutcome, write_outcome
 from experiments.preparation import PreparedRun
 from experiments.simulation import SimulationResult
+from pfsc_drake.control.streams.growing_path import POSITION
 from pfsc_drake.control.streams.messages import StreamStatus, WaypointSender
-from pfsc_drake.control.streams.stream_course import POSITION
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.dumping import dump_typed
 from reporting.folder import check_folder, open_results
@@ -30,10 +30,10 @@ _MOST = 10_000
 
 
 class ControlRecord:
-    """The controls from the last reset on, tick by tick; only changes are kept.
+    """Record of controls since the last reset; only changes are stored.
 
     Args:
-        operator: Whose controls.
+        operator: The operator.
     """
 
     def __init__(self, operator: Operator) -> None:
@@ -41,7 +41,7 @@ class ControlRecord:
         self._ticks, self._rows = [0], [operator.idle]
 
     def note(self, tick: int, controls: np.ndarray) -> None:
-        """Note what holds from a tick on.
+        """Record the controls from a tick on.
 
         Args:
             tick: Number of the sampling interval.
@@ -63,10 +63,10 @@ class ControlRecord:
 
 
 class Pen:
-    """Makes way points of places in a plane, and tells them as fast as the station takes them.
+    """Conversion of points in a plane to waypoints, sent as fast as the station accepts them.
 
     Args:
-        task: What is drawn.
+        task: The streamed path.
     """
 
     def __init__(self, task: ScenarioStream) -> None:
@@ -77,7 +77,7 @@ class Pen:
 
     @classmethod
     def of(cls, station: Station) -> "Pen | None":
-        """Return the pen of a station in which somebody draws, if anybody does.
+        """Return the pen of a station with a plane to draw in, or None.
 
         Args:
             station: The station.
@@ -90,48 +90,48 @@ class Pen:
         self._sender = WaypointSender(self._task.path.messages)
         self._waiting, self._events = deque[tuple[int, np.ndarray]](), list[Event]()
 
-    def draw(self, places: list[list[float]]) -> None:
-        """Take over what was drawn.
+    def draw(self, points: list[list[float]]) -> None:
+        """Add drawn points.
 
         Args:
-            places: Each ``[right, up, kind]`` [m, m, 1], from the plane's middle on.
+            points: Each ``[right, up, kind]`` [m, m, 1], relative to the plane's centre.
         """
         half = np.array([self._plane.width, self._plane.height]) / 2.0
-        for right, up, kind in places:
+        for right, up, kind in points:
             # a pen that leaves the plane draws along its border
             inside = np.clip([right, up], -half, half)
             pose = self._task.path.start.copy()
             pose[:POSITION] = self._origin + inside @ self._axes
-            known = int(kind) if kind in (WAY_POINT, NEW_PATH, END) else WAY_POINT
+            known = int(kind) if kind in (WAYPOINT, NEW_PATH, END) else WAYPOINT
             if known == NEW_PATH:
-                # of what waits nothing will come
+                # pending waypoints are discarded
                 self._waiting.clear()
             self._waiting.append((known, pose))
 
     def message(self, tick: int, taken: int) -> np.ndarray:
-        """Return what is told from a tick on, shape (size,).
+        """Return the message from a tick on, shape (size,).
 
         Args:
             tick: Number of the sampling interval.
-            taken: How many way points the station has taken.
+            taken: Number of waypoints accepted by the station.
         """
         while self._waiting and self._sender.total - taken < self._task.path.messages.length:
             kind, pose = self._waiting.popleft()
             event = Event(tick, kind, pose)
             self._events.append(event)
-            tell(self._sender, event)
+            send_event(self._sender, event)
         return self._sender.message
 
     def text(self) -> str:
-        """Return the content of a file that :func:`~diagrams.tasks.arrivals.read_drawn` reads."""
+        """Return the content of a file for :func:`~diagrams.tasks.arrivals.read_drawn`."""
         return drawn_text(self._events, len(self._task.path.start), self._task.period)
 
     def content(self, y_t: np.ndarray, stream: np.ndarray) -> dict[str, object]:
-        """Return what a page shows, for JSON.
+        """Return the state of drawing as JSON content.
 
         Args:
             y_t: Tool point [m], shape (3,).
-            stream: What the station tells of way points, see
+            stream: Status of the station's waypoint stream, see
                 :class:`~pfsc_drake.control.streams.intake.WaypointIntake`.
         """
         return {
@@ -139,23 +139,23 @@ class Pen:
             "tool": (self._axes @ (y_t - self._origin)).tolist(),
             "status": StreamStatus(int(stream[0])).words,
             "taken": int(stream[1]),
-            "told": self._sender.total + sum(kind != END for kind, _ in self._waiting),
+            "sent": self._sender.total + sum(kind != END for kind, _ in self._waiting),
             "left": float(stream[2]),
         }
 
 
 class TakeFolders:
-    """Folders for takes, numbered in the order in which they are kept.
+    """Folders for takes, numbered in order.
 
     Args:
-        out: Where they are made.
+        out: Parent folder.
         name: Name of the scenario.
-        inputs: Files that takes are made from.
+        inputs: Input files of the scenario.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
 
     Raises:
-        InputError: If they cannot be made.
+        InputError: If they cannot be created.
     """
 
     def __init__(
@@ -177,7 +177,7 @@ class TakeFolders:
         check_folder(self.next(), "run", inputs)
 
     def next(self) -> Path:
-        """Return the next folder, which is not there yet."""
+        """Return the next folder, which does not exist yet."""
         for number in range(1, _MOST):
             folder = self._out / f"{_NAME}_{number}"
             if not folder.exists():
@@ -193,15 +193,15 @@ class TakeFolders:
         progress: ProgressListener,
         interrupted: Callable[[], bool],
     ) -> tuple[Path, RunOutcome]:
-        """Keep a take: its inputs, a scenario that repeats it, and what a run leaves.
+        """Write a take: its inputs, a scenario that replays it, and the results of a run.
 
         Args:
             prepared: The live station.
-            result: What came of it; its context is used up.
-            files: Contents of INPUTS, and of DRAWING where somebody draws.
-            attributes: What else to note in the log.
-            progress: Told what goes on.
-            interrupted: Whether to leave out what takes long.
+            result: Its result; the context is modified.
+            files: Contents of INPUTS, and of DRAWING if there is a plane.
+            attributes: Further attributes of the log.
+            progress: Progress listener.
+            interrupted: Whether to skip slow steps.
         """
         folder = self.next()
         settings = dataclasses.replace(prepared.settings, duration=float(result.root.get_time()))

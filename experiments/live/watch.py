@@ -1,4 +1,4 @@
-"""Looking on while another process drives a robot, and asking its controller for another pace."""
+"""Monitoring of a robot driven by another process, with requests to its controller."""
 
 import time
 from collections.abc import Callable
@@ -15,36 +15,36 @@ from diagrams.station import Station
 from experiments.live.controls import Slider
 from experiments.live.page_server import Pages, PageServer
 from experiments.live.panel import Scene
-from experiments.live.status import LiveStatus
+from experiments.live.status import LiveStatus, coordinate_labels
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake import jets
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.manifolds.coordinate import Kind
-from pfsc_drake.control.manifolds.manifold import PlaceManifold, indices
-from pfsc_drake.drivers.link import WatchingEnd
+from pfsc_drake.control.manifolds.manifold import ProjectedManifold, indices
+from pfsc_drake.drivers.link import ObserverEndpoint
 from pfsc_drake.drivers.messages import RobotStatus
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Pause, Request
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 from pfsc_drake.yaml.typed import load_typed
-from reporting.interruption import noticed_interruption
+from reporting.interruption import watch_interruption
 
 _FRAME = 0.04  # s
 _FIRST = 5.0  # s
-# after which a controller that tells nothing is not there [s]
+# silence after which a controller counts as absent [s]
 _SILENT = 0.5
-_PAUSE, _STOP, _LEAVE = "pause, go on (space)", "stop the robot (X)", "leave (Q)"
+_PAUSE, _STOP, _LEAVE = "pause, resume (space)", "stop the robot (X)", "leave (Q)"
 _KEYS = {_PAUSE: "Space", _STOP: "KeyX", _LEAVE: "KeyQ"}
 _OVERRIDE = Slider("of planned speed", "pace", 0.0, LARGEST_OVERRIDE, 0.05, 1.0)
 _ARROW = 100.0  # N, of the longest
 
 
 class WatchPanel:
-    """What the page that leads asks a controller for.
+    """Requests of the controlling page to a controller.
 
     Args:
-        pages: Who leads.
+        pages: Input of the page.
 
     Attributes:
         has_left: Whether the person has ended the session.
@@ -55,30 +55,30 @@ class WatchPanel:
         pages.expect([], [_OVERRIDE.name, *_KEYS])
 
     def requests(self, override: float) -> list[Request]:
-        """Return what was asked for since the last time.
+        """Return the requests since the last call.
 
         Args:
-            override: Share of the planned pace that the controller has now.
+            override: Current speed scaling of the controller.
         """
-        asked = []
-        for name, value in self._pages.heard().settings:
+        requests = []
+        for name, value in self._pages.collect().settings:
             if name == _OVERRIDE.name:
                 override = _OVERRIDE.nearest(value)
-                asked.append(Request(override))
+                requests.append(Request(override))
             elif name == _PAUSE:
-                override = self._pause.toggled(override)
-                asked.append(Request(override))
+                override = self._pause.toggle(override)
+                requests.append(Request(override))
             elif name == _STOP:
-                asked.append(Request(stop=True))
+                requests.append(Request(stop=True))
             elif name == _LEAVE:
                 self.has_left = True
-        return asked
+        return requests
 
     def content(self, override: float) -> dict[str, object]:
-        """Return what there is to set, for JSON, as :meth:`Panel.content` does.
+        """Return the controls as JSON content, see :meth:`Panel.content`.
 
         Args:
-            override: Share of the planned pace that the controller has now.
+            override: Current speed scaling of the controller.
         """
         slider = _OVERRIDE.content(override)
         return {
@@ -91,50 +91,53 @@ class WatchPanel:
 
 
 class Watch:
-    """Shows on a page what a driven robot and its controller tell, and asks what the page asks.
+    """Monitoring of a driven robot and its controller on a page, with requests from it.
 
     Args:
-        station: The station of the controller, without its robot; only what it knows is used.
-        scene: Makes the scene from a first frame on.
+        station: Station of the controller, without its robot.
+        scene: Returns the scene for a first frame.
         end: The link.
-        panel: What the page asks for.
-        status: What the page shows.
+        panel: Requests of the page.
+        status: Status for the page.
     """
 
     def __init__(
         self,
         station: Station,
         scene: Callable[[LiveFrame], Scene],
-        end: WatchingEnd,
+        end: ObserverEndpoint,
         panel: WatchPanel,
         status: LiveStatus,
     ) -> None:
         self._station, self._end, self._panel, self.status = station, end, panel, status
-        self._pose = pose_function(station.part.belief.robot)
-        self._memory = station.initial_place
+        self._pose = pose_function(station.part.nominal_model.robot)
+        self._memory = station.initial_projection
         self._scene: Scene | None = None
         self._make = scene
         self._names = station.law.linearization.manifold.coordinates
-        self._coordinates = coordinate_function(station.task.place, station.part.belief.robot)
-        self._seen: dict[str, float] = {}
+        self._coordinates = coordinate_function(
+            station.task.projected_manifold, station.part.nominal_model.robot
+        )
+        self._own: dict[str, float] = {}
         status.override = 1.0
+        status.labels = coordinate_labels(station.law.linearization.manifold)
 
     def look(self, timeout: float) -> bool:
-        """Wait for messages, and show what has come; return whether a status has.
+        """Wait for messages, and show them; return whether a status was received.
 
         Args:
-            timeout: How long to wait [s].
+            timeout: Longest time to wait [s].
         """
-        robot = self._end.look(timeout)
+        robot = self._end.receive(timeout)
         if robot is not None:
             self._draw(robot)
         self._observe()
         for request in self._panel.requests(self.status.override or 0.0):
-            self._end.ask(request)
+            self._end.send_request(request)
         return robot is not None
 
     def _draw(self, robot: RobotStatus) -> None:
-        """Draw the robot where it says that it is."""
+        """Draw the robot in its reported posture."""
         coordinates, q = self._station.part.coordinates, robot.q
         if len(q) != self._station.robot.dimension:
             self.status.message = f"The robot on this bus has {len(q)} joints."
@@ -145,11 +148,11 @@ class Watch:
         positions = coordinates.plant_state(state)[: coordinates.num_states // 2]
         pose = np.array(self._pose(q)).ravel()
         point = self._station.task.evaluate(pose[:3], self._memory)
-        place = self._station.task.place
-        self._memory = point[place.layout.memory]
+        manifold = self._station.task.projected_manifold
+        self._memory = point[manifold.layout.memory]
         values = np.array(self._coordinates(q, point)).ravel()
-        names = [coordinate.name for coordinate in place.coordinates]
-        self._seen = {name: float(v) for name, v in zip(names, values, strict=True)}
+        names = [coordinate.name for coordinate in manifold.coordinates]
+        self._own = {name: float(v) for name, v in zip(names, values, strict=True)}
         frame = LiveFrame(positions, pose, point, np.zeros(3))
         if self._scene is None:
             self._scene = self._make(frame)
@@ -157,40 +160,40 @@ class Watch:
         self.status.scene = self._scene.url
 
     def _observe(self) -> None:
-        """Bring the status up to date with what the controller tells."""
-        told, status = self._end.progress, self.status
-        if time.monotonic() - self._end.told > _SILENT or not told:
-            ended = bool(told.get("ended"))
+        """Update the status from the controller's progress."""
+        progress, status = self._end.progress, self.status
+        if time.monotonic() - self._end.progress_time > _SILENT or not progress:
+            ended = bool(progress.get("ended"))
             status.phase = "ended" if ended else "no controller"
             status.message = "" if ended else "No controller drives the robot."
             return
-        status.time, status.override = told["time"], told["override"]
-        status.phase = "stopping" if told["stopping"] else "driving"
+        status.time, status.override = progress["time"], progress["override"]
+        status.phase = "stopping" if progress["stopping"] else "driving"
         if status.override == 0.0 and status.phase == "driving":
             status.phase = "paused"
-        if told["ended"]:
+        if progress["ended"]:
             status.phase = "ended"
-        missed = int(told["missed"])
-        status.message = f"{missed} statuses did not come within the last second." if missed else ""
-        for kind, kept in (
+        missed = int(progress["missed"])
+        status.message = f"{missed} status messages missing in the last second." if missed else ""
+        for kind, attribute in (
             (Kind.TRANSVERSAL, "deviation"),
             (Kind.TANGENTIAL, "progress"),
             (Kind.ROTATIONAL, "angles"),
         ):
             names = [coordinate.name for coordinate in self._names[indices(self._names, kind)]]
-            # a loop in C tells none: then they are those of the joints that the robot tells
-            known = self._seen | told
-            setattr(status, kept, {name: known[name] for name in names if name in known})
+            # a loop in C sends none: then they are computed from the robot's joints
+            known = self._own | progress
+            setattr(status, attribute, {name: known[name] for name in names if name in known})
         status.controls = self._panel.content(status.override)
 
 
 @once_per_content()
-def coordinate_function(manifold: PlaceManifold, robot: RobotModel) -> ca.Function:
+def coordinate_function(manifold: ProjectedManifold, robot: RobotModel) -> ca.Function:
     """Return the coordinates of a tool on a manifold, ``(q, point) -> values``, shape (m,).
 
     Args:
-        manifold: The manifold, whose point is given.
-        robot: The robot that carries the tool.
+        manifold: The manifold.
+        robot: The robot of the tool.
     """
     q, point = ca.SX.sym("q", robot.dimension), ca.SX.sym("point", manifold.layout.size)
     resting = [jets.constant(q[i], 1) for i in range(robot.dimension)]
@@ -200,23 +203,23 @@ def coordinate_function(manifold: PlaceManifold, robot: RobotModel) -> ca.Functi
 
 
 def run_watch(
-    scenario: ScenarioFile, end: WatchingEnd, port: int, tell: Callable[[str], None]
+    scenario: ScenarioFile, end: ObserverEndpoint, port: int, notify: Callable[[str], None]
 ) -> None:
-    """Watch a robot that another process drives by a scenario, until the person leaves.
+    """Monitor a robot driven by another process, until the person leaves.
 
     Args:
-        scenario: The scenario as read, the one that drives.
+        scenario: The scenario of the driving process.
         end: The link.
-        port: Port of the page; 0 for any that is free.
-        tell: Told in words what is prepared and happens.
+        port: Port of the page; 0 for any free port.
+        notify: Receives lines about progress and events.
 
     Raises:
-        InputError: If the scenario is wrong, the port is taken, or no robot tells its status.
+        InputError: If the scenario is wrong, the port is in use, or no status is received.
     """
-    settings = load_typed(Scenario, scenario.data, str(scenario.path))
+    settings = load_typed(Scenario, scenario.data, scenario.source)
     folder = scenario.path.parent
-    tell("preparing")
-    with naming(scenario.path):
+    notify("preparing")
+    with naming(scenario.source):
         settings, _ = driven(settings)
         station = build_station(settings, folder, remote=True)
         drawing = draw_station(settings, folder, station)
@@ -224,12 +227,12 @@ def run_watch(
 
     def scene(first: LiveFrame) -> Scene:
         return Scene(
-            lambda frame, meshcat: LiveView(station, drawing, frame, meshcat, _ARROW), first, tell
+            lambda frame, meshcat: LiveView(station, drawing, frame, meshcat, _ARROW), first, notify
         )
 
     with (
         closing(PageServer(port, pages, status.content)) as server,
-        noticed_interruption() as interrupted,
+        watch_interruption() as interrupted,
     ):
         panel = WatchPanel(pages)
         watch = Watch(station, scene, end, panel, status)
@@ -238,6 +241,6 @@ def run_watch(
                 f"no status of a robot on {end.dialect.status_channel} within {_FIRST:g} s; is its "
                 "driver running, on the same --lcm and --driver?"
             )
-        tell(f"open {server.url}")
+        notify(f"open {server.url}")
         while not (interrupted() or panel.has_left):
             watch.look(_FRAME)

@@ -1,1 +1,1 @@
-"""What a run gives: log, signals, metrics."""
+"""Results of a run: log, signals, metrics and figures."""

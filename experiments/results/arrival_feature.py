@@ -1,4 +1,4 @@
-"""Arrival of a motion: its share that is done at the end of a run.
+"""Arrival of a motion: completed share at the end of a run.
 
 Signals used, as in the log: ``eta``, ``eta_p`` [samples, k] m, ``time_lost`` [samples, 1] s,
 ``waiting_pace`` [samples, 1].
@@ -13,21 +13,21 @@ from experiments.results.run_log import RunLog
 from pfsc_drake.controller.tasks.task import Task
 from reporting.metrics import Metrics
 
-# m, that a tool which has arrived may be short of its goal
+# m, allowed distance from the goal of a tool that has arrived
 _SHORT = 5e-3
-# pace of a reference below which the tool waits
+# speed scaling of a reference below which the tool waits
 _WAITS = 0.1
-# samples by which the length of a motion is measured
+# samples for the length of a motion
 _SAMPLES = 2001
 
 
 def arrival_metrics(log: RunLog, task: Task, settings: Scenario) -> Metrics:
-    """Return the share of the requested motion that the tool has done, if it has one.
+    """Return the completed share of the requested motion, if there is one.
 
-    What is left is the reference's distance to go, by its own time where it waits for obstacles,
-    and how far the tool is from the reference; the latter does not count where the tool
-    complies along the path. It is a requirement of runs that are as long as their scenario, where
-    the motion ends within that time.
+    The remaining distance is the reference's distance to go, in its own time where it waits for
+    obstacles, plus the tool's distance from the reference; the latter does not count where the tool
+    complies along the path. The share is a requirement of runs with the scenario's full duration
+    whose motion ends within that time.
 
     Args:
         log: Log of a run.
@@ -64,8 +64,8 @@ def _distance(task: Task, begin: float) -> float:
     motion = task.motion
     assert motion is not None  # of a station's task
     times = np.linspace(max(begin, motion.domain[0]), motion.domain[1], _SAMPLES)
-    places = motion.derivatives(times, 0)[:, 0]
-    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    positions = motion.derivatives(times, 0)[:, 0]
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
 
 
 FEATURE = Feature(

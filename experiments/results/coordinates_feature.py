@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 
 MILLI = 1e3
 _LATE = 0.2  # s, at the end of a run
-_MOVING = 0.01  # m/s, from which on the tool counts as moving
-_SPACE = 3  # tangential coordinates of a tool that is guided freely
-FLOOR = 1e-9  # m or rad; zero has no place on a logarithmic axis
+_MOVING = 0.01  # m/s, least speed of a moving tool
+_SPACE = 3  # tangential coordinates of a freely guided tool
+FLOOR = 1e-9  # m or rad; a logarithmic axis cannot show zero
 _NAMES = {False: [r"$\eta$"], True: [r"$\eta_1$", r"$\eta_2$"]}
-SAME = 1e-6  # m; references nearer to each other are drawn as one
+SAME = 1e-6  # m; references closer to each other are drawn as one
 
 
 def acts_on_truth(station: Station, raw: Raw) -> bool:
-    """Return whether the coordinates of the law are those of the links as they really are.
+    """Return whether the law acts on the actual coordinates of the links.
 
     Args:
         station: The station.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     return not (station.law.linearization.manifold.follows_time or station.on_motors) and (
         measures_truth(station, raw)
@@ -45,26 +45,30 @@ def acts_on_truth(station: Station, raw: Raw) -> bool:
 
 
 def measures_truth(station: Station, raw: Raw) -> bool:
-    """Return whether joints, and the place of a workpiece, are known as they are.
+    """Return whether joints, and the pose of a workpiece, are known exactly.
 
     Args:
         station: The station.
-        raw: What it logged.
+        raw: Its logged signals.
     """
-    # of what another robot holds, the controller has a belief
+    # the controller knows a moving workpiece only by its nominal model
     measured = "joint_state_measured" in raw or "workpiece_motion" in raw
-    return not measured and station.part.belief.sees_truth
+    return not measured and station.part.nominal_model.has_actual_kinematics
 
 
 def add_coordinates(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add coordinates with rates, those that the law acted on where they differ, and references.
+    """Add actual coordinates with rates and references, and those of the law where they differ.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
-    law, linearization, place = station.law, station.law.linearization, station.task.place
+    law, linearization, manifold = (
+        station.law,
+        station.law.linearization,
+        station.task.projected_manifold,
+    )
     m, kinds = linearization.num_outputs, _kinds(station)
     Y = by_order(raw["law"][:, law.layout.manifold_state], m).copy()
     if not acts_on_truth(station, raw):
@@ -72,14 +76,14 @@ def add_coordinates(log: RunLog, station: Station, raw: Raw) -> None:
         if tracks:
             log.add("tracking_error", Y[:, 0, :3])
         else:
-            _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
-        # the orientation errors of trajectory tracking stay those from the moving reference
-        rotational = indices(place.coordinates, Kind.ROTATIONAL)
+            _add_law_coordinates(log, station, Y[:, 0], "M" if station.on_motors else "measured")
+        # in trajectory tracking, orientation errors remain relative to the moving reference
+        rotational = indices(manifold.coordinates, Kind.ROTATIONAL)
         keeps = tracks and rotational.stop > 0
         replaced = slice(0, rotational.start) if keeps else slice(None)
         Y[:, :2, replaced] = _true_output(station, raw)[:, : Y.shape[1], replaced]
-    log.add("theta", raw["true_points"][:, place.layout.theta])
-    log.add("alpha", raw["true_points"][:, place.layout.alpha])
+    log.add("theta", raw["true_points"][:, manifold.layout.theta])
+    log.add("alpha", raw["true_points"][:, manifold.layout.alpha])
     Y_p = by_order(raw["reference"], m)
     for kind, part, labels in kinds:
         name = kind.value
@@ -93,7 +97,7 @@ def add_coordinates(log: RunLog, station: Station, raw: Raw) -> None:
             log.add(f"{name}_d", raw["desired_reference"][:, :m][:, part], labels=own)
 
 
-def _add_seen(log: RunLog, station: Station, y: FloatArray, suffix: str) -> None:
+def _add_law_coordinates(log: RunLog, station: Station, y: FloatArray, suffix: str) -> None:
     """Add the coordinates that the law acted on, shape (samples, m)."""
     for kind, part, names in _kinds(station):
         if kind is Kind.ROTATIONAL and suffix == "M":
@@ -103,8 +107,8 @@ def _add_seen(log: RunLog, station: Station, y: FloatArray, suffix: str) -> None
 
 
 def _kinds(station: Station) -> list[tuple[Kind, slice, list[str]]]:
-    """Return the kinds of coordinates that there are, their columns, and their names."""
-    coordinates = station.task.place.coordinates
+    """Return the kinds of coordinates, their columns and names."""
+    coordinates = station.task.projected_manifold.coordinates
     parts = {kind: indices(coordinates, kind) for kind in Kind}
     names = {kind: [c.name for c in coordinates[part]] for kind, part in parts.items()}
     return [(kind, parts[kind], names[kind]) for kind in Kind if names[kind]]
@@ -121,9 +125,9 @@ def _true_output(station: Station, raw: Raw) -> FloatArray:
         return np.zeros((0, 2, linearization.num_outputs))
     if "workpiece_motion" in raw:
         points = np.hstack([points, raw["workpiece_motion"]])
-    carried = station.holder is not None or station.turntable is not None
-    place = linearization.manifold if carried else station.task.place
-    function = virtual_output_function(station.robot, place).map(len(points))
+    moves = station.holder is not None or station.turntable is not None
+    manifold = linearization.manifold if moves else station.task.projected_manifold
+    function = virtual_output_function(station.robot, manifold).map(len(points))
     state = raw["joint_state"].T
     Y = np.array(function(state[:n], state[n : 2 * n], points.T))
     return Y.T.reshape(len(points), 2, linearization.num_outputs)
@@ -132,13 +136,13 @@ def _true_output(station: Station, raw: Raw) -> FloatArray:
 def path_following_metrics(
     log: RunLog, settling_tolerance: float, converged_after: float, min_speed: float
 ) -> Metrics:
-    """Return the metrics of following that the log has signals for.
+    """Return the path following metrics whose signals the log has.
 
     Args:
         log: Log of a run.
-        settling_tolerance: Distance from the path that counts as converged [m].
-        converged_after: Time from which on deviations count [s].
-        min_speed: Speed from which on the tool counts as moving [m/s].
+        settling_tolerance: Distance from the path of a converged tool [m].
+        converged_after: Time from which deviations count [s].
+        min_speed: Least speed of a moving tool [m/s].
     """
     metrics, counts = Metrics(), log.time >= converged_after
     if "xi" in log:
@@ -154,7 +158,7 @@ def path_following_metrics(
         metrics.add("static_path_deviation", np.mean(distance[late]))
     if "xi_d" in log:
         off = np.linalg.norm(log["xi"].values - log["xi_p"].values, axis=1)
-        # what rests because its sensor was never tared does not comply
+        # without a tared sensor the reference does not comply
         tared = "tared" not in log or log["tared"].values.any()
         metrics.add("max_error_from_compliant_reference", peak(off[counts]) if tared else math.nan)
     if "xi_M" in log:
@@ -162,7 +166,7 @@ def path_following_metrics(
     if "phi" in log:
         metrics.add("max_orientation_error", peak(log.norm("phi")[counts]))
     if "eta" in log:
-        # what a hand guides freely has no reference
+        # a freely guided tool has no reference
         error = tangential_error(log) if "eta_p" in log else math.nan
         metrics.add("max_tangential_error", error)
     if "eta_dot" in log:
@@ -171,7 +175,7 @@ def path_following_metrics(
 
 
 def settling_time(log: RunLog, tolerance: float) -> float:
-    """Return the time from which on |xi| stays at or below a tolerance [m], in s.
+    """Return the time after which |xi| remains at or below a tolerance [m], in s.
 
     NaN if the last sample is still outside (NaN in the signal counts as outside).
     """
@@ -187,7 +191,7 @@ def tangential_error(log: RunLog, t: float = -math.inf) -> float:
 
 
 def draw_progress(log: RunLog) -> style.Drawing | None:
-    """Tangential coordinates with references, errors, how far they yield, and the speed."""
+    """Draw tangential coordinates, references, errors, compliant displacement and speed."""
     eta = log["eta"].values
     if eta.shape[1] >= _SPACE:
         return None
@@ -199,7 +203,7 @@ def draw_progress(log: RunLog) -> style.Drawing | None:
         desired = log["eta_d"].values
         desired = desired if style.largest(reference - desired) > SAME else None
     shown = []
-    # of each panel below: values, label of its axis, title, colour on a path, words of the caption
+    # each panel below: values, axis label, title, colour on a path, part of the caption
     rows: list[tuple[FloatArray, str, str, int, str]] = []
     if reference is not None:
         shown.append("their references" if on_surface else "its reference")
@@ -208,9 +212,9 @@ def draw_progress(log: RunLog) -> style.Drawing | None:
         error = scale * (eta - reference)
         rows.append((error, f"error in {unit}", title, 1, "the error between them"))
     if reference is not None and desired is not None:
-        title = r"How far the reference yields $\eta^p - \eta^d$"
-        words = "how far the reference yields to forces"
-        rows.append((MILLI * (reference - desired), "way in mm", title, 2, words))
+        title = r"Displacement of the compliant reference $\eta^p - \eta^d$"
+        words = "displacement of the compliant reference by forces"
+        rows.append((MILLI * (reference - desired), "displacement in mm", title, 2, words))
     if "eta_dot" in log:
         title = rf"Speed {where} $\dot\eta$"
         rows.append((log["eta_dot"].values, "speed in m/s", title, 0, "the speed"))
@@ -231,7 +235,7 @@ def draw_progress(log: RunLog) -> style.Drawing | None:
         panel.set(ylabel=ylabel, title=title)
         shown.append(words)
     shade_pushes([position, *further], log)
-    style.place_legend(position)
+    style.add_legend(position)
     *first, last = ["Tangential coordinates" if on_surface else "Tangential coordinate", *shown]
     separator = ", and " if len(first) > 1 else " and "
     caption = f"{', '.join(first)}{separator}{last}." if first else f"{last}."
@@ -239,7 +243,7 @@ def draw_progress(log: RunLog) -> style.Drawing | None:
 
 
 def draw_transversal(log: RunLog) -> style.Drawing:
-    """Transversal coordinates with references, the error or an enlargement, and log distances."""
+    """Draw transversal coordinates with references, errors or an enlargement, and distances."""
     xi = log["xi"].values
     compliant = is_used(log, "xi_p")
     canvas, panels = style.make_panels(3 if compliant or style.is_dwarfed(log.time, xi) else 2)
@@ -253,7 +257,7 @@ def draw_transversal(log: RunLog) -> style.Drawing:
         title = r"Error from the reference $\xi - \xi^p$"
         draw_enlarged(panels[1], log.time, error, "m", labels, title)
     elif len(panels) == 3:
-        draw_enlarged(panels[1], log.time, xi, "m", labels, "The same")
+        draw_enlarged(panels[1], log.time, xi, "m", labels, "Enlarged")
     distances = {r"$\|\xi\|$": xi}
     for name, label in (("xi_M", r"of the motors $\|\xi_M\|$"), ("xi_measured", "as measured")):
         if name in log:
@@ -263,32 +267,32 @@ def draw_transversal(log: RunLog) -> style.Drawing:
     panels[-1].set(ylabel="distance in mm")
     draw_sizes(panels[-1], log.time, distances, f"Distance from the {where}")
     shade_pushes(panels, log)
-    style.place_legend(panels[0])
+    style.add_legend(panels[0])
     caption = (
-        f"{subject}, enlarged where the start dwarfs the rest, and the distance from"
-        f" the {where} on a logarithmic scale."
+        f"{subject}, enlarged if the initial error dominates, and distance from the {where}"
+        " on a logarithmic scale."
         if error is None
-        else f"{subject} over the reference that yields to forces (broad), what lies"
-        " between the two, and the distances on a logarithmic scale."
+        else f"{subject} over the compliant reference (broad), the error between them,"
+        " and the distances on a logarithmic scale."
     )
     return style.Drawing("transversal", f"Deviation from the {where}", caption, canvas)
 
 
 def is_used(log: RunLog, reference: str) -> bool:
-    """Whether a reference is in the log and anywhere other than zero, but for rounding."""
+    """Return whether the log has a reference that differs from zero by more than rounding."""
     return reference in log and style.largest(log[reference].values) > FLOOR
 
 
 def draw_with_references(
     panel: "Axes", log: RunLog, name: str, symbol: str, labels: list[str]
 ) -> FloatArray | None:
-    """Draws a coordinate over the references that are not zero.
+    """Draw a coordinate over the references that are not zero.
 
     Args:
-        panel: Where to draw, in thousandths of the log's unit.
+        panel: The panel, in thousandths of the log's unit.
         log: With signal ``name``, perhaps ``name_p`` and ``name_d``.
         name: Name of the coordinate.
-        symbol: The same in TeX.
+        symbol: Its symbol in TeX.
         labels: One per component.
 
     Returns:
@@ -314,7 +318,7 @@ def draw_with_references(
 def draw_enlarged(
     panel: "Axes", time: FloatArray, values: FloatArray, unit: str, labels: list[str], title: str
 ) -> None:
-    """Draws components scaled to the last three quarters of the run, and says so if it matters."""
+    """Draw components scaled to the last three quarters of the run, and note it in the title."""
     scale, shown_unit = style.fitting_unit(values[style.late_samples(time)], unit)
     panel.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
     style.draw_components(panel, time, scale * values, labels)
@@ -325,13 +329,13 @@ def draw_enlarged(
 
 
 def draw_sizes(panel: "Axes", time: FloatArray, vectors: dict[str, FloatArray], title: str) -> None:
-    """Norms, in thousandths, on a logarithmic scale; the title names one, a legend several."""
+    """Draw norms, in thousandths, on a logarithmic scale; the title names one, a legend several."""
     panel.set_title(title if len(vectors) > 1 else f"{title} {next(iter(vectors))}")
     for (label, values), colour in zip(vectors.items(), (style.INK, *style.COLOURS), strict=False):
         norm = MILLI * np.maximum(np.linalg.norm(values, axis=1), FLOOR)
         panel.semilogy(time, norm, color=colour, linewidth=1.2, label=label)
     if len(vectors) > 1:
-        style.place_legend(panel)
+        style.add_legend(panel)
 
 
 FEATURE = Feature(

@@ -1,4 +1,4 @@
-"""Law and drives: virtual input, faults, torques, and how often drives are at a limit.
+"""Law and drives: virtual input, faults, torques and saturation.
 
 Signals used, as in the log: ``tau_d`` [samples, axes] with attribute ``limits``,
 ``saturated_drives`` and ``fault`` [samples, 1].
@@ -17,32 +17,33 @@ from experiments.results.joints_feature import axis_labels, draw_limit, nears_li
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.supervision import DRIVE_MEMORY
+from pfsc_drake.robot.coordinate_text import eta_text
 from reporting import style
 from reporting.metrics import Metrics
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SATURATION_MARGIN = 1e-9  # relative; a clipped command equals the limit up to rounding
-PEAK_RATIO = 4.0  # first peak to the rest of the run, from which on the rest is drawn enlarged
+SATURATION_MARGIN = 1e-9  # relative; a saturated command equals the limit up to rounding
+PEAK_RATIO = 4.0  # first peak to the rest of the run, above which the rest is drawn enlarged
 EFFORTS = {"Nm": "torque", "N": "force"}
 _EFFORT_TITLES = {"Nm": "torques", "N": "forces"}
 _TITLES = {"eta": "Tangential", "xi": "Transversal", "phi": "Rotational"}
 _SYMBOLS = {"eta": r"\eta", "xi": r"\xi", "phi": r"\phi"}
-_DWARFED = 4.0  # by how much the start has to be larger than the rest to be cut off
+_DWARFED = 4.0  # ratio of the initial peak to the rest, above which the peak is cut off
 
 
 def add_drives(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add what the law commands, how it judges itself, and torques of drives and transmissions.
+    """Add commands and status of the law, and torques of drives and transmissions.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     law, layout, degree = raw["law"], station.law.layout, station.law.linearization.relative_degree
     faults = [fault.name.lower() for fault in Fault]
-    names = [f"v_{coordinate.name}" for coordinate in station.task.place.coordinates]
+    names = [f"v_{coordinate.name}" for coordinate in station.task.projected_manifold.coordinates]
     log.add("virtual_input", law[:, layout.virtual_input], f"SI/s^{degree}", names)
     fault, rcond, saturated = law[:, layout.status].T[:3]
     log.add("fault", fault.astype(int), labels=faults)
@@ -51,7 +52,7 @@ def add_drives(log: RunLog, station: Station, raw: Raw) -> None:
     requested = raw["stop_category"]
     if "servo_stop_category" in raw:
         requested = np.hstack([requested, raw["servo_stop_category"]])
-    # the lowest category is the most urgent, and below 0 there is none
+    # the lowest category is the most urgent; negative for none
     urgent = np.where(requested < 0.0, np.inf, requested).min(axis=1)
     log.add("stop_category", np.where(np.isfinite(urgent), urgent, -1.0).astype(int))
     if degree > 1:
@@ -69,7 +70,7 @@ def add_drives(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def drive_metrics(log: RunLog) -> Metrics:
-    """Return torques of the drives and how often they are at their limits, if they are logged.
+    """Return peak torques and saturation of the drives, if they are logged.
 
     Args:
         log: Log of a run.
@@ -88,7 +89,7 @@ def drive_metrics(log: RunLog) -> Metrics:
 
 
 def _requirements(settings: Scenario) -> dict[str, Target]:
-    """Require fewer reversals than the supervision takes for chatter."""
+    """Require fewer reversals than the supervision's threshold for chatter."""
     turns = settings.faults.chatter_turns
     return (
         {"limit_reversals": Target(f"< {turns:g}", "faults.chatter_turns")} if turns > 0.0 else {}
@@ -96,7 +97,7 @@ def _requirements(settings: Scenario) -> dict[str, Target]:
 
 
 def peak_torque(log: RunLog) -> FloatArray:
-    """Largest magnitude of the drive torque of each axis.
+    """Return the largest drive torque of each axis.
 
     Args:
         log: With ``tau_d``.
@@ -109,7 +110,7 @@ def peak_torque(log: RunLog) -> FloatArray:
 
 
 def saturation_count(log: RunLog) -> int:
-    """Number of samples at which the law or a drive is at a limit, see :func:`is_saturated`.
+    """Return the number of samples with saturation, see :func:`is_saturated`.
 
     Args:
         log: Log of the run.
@@ -121,7 +122,7 @@ def saturation_count(log: RunLog) -> int:
 
 
 def saturation_warnings(log: RunLog) -> list[str]:
-    """Return what there is to say about drives at their limits, one sentence each.
+    """Return warnings about saturated drives, one sentence each.
 
     Args:
         log: As for :func:`is_saturated`.
@@ -134,19 +135,19 @@ def saturation_warnings(log: RunLog) -> list[str]:
     where = ""
     if "eta" in log:
         eta = log["eta"].values[int(saturated.argmax())]
-        where = f", eta = {', '.join(f'{x:.3g}' for x in eta)} m"
+        where = f", {eta_text(eta, digits=3)}"
     return [
-        f"drives were at a limit in {count} samples, {100.0 * count / saturated.size:.2g} % of "
-        f"the run, first at {first:.3f} s{where}: while they are, nothing that the law promises "
-        "holds"
+        f"drives were saturated in {count} samples, {100.0 * count / saturated.size:.2g} % of "
+        f"the run, first at {first:.3f} s{where}: meanwhile the properties of the control law do "
+        "not hold"
     ]
 
 
 def limit_reversals(log: RunLog) -> float:
-    """Return the most turns of any drive's torque from limit to limit, while there is no fault.
+    """Return the largest number of reversals of a drive's torque between its limits, without fault.
 
-    As :class:`~pfsc_drake.control.law.supervision.DriveWatch` counts what the law commands, with
-    the same forgetting; here it is what drives apply, also behind velocity servos.
+    The count follows :class:`~pfsc_drake.control.law.supervision.DriveWatch` with the same decay,
+    applied to the torques of the drives, also of velocity servos, instead of commands.
 
     Args:
         log: With ``tau_d``, its limits, and ``fault``.
@@ -166,31 +167,30 @@ def limit_reversals(log: RunLog) -> float:
 
 
 def is_saturated(log: RunLog) -> np.ndarray:
-    """Return at which samples the law or a drive is at a limit, shape (samples,).
+    """Return the samples at which the law or a drive is saturated, shape (samples,).
 
-    That is, while there is no fault the law asks of a drive more than it may: torque, or with
-    velocity servos speed (``saturated_drives``); or the torque of a drive is at its limit,
-    whoever commands it: the law, a servo, or the safe state after a fault.
+    Either the law requests, without a fault, more than the limit of a drive: torque, or speed of
+    velocity servos (``saturated_drives``); or the torque of a drive is at its limit, commanded by
+    the law, a servo or the safe state after a fault.
 
     Args:
-        log: With ``tau_d`` and its ``limits``, or ``saturated_drives`` with ``fault``, or both;
-            nothing of the others counts.
+        log: With ``tau_d`` and its ``limits``, or ``saturated_drives`` with ``fault``, or both.
     """
     saturated = np.zeros(log.time.size, dtype=bool)
     if "tau_d" in log and (signal := log["tau_d"]).limits is not None:
         at_limit = np.abs(signal.values) >= signal.limits * (1.0 - SATURATION_MARGIN)
         saturated |= np.any(at_limit, axis=1)
     if "saturated_drives" in log:
-        asked = log["saturated_drives"].values[:, 0] > 0
+        requested = log["saturated_drives"].values[:, 0] > 0
         # after a fault the drives do not follow the law
-        saturated |= asked & (log["fault"].values[:, 0] == Fault.NONE)
+        saturated |= requested & (log["fault"].values[:, 0] == Fault.NONE)
     return saturated
 
 
 def draw_efforts(log: RunLog) -> style.Drawing:
-    """Drive torques or forces, three axes per panel, with limits near enough to matter (dashed).
+    """Draw drive torques or forces, three axes per panel, with nearby limits (dashed).
 
-    Where a short peak flattens everything else, a second panel shows the rest enlarged.
+    If a short peak dominates, a second panel shows the rest enlarged.
     """
     signal = log["tau_d"]
     title = f"Drive {_EFFORT_TITLES.get(signal.unit, 'torques and forces')}"
@@ -198,35 +198,35 @@ def draw_efforts(log: RunLog) -> style.Drawing:
     dwarfed = [style.is_dwarfed(log.time, signal.values[:, group], PEAK_RATIO) for group in groups]
     canvas, panels = style.make_panels(len(groups) + sum(dwarfed), height=2.6)
     labels = axis_labels(signal.dim)
-    places = iter(panels)
+    free = iter(panels)
     for group, enlarge in zip(groups, dwarfed, strict=True):
-        panel = next(places)
+        panel = next(free)
         _draw_group(panel, log, group, labels)
         axes = f"axes {group[0] + 1} to {group[-1] + 1}" if len(group) > 1 else labels[group[0]]
         panel.set(ylabel=effort_label(signal.unit), title=f"{title}, {axes}")
-        style.place_legend(panel)
+        style.add_legend(panel)
         if enlarge:
-            panel = next(places)
+            panel = next(free)
             values = signal.values[:, group]
             for axis in group:
                 panel.plot(log.time, signal.values[:, axis], color=f"C{axis}")
             style.scale_to_late(panel, log.time, values)
-            enlarged = "The same, scaled to the last three quarters"
+            enlarged = "Scaled to the last three quarters"
             panel.set(ylabel=effort_label(signal.unit), title=enlarged)
     caption = f"{title.removeprefix('Drive ').capitalize()} of the drives"
     limited = any(nears_limit(signal, axis) for axis in range(signal.dim))
-    caption += "; dashed lines are limits within reach." if limited else "."
+    caption += "; dashed: limits within reach." if limited else "."
     name = title.lower().replace(" ", "_")
     return style.Drawing(name, title, caption, canvas)
 
 
 def effort_label(unit: str) -> str:
-    """Label of an axis, in two lines where drives are of both kinds."""
+    """Return the label of an axis, in two lines for drives of both kinds."""
     return f"{EFFORTS[unit]} in {unit}" if unit in EFFORTS else f"torque or force\nin {unit}"
 
 
 def _draw_group(panel: "Axes", log: RunLog, group: range, labels: list[str]) -> None:
-    """The torques or forces of some axes with their limits."""
+    """Draw the torques or forces of some axes with their limits."""
     signal = log["tau_d"]
     for axis in group:
         colour = f"C{axis}"
@@ -235,10 +235,10 @@ def _draw_group(panel: "Axes", log: RunLog, group: range, labels: list[str]) -> 
 
 
 def draw_virtual_input(log: RunLog) -> style.Drawing | None:
-    """Virtual input v of the law (Fig. 3.6 c, 4.4 c), a panel for each kind of coordinates.
+    """Draw virtual input v of the law (Fig. 3.6 c, 4.4 c), a panel for each kind of coordinates.
 
     Args:
-        log: With ``virtual_input``, whose labels are those of the coordinates after ``v_``.
+        log: With ``virtual_input``, labelled by ``v_`` and the coordinate.
     """
     signal = log["virtual_input"]
     kinds = [name for name in _TITLES if name in log]
@@ -259,23 +259,23 @@ def draw_virtual_input(log: RunLog) -> style.Drawing | None:
         panel.set(ylabel=f"$v$ in {unit}", title=title)
     shade_pushes(panels, log)
     for panel in panels:
-        style.place_legend(panel)
+        style.add_legend(panel)
     order = signal.unit.rpartition("^")[2]
     word = {"1": "first", "2": "second", "3": "third", "4": "fourth"}[order]
     caption = (
-        f"What the law asks of the {word} time derivatives of the coordinates: that of the"
-        " reference, less what errors and their integrals are fed back with."
+        f"Desired {word} time derivatives of the coordinates: derivatives of the reference minus"
+        " feedback of errors and their integrals."
     )
     return style.Drawing("virtual_input", "Virtual input of the law", caption, canvas)
 
 
 def _symbol(kind: str, label: str) -> str:
-    """Symbol of a component, of a coordinate like ``xi_1``."""
+    """Return the symbol of a component for a coordinate such as ``xi_1``."""
     return f"$v_{{{_SYMBOLS[kind]}{label.removeprefix(kind)}}}$"
 
 
 def _written(unit: str, coordinate: str) -> str:
-    """Unit of a derivative, ``SI/s^2``, in that of its coordinate, for an axis."""
+    """Return the unit of a derivative, ``SI/s^2``, with the unit of its coordinate."""
     base, _, order = unit.replace("SI", coordinate).partition("^")
     return base if order == "1" else f"{base}$^{order}$"
 

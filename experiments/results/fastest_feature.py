@@ -1,4 +1,4 @@
-"""Reference that is planned for the drives: slowed where they need it, or the fastest."""
+"""Reference planned for the drives: slowed down where required, or time-optimal."""
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from reporting.metrics import Metrics
 
 
 def add_limits(log: RunLog, plan: DrivePlan) -> None:
-    """Add how fast a planned motion is, and what of each limit it takes.
+    """Add the speed of a planned motion, and its share of each limit.
 
     Args:
         log: Log of the run.
-        plan: Plan of its reference, the fastest.
+        plan: Plan of its time-optimal reference.
     """
     limiting = plan.limiting
     assert limiting is not None  # it is the fastest
@@ -29,23 +29,23 @@ def add_limits(log: RunLog, plan: DrivePlan) -> None:
 
 
 def fastest_metrics(plan: DrivePlan) -> Metrics:
-    """Return how long the fastest motion takes, and on what share of the way each limit is at work.
+    """Return the duration of the fastest motion, and shares of the path by active limit.
 
     Args:
-        plan: The plan of a reference; others than the fastest have none.
+        plan: Plan of the reference; only the fastest has these metrics.
     """
     metrics, limiting = Metrics(), plan.limiting
     if limiting is None:
         return metrics
     steps = np.diff(plan.times, append=plan.times[-1])
     metrics.add("fastest_time", float(steps[plan.speed > 0.0].sum()))
-    for name, part in limiting.of_the_way(plan.speed * steps).items():
+    for name, part in limiting.path_shares(plan.speed * steps).items():
         metrics.add(f"limited_by_{name}", part)
     return metrics
 
 
-def given_metrics(log: RunLog, plan: DrivePlan | None) -> Metrics:
-    """Return what drives gave for the fastest motion, to be compared with what was planned.
+def applied_torque_metrics(log: RunLog, plan: DrivePlan | None) -> Metrics:
+    """Return the drives' torques in the fastest motion, for comparison with the plan.
 
     Args:
         log: Log of a run.
@@ -69,26 +69,26 @@ def given_metrics(log: RunLog, plan: DrivePlan | None) -> Metrics:
 
 
 def rate_warnings(log: RunLog, plan: DrivePlan | None, reference: ReferenceParameters) -> list[str]:
-    """Return a sentence if commanded torques changed faster than the fastest motion may ask for.
+    """Return a warning if commanded torques changed faster than the plan's limit.
 
     Args:
         log: Log of a run.
         plan: Plan of its reference.
-        reference: What was asked of it.
+        reference: Parameters of the reference.
     """
     if plan is None or plan.limiting is None or "tau_d" not in log or log.time.size < 2:
         return []
     torque, n = log["tau_d"], len(plan.limits) // 2
     allowed = torque_rates(reference.torque_rate, plan.limits[:n])
-    given, planned = (rates.max(axis=0) for rates in (_rates(log, torque), _planned(log, plan)))
-    i = int(np.argmax(given / allowed))
-    if not given[i] > allowed[i]:
+    applied, planned = (rates.max(axis=0) for rates in (_rates(log, torque), _planned(log, plan)))
+    i = int(np.argmax(applied / allowed))
+    if not applied[i] > allowed[i]:
         return []
     return [
-        f"the commanded torque of axis {i + 1} changes by up to {given[i]:,.0f} {torque.unit}/s, "
-        f"planned {planned[i]:,.0f}, allowed {allowed[i]:,.0f} (reference.torque_rate): the rest "
-        "is feedback, noise of encoders and compensated friction; a drive that limits the rate "
-        "follows less well; a larger reference.reserve leaves more for it"
+        f"the commanded torque of axis {i + 1} changes by up to {applied[i]:,.0f} {torque.unit}/s, "
+        f"planned {planned[i]:,.0f}, allowed {allowed[i]:,.0f} (reference.torque_rate): the "
+        "difference is feedback, encoder noise and compensated friction; a drive with a rate limit "
+        "tracks less accurately; a larger reference.reserve leaves a larger margin"
     ]
 
 
@@ -106,22 +106,22 @@ def _planned(log: RunLog, plan: DrivePlan) -> FloatArray:
 
 
 def plan_metrics(plan: DrivePlan | None) -> Metrics:
-    """Return the shares of the drives' limits that a reference takes, and how it was slowed.
+    """Return a reference's share of the drives' limits, and its speed scaling.
 
     Args:
-        plan: Plan of the reference; None where nobody planned it.
+        plan: Plan of the reference, or None.
     """
     metrics = Metrics()
     if plan is None or not len(plan.times):
         return metrics
     joints = len(plan.limits) // 2
     metrics.update(fastest_metrics(plan))
-    shares = {"planned" if plan.limiting else "asked": plan.asked}
+    shares = {"planned" if plan.limiting else "asked": plan.requested_demand}
     if plan.is_slowed:
         shares["planned"] = plan.demand
-        metrics.add("slowest_pace", float(plan.pace.min()))
+        metrics.add("slowest_pace", float(plan.speed_scaling.min()))
         metrics.add("waiting_time", float(plan.waiting_time))
-    # drives whose limits nobody knows have no share of them
+    # drives without known limits have no share of them
     limited = np.isfinite(plan.limits[:joints]).any()
     for name, demand in shares.items() if limited else ():
         share = np.max(np.abs(demand[:, :joints]) / plan.limits[:joints])
@@ -130,12 +130,12 @@ def plan_metrics(plan: DrivePlan | None) -> Metrics:
 
 
 def _add_plan(log: RunLog, station: Station, _raw: Raw) -> None:
-    """Add how the reference was chosen for the drives, and what was expected of them."""
+    """Add speed scaling or limits of the planned reference, and the planned torques."""
     plan, n = station.task.drive_plan, station.robot.dimension
     if plan is None or not (plan.is_slowed or plan.limiting):
         return
     if plan.limiting is None:
-        log.add("pace", np.interp(log.time, plan.times, plan.pace))
+        log.add("pace", np.interp(log.time, plan.times, plan.speed_scaling))
     else:
         add_limits(log, plan)
     expected = [np.interp(log.time, plan.times, torque) for torque in plan.demand[:, :n].T]
@@ -143,7 +143,7 @@ def _add_plan(log: RunLog, station: Station, _raw: Raw) -> None:
 
 
 def draw_fastest(log: RunLog) -> style.Drawing:
-    """Speed of the fastest motion over the way, coloured by its limit; how near each of them is.
+    """Draw the speed of the fastest motion over the path, coloured by active limit, and all shares.
 
     Args:
         log: With ``speed_planned``, ``limited_by`` and ``limit_shares``.
@@ -151,68 +151,70 @@ def draw_fastest(log: RunLog) -> style.Drawing:
     speed, shares = log["speed_planned"].values[:, 0], log["limit_shares"]
     limits = log["limited_by"]
     number = limits.values[:, 0].astype(int)
-    way = np.concatenate([[0.0], np.cumsum(np.diff(log.time) * (speed[1:] + speed[:-1]) / 2.0)])
+    travel = np.concatenate([[0.0], np.cumsum(np.diff(log.time) * (speed[1:] + speed[:-1]) / 2.0)])
     canvas, panels = style.make_panels(2)
     upper, lower = panels
-    upper.plot(way, speed, color=style.REFERENCE, linewidth=0.8)
+    upper.plot(travel, speed, color=style.REFERENCE, linewidth=0.8)
     moving = speed > 0.0
     for k, value in enumerate(np.unique(number[moving & (number > 0)])):
         there = moving & (number == value)
         name = limits.labels[value].replace("_", " ")
         colour = f"C{k}"
-        upper.plot(way, np.where(there, speed, np.nan), color=colour, linewidth=2.6, label=name)
-    upper.set(ylabel="speed in m/s", ylim=(0.0, None), title="Speed, by what limits it")
-    style.place_legend(upper)
+        upper.plot(travel, np.where(there, speed, np.nan), color=colour, linewidth=2.6, label=name)
+    upper.set(ylabel="speed in m/s", ylim=(0.0, None), title="Speed by active limit")
+    style.add_legend(upper)
     for k, name in enumerate(shares.labels):
         taken = shares.values[:, k]
         if taken[moving].max(initial=0.0) > 0.0:
-            lower.plot(way[moving], taken[moving], color=f"C{k}", label=name)
+            lower.plot(travel[moving], taken[moving], color=f"C{k}", label=name)
     lower.set(
-        xlabel="way along the reference in m",
-        ylabel="taken / allowed",
+        xlabel="distance along the reference in m",
+        ylabel="used / allowed",
         ylim=(0.0, 1.1),
-        title="Largest share of what is allowed",
+        title="Largest share of each limit",
     )
-    style.place_legend(lower)
+    style.add_legend(lower)
     caption = (
-        "Speed of the reference along its way. Colours: the limit of a drive, as it is believed, "
-        "that allows no more: its torque, its joint's speed or the rate of its torque; or the "
-        "largest velocity of the tool. Below: what the motion takes of each kind of limit."
+        "Speed of the reference along the path. Colours: active limit of the nominal model: torque "
+        "of a drive, speed of its joint, rate of its torque, or largest speed of the tool. Below: "
+        "share of each kind of limit used by the motion."
     )
     return style.Drawing("fastest", "The fastest motion and its limits", caption, canvas)
 
 
-def draw_pace(log: RunLog) -> style.Drawing:
-    """Pace of the reference, and what the drives were expected to give and gave."""
+def draw_speed_scaling(log: RunLog) -> style.Drawing:
+    """Draw the speed scaling of the reference, and planned and applied drive torques."""
     limits = log["tau_d"].limits
-    assert limits is not None  # a pace is chosen for limits
-    planned, given = (
+    assert limits is not None  # a speed scaling requires limits
+    planned, applied = (
         np.max(np.abs(log[name].values) / limits, axis=1) for name in ("tau_planned", "tau_d")
     )
-    pace = log["pace"].values[:, 0]
+    scaling = log["pace"].values[:, 0]
     canvas, panels = style.make_panels(2)
-    panels[0].plot(log.time, pace, color="C0")
-    panels[0].set(ylabel="speed / speed asked for", ylim=(0.0, 1.05), title="Pace")
-    panels[1].plot(log.time, given, color="C1", label="given")
-    panels[1].plot(log.time, planned, "--", color=style.REFERENCE, label="expected beforehand")
-    panels[1].set(ylabel="torque / limit", ylim=(0.0, None), title="Largest share of a drive")
-    style.place_legend(panels[1])
-    caption = (
-        f"The reference is slowed to {pace.min():.2g} of the speed asked for where a drive would "
-        "not have kept up; the largest share of its limit that any drive was expected to give, "
-        "and gave."
+    panels[0].plot(log.time, scaling, color="C0")
+    panels[0].set(ylabel="speed / requested speed", ylim=(0.0, 1.05), title="Speed scaling")
+    panels[1].plot(log.time, applied, color="C1", label="applied")
+    panels[1].plot(log.time, planned, "--", color=style.REFERENCE, label="planned")
+    panels[1].set(
+        ylabel="torque / limit", ylim=(0.0, None), title="Largest share of a drive's torque limit"
     )
-    return style.Drawing("pace", "Pace of the reference", caption, canvas)
+    style.add_legend(panels[1])
+    caption = (
+        f"The reference is slowed down to {scaling.min():.2g} of the requested speed where a drive "
+        "would exceed its limits. Below: largest planned and applied torque relative to a drive's "
+        "limit."
+    )
+    return style.Drawing("pace", "Speed scaling of the reference", caption, canvas)
 
 
 FEATURE = Feature(
     signals=_add_plan,
     metrics=lambda log, station, settings: (
-        plan_metrics(station.task.drive_plan) | given_metrics(log, station.task.drive_plan)
+        plan_metrics(station.task.drive_plan) | applied_torque_metrics(log, station.task.drive_plan)
     ),
     known=lambda station, settings: plan_metrics(station.task.drive_plan),
     warnings=lambda log, station, settings: rate_warnings(
         log, station.task.drive_plan, settings.reference
     ),
-    figures={"pace": draw_pace, "fastest": draw_fastest},
+    figures={"pace": draw_speed_scaling, "fastest": draw_fastest},
 )

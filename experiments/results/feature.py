@@ -1,4 +1,4 @@
-"""A feature of runs: what is logged of it, measured, required, reported and drawn."""
+"""Features of runs: their signals, metrics, requirements, warnings and figures."""
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
@@ -20,23 +20,20 @@ Raw = Mapping[str, FloatArray]
 
 @dataclass(frozen=True)
 class Feature:
-    """A feature that a run may have; what it does not have adds nothing.
+    """Optional feature of a run; without its signals it adds nothing.
 
-    All of a feature stands in one file, which ends with its record, and ``features.FEATURES`` lists
-    the records. Units and sentences of signals, metrics and figures are rows of
-    ``reporting/registry.toml``.
+    Each feature has one file, which ends with its record; ``features.FEATURES`` lists the records.
+    Units and sentences of signals, metrics and figures are rows of ``reporting/registry.toml``.
 
     Attributes:
-        signals: Adds signals to the log of a station from what the station logged.
+        signals: Adds signals to the log of a run from a station's logged signals.
         metrics: Returns metrics of a log, its station, and its scenario.
-        requirements: Returns targets of metrics that every run of a scenario has, by name.
-        always: Metrics with targets that hold at every instant, so that a run that was cut short
-            is judged by them, too.
-        known: Returns what metrics may need, beside signals that the station logs: properties of
-            a run, metrics known beforehand, signals of another choice of options.
-        warnings: Returns what may not have gone as well as hoped, one sentence each.
-        figures: Draws each figure of a log that has the signals for it; None where it is not worth
-            a look.
+        requirements: Returns targets of metrics that apply to every run of a scenario, by name.
+        always: Metrics with targets at every instant, which also apply to an incomplete run.
+        known: Returns further inputs of metrics: properties of a run, metrics known before it,
+            signals with other options.
+        warnings: Returns warnings, one sentence each.
+        figures: Draws each figure whose signals the log has; None for one without information.
     """
 
     signals: Callable[[RunLog, Station, Raw], None] = lambda log, station, raw: None
@@ -51,9 +48,9 @@ class Feature:
 
 
 def converged_after(settings: Scenario, log: RunLog) -> float:
-    """Return the time from which deviations count [s]: until then the tool comes to the path.
+    """Return the time from which deviations count [s], after the approach to the path.
 
-    Where it waits for obstacles its approach waits, too, by the time that is lost.
+    The approach is extended by the time of waiting for obstacles.
 
     Args:
         settings: Scenario of the run.

@@ -1,4 +1,4 @@
-"""The features of runs: a list, and the figures that they draw."""
+"""List of the features of runs, and their figures."""
 
 from collections.abc import Iterator, Sequence
 
@@ -68,25 +68,25 @@ FEATURES = [module.FEATURE for module in _MODULES]
 def render_figures(
     log: RunLog, outline: Sequence[FloatArray], fit: Residuals | None = None
 ) -> list[style.Figure]:
-    """Return all figures that a log has signals for, in the order of the report.
+    """Return all figures whose signals a log has, in the order of the report.
 
     Args:
         log: Log of a run.
-        outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
+        outline: Lines that show the path or surface, each [k, 3] m, in the frame of ``y_t``.
         fit: Residuals of the points that a surface was fitted to, if it was.
     """
-    with style.styled():
+    with style.project_style():
         return [style.render(drawing) for drawing in draw_figures(log, outline, fit)]
 
 
 def draw_figures(
     log: RunLog, outline: Sequence[FloatArray], fit: Residuals | None = None
 ) -> Iterator[style.Drawing]:
-    """Draw all figures that a log has signals for, one after the other.
+    """Draw all figures whose signals a log has, one after the other.
 
     Args:
         log: Log of a run.
-        outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
+        outline: Lines that show the path or surface, each [k, 3] m, in the frame of ``y_t``.
         fit: Residuals of the points that a surface was fitted to, if it was.
     """
     if log.time.size == 0:

@@ -23,7 +23,7 @@ from reporting.metrics import Metrics
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# what stands in a station's log as in that of a run
+# signals with the same name in a station's log and a run's
 _AS_LOGGED = (
     *("wrench_ext", "wrench_measured", "wrench_sensor", "wrench_observed"),
     *("tared", "sensor_fault", "tau_ext_observed"),
@@ -34,11 +34,11 @@ _TITLES = {
         "Force along the path's coordinates",
         "Moment along the orientation's coordinates",
     ),
-    "wrench_measured": ("Force measured, world axes", "Moment measured, world axes"),
-    "wrench_ext": ("Force acting, world axes", "Moment acting, world axes"),
+    "wrench_measured": ("Measured force, world axes", "Measured moment, world axes"),
+    "wrench_ext": ("Actual force, world axes", "Actual moment, world axes"),
 }
 LEVER = 1e-3  # m; moments below the largest force times this lever are noise and not drawn
-PAUSE = 0.02  # share of a run, up to which a break counts as part of a push
+PAUSE = 0.02  # share of a run, up to which a gap counts as part of a push
 _SYMBOLS = {
     "tau_par": r"$\tau_\parallel$",
     "tau_par_1": r"$\tau_{\parallel,1}$",
@@ -54,17 +54,17 @@ _MARGIN = 1.25  # of the picture, beyond the farthest point
 
 
 def add_forces(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add forces on the tool, as they act and as measured, impedance, and the ball in a notch.
+    """Add actual and measured forces on the tool, impedance, and the ball's position in a notch.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     for name in _AS_LOGGED:
         if name in raw:
             log.add(name, raw[name])
-    forces = [coordinate.force for coordinate in station.task.place.coordinates]
+    forces = [coordinate.force for coordinate in station.task.projected_manifold.coordinates]
     if "manifold_force" in raw:
         log.add("manifold_force", raw["manifold_force"], labels=forces)
     if "damping" in raw:
@@ -79,8 +79,8 @@ def add_forces(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def _add_impedance(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add what an operator has made of the impedance, where it is not as the scenario says."""
-    names = [coordinate.name for coordinate in station.task.place.coordinates]
+    """Add the impedance that an operator has changed."""
+    names = [coordinate.name for coordinate in station.task.projected_manifold.coordinates]
     impedance = by_order(raw["impedance"], len(names))
     log.add("stiffness", impedance[:, STIFFNESS], labels=names)
     log.add("damping", impedance[:, DAMPING], labels=names)
@@ -88,7 +88,7 @@ def _add_impedance(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def _joint_torques(station: Station, raw: Raw) -> np.ndarray:
-    """Return what acts on tool and links means in the joints, shape (samples, N)."""
+    """Return external forces on tool and links as joint torques, shape (samples, N)."""
     q_J = raw["joint_state"][:, : station.robot.dimension]
     pushes = raw.get("push_torque", np.zeros_like(q_J))
     if len(q_J) == 0 or "wrench_ext" not in raw:
@@ -98,7 +98,7 @@ def _joint_torques(station: Station, raw: Raw) -> np.ndarray:
 
 
 def force_metrics(log: RunLog) -> Metrics:
-    """Return the metrics of forces on the tool that a log has signals for.
+    """Return the metrics of forces on the tool whose signals a log has.
 
     Args:
         log: Log of a run.
@@ -124,7 +124,7 @@ def force_metrics(log: RunLog) -> Metrics:
 
 
 def _requirements(settings: Scenario) -> dict[str, Target]:
-    """Require that forces on a sensor that is not tared are below what is taken for a bias."""
+    """Require that forces on an untared sensor are below the threshold of taring."""
     if not settings.compliance.needs_sensor:
         return {}
     spread = settings.sensor.taring_spread[:3].max()
@@ -132,26 +132,27 @@ def _requirements(settings: Scenario) -> dict[str, Target]:
 
 
 def _sensor_warnings(log: RunLog) -> list[str]:
-    """Return a warning if a force sensor was never of use."""
+    """Return a warning if a force sensor was never tared."""
     if "tared" not in log or log["tared"].values.any() or not log.time.size:
         return []
     return [
-        "the force/torque sensor was never tared: what should yield has rested, and no metric of "
-        "compliance counts; its residual did not rest within sensor.taring_spread for "
+        "the force/torque sensor was never tared: the reference did not comply, and metrics of "
+        "compliance do not count; the sensor's residual did not remain within sensor.taring_spread "
+        "for "
         "sensor.taring_time, or its mean was above sensor.taring_bias"
     ]
 
 
 def has_forces(log: RunLog) -> bool:
-    """Whether the log has forces on the tool that are not all zero."""
+    """Return whether the log has forces on the tool that are not all zero."""
     return any(style.largest(log[name].values) > 0.0 for name in _TITLES if name in log)
 
 
 def draw_forces(log: RunLog) -> style.Drawing | None:
-    """Forces along the path's coordinates, the wrench that acts and is measured.
+    """Draw forces along the path's coordinates, and the actual and measured wrench.
 
-    Moments have panels of their own, where they are more than noise. The times at which the
-    force sensor is not tared yet, or faulty, are shaded.
+    Moments above noise have separate panels. Times with an untared or faulty force sensor are
+    shaded.
     """
     if not has_forces(log):
         return None
@@ -171,17 +172,17 @@ def draw_forces(log: RunLog) -> style.Drawing | None:
             acting = panel.plot(log.time, log["wrench_ext"].values[:, part], "--", linewidth=1.0)
             for line in acting:
                 line.set_color(style.INK)
-            acting[0].set_label("acting")
+            acting[0].set_label("actual")
         kind, unit = ("force", "N") if part.start == 0 else ("moment", "Nm")
         panel.set(ylabel=f"{kind} in {unit}", title=title)
     _shade_sensor(panels, log)
     for panel in panels:
-        style.place_legend(panel)
+        style.add_legend(panel)
     return style.Drawing("forces", "Forces on the tool", _caption(log), canvas)
 
 
 def shade_pushes(panels: "list[Axes]", log: RunLog) -> None:
-    """Shades the times at which a force acts on the tool, or on a link, where the log has it.
+    """Shade the times of forces on the tool or a link, if the log has them.
 
     Args:
         panels: To shade; the first gets an entry for the legend.
@@ -201,7 +202,7 @@ def shade_pushes(panels: "list[Axes]", log: RunLog) -> None:
 
 
 def _bridged(where: NDArray[np.bool_], gap: int) -> NDArray[np.bool_]:
-    """Fills gaps of up to so many samples between true ones."""
+    """Fill gaps of up to a number of samples between true ones."""
     filled, true = where.copy(), np.flatnonzero(where)
     steps = np.diff(true)
     for k in np.flatnonzero((steps > 1) & (steps <= gap + 1)):
@@ -210,12 +211,12 @@ def _bridged(where: NDArray[np.bool_], gap: int) -> NDArray[np.bool_]:
 
 
 def _has_moments(wrench: FloatArray) -> bool:
-    """Whether the moments, after three forces, are more than noise."""
+    """Return whether the moments in a wrench exceed noise."""
     return style.largest(wrench[:, 3:]) > LEVER * style.largest(wrench[:, :3])
 
 
 def _shade_sensor(panels: "list[Axes]", log: RunLog) -> None:
-    """Shades where the sensor is not tared, or faulty."""
+    """Shade the times of an untared or faulty sensor."""
     if "tared" in log:
         waiting = log["tared"].values[:, 0] == 0.0
         style.shade(panels, log.time, waiting, "sensor not tared", "#E5E7EB", "///")
@@ -225,22 +226,22 @@ def _shade_sensor(panels: "list[Axes]", log: RunLog) -> None:
 
 
 def _caption(log: RunLog) -> str:
-    """What the figure shows, by the signals that it has."""
+    """Return the caption for the available signals."""
     parts = []
     if "manifold_force" in log:
-        parts.append("generalized forces along and across the path, as the controller sees them")
+        parts.append("generalized forces along and across the path, as measured by the controller")
     if "wrench_measured" in log and "wrench_ext" in log:
-        parts.append("the measured wrench and the one that acts at the tool point (dashed)")
+        parts.append("measured and actual wrench at the tool point (dashed: actual)")
     elif "wrench_measured" in log:
-        parts.append("the wrench measured at the tool point")
+        parts.append("measured wrench at the tool point")
     elif "wrench_ext" in log:
-        parts.append("the wrench that acts at the tool point")
+        parts.append("actual wrench at the tool point")
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
 
 
 def draw_damping(log: RunLog) -> style.Drawing | None:
-    """Damping of the tangential coordinate over the arc length, wherever the tool was."""
+    """Draw damping of the tangential coordinate over the arc length."""
     eta, damping = log["eta"].values[:, 0], log["damping"].values[:, 0]
     if np.ptp(damping) == 0.0:
         return None
@@ -250,14 +251,13 @@ def draw_damping(log: RunLog) -> style.Drawing | None:
     panel.set(xlabel=r"$\eta$ in m", ylabel="damping in kNs/m", ylim=(0.0, None))
     panel.set_title(r"Damping $d_\parallel$ over the arc length")
     caption = (
-        f"Damping of the impedance along the path where the tool was, {damping.min():.3g} to "
-        f"{damping.max():.4g} Ns/m."
+        f"Damping of the impedance along the path, {damping.min():.3g} to {damping.max():.4g} Ns/m."
     )
     return style.Drawing("damping", "Damping along the path", caption, canvas)
 
 
 def draw_notch_position(log: RunLog) -> style.Drawing:
-    """Way of the ball's centre in the notch, with the circle in which it touches nothing."""
+    """Draw the motion of the ball's centre in the notch, with the circle free of contact."""
     signal = log["notch_position"]
     left, above = 1e3 * signal.values.T
     canvas = style.make_canvas(_NOTCH_SIZE, _NOTCH_SIZE)
@@ -281,13 +281,13 @@ def draw_notch_position(log: RunLog) -> style.Drawing:
     span = _MARGIN * reach
     panel.set(xlim=(-span, span), ylim=(-span, span), aspect="equal")
     panel.set(xlabel="to the right of the notch's axis in mm", ylabel="above it in mm")
-    panel.set_title("Ball in the notch, seen along the path")
+    panel.set_title("Ball in the notch, view along the path")
     panel.legend(loc="upper right")
     return style.Drawing(
         "notch",
         "Ball in the notch",
         "Centre of the ball in the cross-section of the notch; outside the dashed circle its soft "
-        "shell is pressed.",
+        "shell is in contact.",
         canvas,
     )
 

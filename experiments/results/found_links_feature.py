@@ -1,4 +1,4 @@
-"""Links located without encoders on them: estimate, standard deviation, error."""
+"""Estimated positions of links without encoders: estimate, standard deviation, error."""
 
 import numpy as np
 
@@ -21,12 +21,12 @@ _UNITS = {"rad": "mrad", "m": "mm"}
 
 
 def add_found_links(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add where links and tool were found, by what, and standard deviations, if they were.
+    """Add estimated positions of links and tool, their inputs and standard deviations, if any.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     for port, name in _OF_BLOCK.items():
         if port in raw:
@@ -42,9 +42,9 @@ def add_found_links(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def found_links_metrics(log: RunLog) -> Metrics:
-    """Return how sure and how true it was where links were found, if they were.
+    """Return standard deviation and consistency of estimated link positions, if any.
 
-    Joints whose position is measured, as that of rigid ones is, do not count.
+    Joints with measured position, such as rigid ones, do not count.
 
     Args:
         log: Log of the run.
@@ -65,10 +65,10 @@ def found_links_metrics(log: RunLog) -> Metrics:
 
 
 def draw_found_links(log: RunLog) -> style.Drawing:
-    """Errors of the links' positions and of the tool point, beside two standard deviations.
+    """Draw errors of the links' positions and of the tool point, beside two standard deviations.
 
     Args:
-        log: With ``q_J``, ``q_J_found``, ``q_J_deviation``, and the same of ``y_t``.
+        log: With ``q_J``, ``q_J_found``, ``q_J_deviation``, and likewise ``y_t``.
     """
     signal = log["q_J"]
     canvas, panels = style.make_panels(signal.dim + 1, height=1.15)
@@ -86,12 +86,13 @@ def draw_found_links(log: RunLog) -> style.Drawing:
     panels[-1].plot(log.time, tool, color="C0")
     panels[-1].set(ylabel="mm")
     panels[-1].set_title("tool point", fontsize=10)
-    style.place_legend(panels[0])
+    style.add_legend(panels[0])
     caption = (
-        "Positions of the links as they were found from motors and torques, less the true ones, and"
-        " by how far the tool point is off then; grey: within two standard deviations."
+        "Errors of link positions estimated from motors and torques, and resulting error of the "
+        "tool"
+        " point; grey: two standard deviations."
     )
-    return style.Drawing("found_links", "Links as found", caption, canvas)
+    return style.Drawing("found_links", "Estimated link positions", caption, canvas)
 
 
 FEATURE = Feature(

@@ -1,4 +1,4 @@
-"""Friction of the drives, its estimate, and the coefficients and momenta of the estimation."""
+"""Friction of the drives, its estimate, and coefficients and momenta of the estimation."""
 
 import numpy as np
 
@@ -18,12 +18,12 @@ _TOGETHER = 3  # axes whose momenta share a panel
 
 
 def add_friction(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add friction, its estimate, and the momenta and coefficients if those are estimated.
+    """Add friction, its estimate, and momenta and coefficients of an estimation.
 
     Args:
         log: Log of the run.
         station: The station that was simulated.
-        raw: What its station logged.
+        raw: Its logged signals.
     """
     if "friction_torque" in raw:
         log.add("tau_f", raw["friction_torque"])
@@ -44,9 +44,9 @@ def add_friction(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def friction_metrics(log: RunLog) -> Metrics:
-    """Return the metrics of friction that the log has signals for.
+    """Return the metrics of friction whose signals the log has.
 
-    Errors of coefficients are those at the last sample, of each axis and of the worst.
+    Errors of coefficients refer to the last sample, for each axis and the worst axis.
     """
     metrics = Metrics()
     if log.time.size == 0:
@@ -66,12 +66,12 @@ def friction_metrics(log: RunLog) -> Metrics:
 
 
 def relative_errors(log: RunLog, name: str) -> FloatArray:
-    """Return the errors of estimated coefficients, by the true ones, shape (samples, axes).
+    """Return relative errors of estimated coefficients, shape (samples, axes).
 
-    NaN where there is no such friction.
+    NaN without such friction.
 
     Args:
-        log: With an estimate and its truth.
+        log: With estimated and actual coefficients.
         name: ``f_c`` or ``f_v``.
     """
     estimate, truth = log[f"{name}_estimate"].values, log[name].values
@@ -79,7 +79,7 @@ def relative_errors(log: RunLog, name: str) -> FloatArray:
 
 
 def _momentum(station: Station, state: FloatArray) -> FloatArray:
-    """Return the momenta on which friction acts, shape (samples, N), of App. A's ``D(q) q'``."""
+    """Return the generalized momenta ``D(q) q'`` of App. A, shape (samples, N)."""
     if len(state) == 0:
         return np.zeros((0, station.robot.dimension))
     function = drive_momentum(station.robot).function.map(len(state))
@@ -87,7 +87,7 @@ def _momentum(station: Station, state: FloatArray) -> FloatArray:
 
 
 def draw_friction(log: RunLog) -> style.Drawing:
-    """Friction of each drive over the velocity that it acts on; both zeros at one height."""
+    """Draw friction and velocity of each drive; both axes share their zero."""
     friction = log["tau_f"]
     motors = "v_M" in log
     velocity = log["v_M" if motors else "v_J"]
@@ -102,7 +102,7 @@ def draw_friction(log: RunLog) -> style.Drawing:
         right.set(ylabel=f"{mover} velocity\nin {velocity.unit}")
         right.grid(visible=False)
         right.spines["right"].set_visible(True)
-        # the twin is drawn above; friction belongs on top
+        # the twin axis is drawn above; friction must be on top
         panel.set_zorder(right.get_zorder() + 1)
         panel.patch.set_visible(False)
         panel.plot(log.time, tau_f, color="C1", label=f"friction {word} (left)")
@@ -119,34 +119,34 @@ def draw_friction(log: RunLog) -> style.Drawing:
             if span > 0.0:
                 axes.set_ylim(-span, span)
         panel.set(ylabel=effort_label(friction.unit), title=f"Axis {axis + 1}")
-    style.place_legend(panels[0])
+    style.add_legend(panels[0])
     caption = (
-        f"Friction over the velocity that it acts on. Nearly at rest, below {100 * AT_REST:g} % of"
-        f" its top speed, a drive sticks: there the friction {word} goes from one sign to the other"
-        " without motion."
+        f"Friction and velocity of the drives. Below {100 * AT_REST:g} % of its largest speed a "
+        "drive"
+        f" sticks: the friction {word} changes sign without motion."
     )
     return style.Drawing("friction", "Friction of the drives", caption, canvas)
 
 
 def draw_friction_estimate(log: RunLog) -> style.Drawing:
-    """Friction of each drive, and what the controller takes it for."""
+    """Draw actual and estimated friction of each drive."""
     friction, estimate = log["tau_f"], log["friction_estimate"]
     word = {"Nm": "torque in Nm", "N": "force in N"}.get(friction.unit, "torque or force")
     canvas, panels = style.make_panels(friction.dim, height=1.9)
     for axis, panel in enumerate(panels):
-        panel.plot(log.time, friction.values[:, axis], label="true", **style.BROAD)
+        panel.plot(log.time, friction.values[:, axis], label="actual", **style.BROAD)
         panel.plot(log.time, estimate.values[:, axis], color="C1", label="estimate")
         span = 1.4 * float(np.max(np.abs(friction.values[:, axis]), initial=0.0))
         if span > 0.0:
             panel.set_ylim(-span, span)
         panel.set(ylabel=word, title=f"Axis {axis + 1}")
-    style.place_legend(panels[0])
-    caption = "What the controller takes for friction of the drives, and what it is."
+    style.add_legend(panels[0])
+    caption = "Friction of the drives: actual value, and the controller's estimate."
     return style.Drawing("friction_estimate", "Estimated friction", caption, canvas)
 
 
 def draw_friction_coefficients(log: RunLog) -> style.Drawing:
-    """Momenta, and the coefficients estimated from them in units of the true ones (Fig. A.1)."""
+    """Draw momenta, and estimated coefficients relative to the actual ones (Fig. A.1)."""
     momentum = log["momentum"]
     shares = _shares(momentum.dim)
     canvas, panels = style.make_panels(len(shares) + 2, height=2.4)
@@ -154,9 +154,9 @@ def draw_friction_coefficients(log: RunLog) -> style.Drawing:
         for axis in axes:
             label = rf"$p_{axis + 1}$"
             panel.plot(log.time, momentum.values[:, axis], color=_colour(axis), label=label)
-        title = "Generalized momenta $p$" if axes[0] == 0 else "Those of the last axes"
+        title = "Generalized momenta $p$" if axes[0] == 0 else "Momenta of the last axes"
         panel.set(ylabel=f"momentum in {momentum.unit}", title=title)
-        style.place_legend(panel)
+        style.add_legend(panel)
     kinds = {"f_c": "Coulomb friction $f_c$", "f_v": "Viscous friction $f_v$"}
     for panel, (name, title) in zip(panels[-2:], kinds.items(), strict=True):
         values = 100.0 * (1.0 + relative_errors(log, name))
@@ -167,11 +167,11 @@ def draw_friction_coefficients(log: RunLog) -> style.Drawing:
         late = values[log.time >= log.time[-1] / 10.0] - 100.0
         span = max(1.1 * float(np.nanmax(np.abs(late), initial=0.0)), _SMALLEST_SPAN)
         panel.set_ylim(100.0 - span, 100.0 + span)
-        panel.set(ylabel="estimate in %\nof the true one", title=title)
-    style.place_legend(panels[-2])
+        panel.set(ylabel="estimate in %\nof actual value", title=title)
+    style.add_legend(panels[-2])
     caption = (
-        "Momenta on which friction acts, from which it is estimated, and the estimated coefficients"
-        " in units of the true ones; the band is 2 % wide to either side."
+        "Generalized momenta, the input of the estimation, and estimated coefficients relative to"
+        " the actual ones; grey band: 2 % to either side."
     )
     return style.Drawing(
         "friction_coefficients", "Estimated coefficients of friction", caption, canvas
@@ -179,7 +179,7 @@ def draw_friction_coefficients(log: RunLog) -> style.Drawing:
 
 
 def _shares(axes: int) -> list[range]:
-    """Axes of each panel of momenta: those next to the tool have too little to be seen."""
+    """Return the axes of each panel of momenta; small ones near the tool have their own panel."""
     half = (axes + 1) // 2
     return [range(axes)] if axes <= _TOGETHER else [range(half), range(half, axes)]
 
@@ -191,7 +191,7 @@ def _colour(axis: int) -> str:
 FEATURE = Feature(
     signals=add_friction,
     metrics=lambda log, station, settings: friction_metrics(log),
-    # an observer may be left out
+    # an observer is optional
     known=lambda station, settings: (
         *("tau_f", "friction_estimate", "f_c", "f_c_estimate", "f_v", "f_v_estimate"),
     ),

@@ -1,4 +1,4 @@
-"""Audit of guidance within virtual fixtures: its rules and assumptions, checked from the log."""
+"""Audit of guidance within virtual fixtures: rules and assumptions checked against the log."""
 
 from dataclasses import dataclass
 
@@ -18,20 +18,20 @@ _NEAR = 2e-3  # m, a region as close as this must not be missed
 _SPAN, _MOVED = 20, 2e-3
 # of the lag, and s, that it may be wrong by
 _SHARE, _LEAST = 0.3, 1e-3
-# m, from a region that leaves no room
+# m, distance from a region that blocks the tool
 _TIGHT = 1e-3
 
 
 @dataclass(frozen=True)
 class GuidanceRules:
-    """Numbers that the rules were given.
+    """Parameters of the guidance rules.
 
     Attributes:
         mass: m [kg].
-        damping: d [N s/m]; None where a person may change it, so that the log's counts.
-        largest_speed: Largest speed of the free motion [m/s]; the log tells where it was lower.
+        damping: d [N s/m]; None where a person may change it, so that the logged value counts.
+        largest_speed: Largest speed of the free motion [m/s]; the log has times of a lower limit.
         capacity: Capacity of the tank [J].
-        guides: Stiffness [N/m] and reach [m] of each path that attracts.
+        guides: Stiffness [N/m] and reach [m] of each attracting path.
     """
 
     mass: float
@@ -43,7 +43,7 @@ class GuidanceRules:
 
 @dataclass(frozen=True)
 class _Slots:
-    """What the log tells of near regions, by tick and slot."""
+    """Logged data of near regions, by tick and slot."""
 
     used: NDArray[np.bool_]
     index: NDArray[np.int_]
@@ -63,20 +63,20 @@ class _Slots:
         return self.used & (self.stiffness > 0.0)
 
 
-def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
-    """Return by how much, at worst, a run breaks what was promised.
+def audit(log: RunLog, rules: GuidanceRules) -> Metrics:
+    """Return the largest violations of the guidance rules in a run.
 
     Args:
         log: Log of a run with fixtures, by the rules ``program``.
-        promise: Numbers that the rules were given.
+        rules: Parameters of the rules.
 
     Returns:
-        ``audit_stationarity`` [m/s]: of ``(m + T d) v+ = m v + T f + T sum phi n``, d being what
-        limits the speed where it was limited;
-        ``audit_allowance`` [m/s]: of ``n v+ >= u - beta``, and of equality where phi > 0;
-        ``audit_energy`` [J]: gained beyond the inequality of a tick; ``audit_tank`` [J]: beside the
-        tank's law; ``audit_bound`` [J]: how far the hand's work stays above its bound, negative if
-        it does not; ``audit_missed``: ticks at which a region within 2 mm was not looked at.
+        ``audit_stationarity`` [m/s]: of ``(m + T d) v+ = m v + T f + T sum phi n``, with the d that
+        limits the speed where it was limited; ``audit_allowance`` [m/s]: of ``n v+ >= u - beta``,
+        and of equality where phi > 0; ``audit_energy`` [J]: energy gained beyond the inequality of
+        a tick; ``audit_tank`` [J]: deviation from the tank's balance; ``audit_bound`` [J]: distance
+        of the operator's work above its bound, negative below; ``audit_missed``: ticks at which a
+        region within 2 mm was not evaluated.
     """
     metrics = Metrics()
     v, f = log["velocity_command"].values, log["guiding_force"].values
@@ -88,35 +88,35 @@ def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
     slots = _read(log["near_regions"].values[:count])
     before = np.vstack([np.zeros(3), v[:-1]])
     d = log["free_damping"].values[:count, 0]
-    if promise.damping is not None:
-        d = np.full(count, promise.damping)
-    limit = np.minimum(log["speed_limit"].values[:count, 0], promise.largest_speed)
-    kappa, way, stored, stored_after = _guided(log, promise, count, T)
-    momentum = promise.mass * before + T * (f + kappa[:, None] * way)
+    if rules.damping is not None:
+        d = np.full(count, rules.damping)
+    limit = np.minimum(log["speed_limit"].values[:count, 0], rules.largest_speed)
+    kappa, offset, stored, stored_after = _guided(log, rules, count, T)
+    momentum = rules.mass * before + T * (f + kappa[:, None] * offset)
     # a limit of speed is damping
     slowed = np.linalg.norm(momentum, axis=1) / np.maximum(limit, 1e-6)
-    inertia = np.maximum(promise.mass + T * d + T**2 * kappa, slowed)
-    d = (inertia - promise.mass) / T - T * kappa
-    held = T * np.sum((slots.used * slots.phi)[..., None] * slots.n, axis=1)
-    missed = v - (momentum + held) / inertia[:, None]
+    inertia = np.maximum(rules.mass + T * d + T**2 * kappa, slowed)
+    d = (inertia - rules.mass) / T - T * kappa
+    impulse = T * np.sum((slots.used * slots.phi)[..., None] * slots.n, axis=1)
+    missed = v - (momentum + impulse) / inertia[:, None]
     metrics.add("audit_stationarity", float(np.max(np.linalg.norm(missed, axis=1))))
     metrics.add("audit_allowance", _allowance(v, slots))
     work = T * np.sum(f * v, axis=1)
     lost = T * d * np.sum(v * v, axis=1)
     out = np.where(slots.hard, np.maximum(0.0, -slots.beta), 0.0)
-    given = T * np.sum(slots.used * slots.phi * (slots.u + out), axis=1)
+    supplied = T * np.sum(slots.used * slots.phi * (slots.u + out), axis=1)
     spring = (
         np.sum(np.where(slots.soft, slots.stiffness * np.maximum(slots.depth, 0) ** 2, 0), 1) / 2
     )
     pressed = np.divide(slots.phi, slots.stiffness, out=np.zeros_like(slots.phi), where=slots.soft)
     after = np.sum(np.where(slots.soft, slots.stiffness * pressed**2, 0.0), axis=1) / 2
     spring, after = spring + stored, after + stored_after
-    kinetic = promise.mass / 2 * np.sum(v * v - before * before, axis=1)
-    metrics.add("audit_energy", float(np.max(kinetic + after - spring - (work - lost + given))))
+    kinetic = rules.mass / 2 * np.sum(v * v - before * before, axis=1)
+    metrics.add("audit_energy", float(np.max(kinetic + after - spring - (work - lost + supplied))))
     tank = log["tank"].values[:count, 0]
-    # what springs gain between ticks
+    # energy gained by springs between ticks
     paid = spring - np.concatenate([[stored[0]], after[:-1]])
-    expected = np.minimum(promise.capacity, tank[:-1] - given[:-1] + lost[:-1] - paid[:-1])
+    expected = np.minimum(rules.capacity, tank[:-1] - supplied[:-1] + lost[:-1] - paid[:-1])
     metrics.add("audit_tank", float(np.max(np.abs(expected - tank[1:]), initial=0.0)))
     bound = -(tank[0] + spring[0])
     metrics.add("audit_bound", float(np.min(np.cumsum(work)) - bound))
@@ -125,27 +125,27 @@ def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
 
 
 def _guided(
-    log: RunLog, promise: GuidanceRules, count: int, period: float
+    log: RunLog, rules: GuidanceRules, count: int, period: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return stiffness [N/m], distance [m], and energy before and after a tick [J] of guides."""
+    """Return stiffness [N/m], offset [m], and energy before and after a tick [J] of guides."""
     none = np.zeros(count)
-    if not promise.guides:
+    if not rules.guides:
         return none, np.zeros((count, 3)), none, none
     active = log["guide"].values[:count, 0]
     share = log["guide_share"].values[:count, 0]
-    k, R = np.array([(0.0, 1.0), *promise.guides])[active].T
-    top = max(stiffness * reach**2 / 6.0 for stiffness, reach in promise.guides)
-    foot, z = (log[name].values[:count] for name in ("guide_foot", "rest_point"))
+    k, R = np.array([(0.0, 1.0), *rules.guides])[active].T
+    top = max(stiffness * reach**2 / 6.0 for stiffness, reach in rules.guides)
+    closest_point, z = (log[name].values[:count] for name in ("guide_foot", "rest_point"))
     after = z + period * log["velocity_command"].values[:count]
 
     def inside(point: FloatArray) -> FloatArray:
-        return np.maximum(1.0 - np.sum((point - foot) ** 2, axis=1) / R**2, 0.0)
+        return np.maximum(1.0 - np.sum((point - closest_point) ** 2, axis=1) / R**2, 0.0)
 
     def energy(point: FloatArray) -> FloatArray:
         return np.asarray(share * (top - k * R**2 / 6.0 * inside(point) ** 3))
 
     kappa = np.asarray(share * k * inside(z) ** 2)
-    return kappa, foot - z, energy(z), energy(after)
+    return kappa, closest_point - z, energy(z), energy(after)
 
 
 def _read(values: FloatArray) -> _Slots:
@@ -158,26 +158,26 @@ def _read(values: FloatArray) -> _Slots:
 
 def _allowance(v: FloatArray, slots: _Slots) -> float:
     speed = np.einsum("tsk,tk->ts", slots.n, v)
-    room = speed - (slots.u - slots.beta)
-    held = slots.hard & (slots.phi > 0.0)
-    broken = np.max(np.where(slots.hard, -room, 0.0), initial=0.0)
-    loose = np.max(np.where(held, np.abs(room), 0.0), initial=0.0)
+    slack = speed - (slots.u - slots.beta)
+    active = slots.hard & (slots.phi > 0.0)
+    broken = np.max(np.where(slots.hard, -slack, 0.0), initial=0.0)
+    loose = np.max(np.where(active, np.abs(slack), 0.0), initial=0.0)
     return float(max(broken, loose))
 
 
 def _missed(log: RunLog, slots: _Slots, count: int) -> int:
-    """Return at how many ticks a region was near the tool's rest point, but not looked at."""
+    """Return the number of ticks at which a region near the tool's rest point was not evaluated."""
     distance = log["region_distance"].values[:count]
     lag = np.linalg.norm(log["rest_point"].values[:count] - log["y_t"].values[:count], axis=1)
     missed = 0
     for region, h in enumerate(distance.T):
-        seen = np.any(slots.used & (slots.index == region), axis=1)
-        missed += int(np.count_nonzero((h + lag < _NEAR) & ~seen))
+        evaluated = np.any(slots.used & (slots.index == region), axis=1)
+        missed += int(np.count_nonzero((h + lag < _NEAR) & ~evaluated))
     return missed
 
 
 def guidance_warnings(log: RunLog, settings: Scenario) -> list[str]:
-    """Return what a run within fixtures has shown to be otherwise, one sentence each.
+    """Return violated assumptions of a run within fixtures, one sentence each.
 
     Args:
         log: Log of the run.
@@ -188,16 +188,16 @@ def guidance_warnings(log: RunLog, settings: Scenario) -> list[str]:
     return [*_squeezed(log), *_late_servos(log, settings)]
 
 
-def observed_lag(log: RunLog, believed: float) -> float | None:
-    """Return the lag of velocity servos, from what was asked of them and measured [s].
+def observed_lag(log: RunLog, nominal: float) -> float | None:
+    """Return the lag of velocity servos, from commanded and measured velocities [s].
 
-    The rules look at ``z = y + tau y' + T sum of commands under way``. Behind servos with
-    ``y'' = (v - y') / tau`` it moves by T v in a tick. What it moves beside that is the error of
-    ``tau`` times the change of ``y'``.
+    The rules use ``z = y + tau y' + T sum of pending commands``. With servos ``y'' = (v - y') /
+    tau`` it moves by T v in a tick. Any further motion is the error of ``tau`` times the change of
+    ``y'``.
 
     Args:
         log: Log of a run with the law ``velocity_servo``.
-        believed: ``tau`` [s].
+        nominal: ``tau`` [s].
 
     Returns:
         None where the tool hardly moved.
@@ -208,28 +208,29 @@ def observed_lag(log: RunLog, believed: float) -> float | None:
     if np.count_nonzero(known) <= _SPAN:
         return None
     z, v, period = z[known], v[known], log.period
-    # what was asked at a tick counts from the next one on
+    # a command at a tick acts from the next tick on
     error = z - period * (np.cumsum(v, axis=0) - v)
     rate = np.gradient(y[known], period, axis=0)
     beside, change = (x[_SPAN:] - x[:-_SPAN] for x in (error, rate))
     if np.sqrt(np.mean(change**2)) < _MOVED:
         return None
-    return believed - float(np.sum(beside * change) / np.sum(change**2))
+    return nominal - float(np.sum(beside * change) / np.sum(change**2))
 
 
 def _late_servos(log: RunLog, settings: Scenario) -> list[str]:
     fixtures, servo = settings.fixtures, settings.servo
     if fixtures is None or settings.controller.law_record.commands_torque:
         return []
-    believed = fixtures.lag_behind(servo.bandwidth)
-    lag = observed_lag(log, believed)
-    if lag is None or abs(lag - believed) <= max(_SHARE * believed, _LEAST):
+    nominal = fixtures.lag_behind(servo.bandwidth)
+    lag = observed_lag(log, nominal)
+    if lag is None or abs(lag - nominal) <= max(_SHARE * nominal, _LEAST):
         return []
     least = 2.0 * (lag + servo.bus_delay)
     return [
-        f"the tool follows the asked velocity by {1e3 * lag:.2g} ms later, not by "
-        f"{1e3 * believed:.2g} ms as fixtures.servo_lag has it (by default 1 / servo.bandwidth), "
-        f"and so enters regions deeper: set it, and fixtures.guidance.approach_time to {least:.2g} "
+        f"the tool follows the commanded velocity with a lag of {1e3 * lag:.2g} ms, not "
+        f"{1e3 * nominal:.2g} ms as in fixtures.servo_lag (by default 1 / servo.bandwidth), and "
+        "enters regions deeper: correct it, and set fixtures.guidance.approach_time to "
+        f"{least:.2g} "
         "s or more"
     ]
 
@@ -248,18 +249,18 @@ def _squeezed(log: RunLog) -> list[str]:
     deepest = -float(np.nanmin(distance.values[ticks], initial=0.0))
     return [
         f"{' and '.join(names)} squeezed the tool for {period * ticks.size:.3g} s from t = "
-        f"{log.time[ticks[0]]:.3f} s on: no place near it is admitted by all of them, and it was "
-        f"up to {1e3 * deepest:.2g} mm in one"
+        f"{log.time[ticks[0]]:.3f} s on: no nearby position is outside all of them, and it was "
+        f"up to {1e3 * deepest:.2g} mm inside one"
     ]
 
 
 def _is_tight(slots: dict[str, FloatArray]) -> NDArray[np.bool_]:
-    """Return when the tool was in a hard region, or all but, shape (samples,)."""
+    """Return when the tool was in a hard region or close to it, shape (samples,)."""
     return (slots["stiffness"] == 0.0) & (slots["h"] < _TIGHT)
 
 
 def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
-    """Check what was promised of forbidden regions, if there were any."""
+    """Audit forbidden regions, if there are any."""
     fixtures = settings.fixtures
     if fixtures is None or "near_regions" not in log:
         return Metrics()

@@ -1,4 +1,4 @@
-"""Guidance of the tool by hand within virtual fixtures."""
+"""Hand guiding of the tool within virtual fixtures."""
 
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from reporting.metrics import Metrics
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# name in the log of what the record has
+# names in the log of the record's fields
 _SINGLE = {
     "velocity": "velocity_command",
     "point": "rest_point",
@@ -31,18 +31,18 @@ _SINGLE = {
     "squeezed": "squeezed",
 }
 MILLI = 1e3
-FAR = 0.03  # m, distances above which nobody needs to see
+FAR = 0.03  # m, distances above which are not shown
 CLOSE = 3e-4  # m, of the enlargement
 MOST_NAMED = 6  # regions with an entry in a legend
 
 
 def add_guidance(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add modes, what the rules went by, and how far the tool truly is from each region.
+    """Add modes, data of the guidance rules, and the actual distance from each region.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     task = station.task
     if "guidance" not in raw or not isinstance(task, SpaceTask):
@@ -59,19 +59,21 @@ def add_guidance(log: RunLog, station: Station, raw: Raw) -> None:
     log.add("near_regions", rows["near"], labels=slots)
     for name in ("labels", "evaluated", "on"):
         log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), labels=names)
-    distances = task.distances(raw["true_pose"][:, :3], region_times(log, task.lead.lag))
+    distances = task.distances(
+        raw["true_pose"][:, :3], region_times(log, task.command_dynamics.lag)
+    )
     distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
     log.add("region_distance", distances, labels=names)
 
 
 def region_times(log: RunLog, lag: float) -> FloatArray:
-    """Return the clock of moving regions that the tool itself meets, shape (samples,).
+    """Return the clock of moving regions at the tool's current position, shape (samples,).
 
-    The rules look at where the tool will come to rest, and at the regions as they will be then.
+    The rules evaluate the tool's future rest point, and the regions at that time.
 
     Args:
         log: With ``region_clock``.
-        lag: How much later the tool is where the rules look [s].
+        lag: Delay until the tool reaches the rest point [s].
     """
     clock = log["region_clock"].values[:, 0]
     if clock.size == 0:
@@ -80,14 +82,14 @@ def region_times(log: RunLog, lag: float) -> FloatArray:
 
 
 def slots_of(log: RunLog, region: int) -> dict[str, FloatArray]:
-    """Return what the log tells of a region while it was near, NaN else, each (samples, ..).
+    """Return the logged data of a region while it was near, NaN otherwise, each (samples, ..).
 
     Args:
         log: With ``near_regions``.
         region: Its index.
 
     Returns:
-        By the names of ``SLOT``, the normal as ``n``, shape (samples, 3).
+        Values by the names of ``SLOT``, the normal as ``n``, shape (samples, 3).
     """
     slots = log["near_regions"].values.reshape(len(log.time), -1, len(SLOT))
     values = np.full((len(log.time), len(SLOT)), np.nan)
@@ -99,7 +101,7 @@ def slots_of(log: RunLog, region: int) -> dict[str, FloatArray]:
 
 
 def guidance_metrics(log: RunLog) -> Metrics:
-    """Return how well forbidden regions were respected, and what that cost.
+    """Return the metrics of guidance: violations of regions, forces, energy, evaluations.
 
     Args:
         log: Log of a run; without ``region_distance`` there are no such metrics.
@@ -107,7 +109,7 @@ def guidance_metrics(log: RunLog) -> Metrics:
     metrics = Metrics()
     if "region_distance" not in log or not log.time.size:
         return metrics
-    if "phi" in log:  # a tool that a hand turns is where it is asked to be, not at zero
+    if "phi" in log:  # the reference orientation of a tool turned by hand is not zero
         error = np.linalg.norm(log["phi"].values - log["phi_p"].values, axis=1)
         metrics.add("max_orientation_error", float(np.nanmax(error)))
     distance, soft = log["region_distance"].values, soft_regions(log)
@@ -124,7 +126,7 @@ def guidance_metrics(log: RunLog) -> Metrics:
     metrics.add("largest_command", float(np.nanmax(np.linalg.norm(command, axis=1))))
     period = log.period
     power = np.sum(log["guiding_force"].values * command, axis=1)
-    # the least that the hand has given up to any instant: what it got out of the fixtures
+    # energy that the operator extracted from the fixtures up to any instant
     metrics.add("energy_from_fixtures", max(0.0, float(-np.nanmin(np.cumsum(power)) * period)))
     metrics.add("least_tank", float(np.nanmin(log["tank"].values)))
     modes = log["mode"].values[:, 0]
@@ -139,13 +141,13 @@ def guidance_metrics(log: RunLog) -> Metrics:
 
 
 def deepest_violation(distance: FloatArray) -> float:
-    """Return how deep a tool came into regions [m]; 0 for one that stayed out.
+    """Return the largest penetration of regions [m], 0 without any.
 
-    What it was in when it began, or when a region was switched on, is no violation as far as it
-    only gets less from then on.
+    An initial penetration, also when a region is switched on, is no violation as long as it
+    decreases.
 
     Args:
-        distance: From each region, NaN while that is switched off, shape (samples, M) [m].
+        distance: Distance from each region, NaN while it is switched off, shape (samples, M) [m].
     """
     deepest = 0.0
     for depth in np.maximum(-distance, 0.0).T:
@@ -169,12 +171,12 @@ def soft_regions(log: RunLog) -> FloatArray:
 
 
 def has_regions(log: RunLog) -> bool:
-    """Whether the log is that of a tool that regions may hold."""
+    """Return whether the log has forbidden regions."""
     return log["region_distance"].dim > 0
 
 
 def draw_guidance(log: RunLog) -> style.Drawing | None:
-    """Mode, distance from the regions that were near, enlarged, and the speed."""
+    """Draw mode, distance from near regions, also enlarged, and commanded speed."""
     if not has_regions(log):
         return None
     canvas, (mode, distance, close, speed) = style.make_panels(4)
@@ -187,15 +189,14 @@ def draw_guidance(log: RunLog) -> style.Drawing | None:
             panel.plot(log.time, MILLI * column, color=f"C{k}", label=label)
         panel.set(ylabel="distance in mm")
     distance.set(title="Distance from the regions", ylim=(-0.05 * MILLI * FAR, MILLI * FAR))
-    close.set(title="The same, close by", ylim=(-MILLI * CLOSE, MILLI * CLOSE))
+    close.set(title="Distance from the regions, enlarged", ylim=(-MILLI * CLOSE, MILLI * CLOSE))
     command = log.norm("velocity_command")
     speed.plot(log.time, command, color="C0")
-    speed.set(title="Speed that is asked of the tool", ylabel="speed in m/s")
+    speed.set(title="Commanded speed of the tool", ylabel="speed in m/s")
     shade_pushes([distance], log)
-    style.place_legend(distance)
+    style.add_legend(distance)
     caption = (
-        "What the tool is led along; how far it truly is from the regions, negative inside; "
-        "and how fast it is asked to move."
+        "Mode of guidance, actual distance from the regions, negative inside, and commanded speed."
     )
     return style.Drawing("guidance", "Guidance within fixtures", caption, canvas)
 
@@ -208,7 +209,7 @@ def _draw_mode(panel: "Axes", log: RunLog) -> None:
 
 
 def _near_distances(log: RunLog) -> tuple[FloatArray, list[str]]:
-    """Return the distances of regions that were near [m], the closest first, and their names."""
+    """Return the distances of near regions [m], the closest first, and their names."""
     values, names = log["region_distance"].values, log["region_distance"].labels
     least = np.nanmin(values, axis=0, initial=np.inf)
     shown = [i for i in np.argsort(least) if least[i] < FAR]
@@ -216,7 +217,7 @@ def _near_distances(log: RunLog) -> tuple[FloatArray, list[str]]:
 
 
 def draw_contact(log: RunLog) -> style.Drawing | None:
-    """The longest way along one surface: tangential and transversal coordinates, and forces."""
+    """Draw the longest contact with one surface: coordinates and forces."""
     rows, region = _longest_contact(log)
     if rows.size <= 1:
         return None
@@ -226,30 +227,33 @@ def draw_contact(log: RunLog) -> style.Drawing | None:
     n, phi = slot["n"][rows], slot["phi"][rows]
     coordinates = _along(log["y_t"].values[rows], n)
     style.draw_components(tangential, time, coordinates, [r"$\eta_{1,1}$", r"$\eta_{1,2}$"])
-    tangential.set(title="Tangential coordinates", ylabel="way in m")
+    tangential.set(title="Tangential coordinates", ylabel="distance in m")
     xi = log["region_distance"].values[rows, region]
     transversal.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
     transversal.plot(time, MILLI * xi, color="C0", label=r"$\xi_1$")
     transversal.set(title="Transversal coordinate, negative inside", ylabel="distance in mm")
     f = log["guiding_force"].values[rows]
     pressing = -np.sum(f * n, axis=1)
-    force.plot(time, phi, color="C1", label=r"of the fixture $\varphi$")
-    force.plot(time, pressing, "--", color=style.INK, label="of the hand, into it")
+    force.plot(time, phi, color="C1", label=r"fixture $\varphi$")
+    force.plot(time, pressing, "--", color=style.INK, label="operator, normal")
     force.plot(
-        time, np.linalg.norm(f + pressing[:, None] * n, axis=1), color="C2", label="along it"
+        time,
+        np.linalg.norm(f + pressing[:, None] * n, axis=1),
+        color="C2",
+        label="operator, tangential",
     )
     force.set(title="Forces", ylabel="force in N")
     for panel in (tangential, transversal, force):
-        style.place_legend(panel)
+        style.add_legend(panel)
     name = log["region_distance"].labels[region]
-    caption = f"The longest way along one surface, {name}."
-    return style.Drawing("contact", "Along a surface", caption, canvas)
+    caption = f"Longest contact with one surface, {name}."
+    return style.Drawing("contact", "Contact with a surface", caption, canvas)
 
 
 def _longest_contact(log: RunLog) -> tuple[FloatArray, int]:
-    """Return the samples of the longest way along a single region, and which it is."""
-    held = log["region_labels"].values
-    alone = held * (held.sum(axis=1, keepdims=True) == 1)
+    """Return the samples of the longest contact with a single region, and its index."""
+    contacts = log["region_labels"].values
+    alone = contacts * (contacts.sum(axis=1, keepdims=True) == 1)
     longest: tuple[FloatArray, int] = np.zeros(0, dtype=int), 0
     for region, column in enumerate(alone.T):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], column, [0]]))).reshape(-1, 2)
@@ -260,21 +264,21 @@ def _longest_contact(log: RunLog) -> tuple[FloatArray, int]:
 
 
 def _along(y_t: FloatArray, n: FloatArray) -> FloatArray:
-    """Return the way of a tool along a surface [m], shape (samples, 2).
+    """Return tangential coordinates of a tool along a surface [m], shape (samples, 2).
 
-    The second coordinate rises as much as the surface allows, the first is level.
+    The second coordinate points along the steepest ascent, the first is horizontal.
     """
     up = np.eye(3)[np.argmin(np.abs(n).mean(axis=0)) if np.abs(n[:, 2]).mean() > 0.9 else 2]
     rising = up - n * (n @ up)[:, None]
     rising /= np.linalg.norm(rising, axis=1, keepdims=True)
     level = np.cross(rising, n)
     steps = np.diff(y_t, axis=0)
-    ways = np.stack([np.sum(steps * e[:-1], axis=1) for e in (level, rising)], axis=1)
-    return np.vstack([np.zeros(2), np.cumsum(ways, axis=0)])
+    parts = np.stack([np.sum(steps * e[:-1], axis=1) for e in (level, rising)], axis=1)
+    return np.vstack([np.zeros(2), np.cumsum(parts, axis=0)])
 
 
 def gives_energy(log: RunLog) -> bool:
-    """Whether regions moved or gave way, so that energy went back and forth."""
+    """Return whether regions or guides exchanged energy with the operator."""
     if "guide" in log:
         return True
     if not has_regions(log):
@@ -289,10 +293,10 @@ def _moves(slots: FloatArray) -> bool:
 
 
 def draw_energy(log: RunLog) -> style.Drawing | None:
-    """Tank, springs, what the hand has given, and the pace of moving regions."""
+    """Draw energy of tank and springs, work of the operator, and time scaling of regions."""
     if not gives_energy(log):
         return None
-    canvas, (stored, given, pace) = style.make_panels(3)
+    canvas, (stored, supplied, scaling) = style.make_panels(3)
     stored.plot(log.time, log["tank"].values[:, 0], color="C0", label="tank $x$")
     stored.plot(
         log.time,
@@ -300,22 +304,20 @@ def draw_energy(log: RunLog) -> style.Drawing | None:
         color="C1",
         label="springs and guides $V$" if "guide" in log else "springs $V$",
     )
-    stored.set(title="Energy that is stored", ylabel="energy in J")
+    stored.set(title="Stored energy", ylabel="energy in J")
     period = log.period
     power = np.sum(log["guiding_force"].values * log["velocity_command"].values, axis=1)
-    given.plot(log.time, np.cumsum(power) * period, color="C2", label="the hand's work")
+    supplied.plot(log.time, np.cumsum(power) * period, color="C2", label="operator's work")
     bound = -float(log["tank"].values[0, 0] + log["spring_energy"].values[0, 0])
-    given.axhline(bound, color=style.INK, linestyle="--", label="never below")
-    given.set(title=r"Work of the hand $\int f \cdot v\, dt$", ylabel="work in J")
-    pace.plot(log.time, log["region_rate"].values[:, 0], color="C3")
-    pace.set(
-        title=r"Share of their pace with which regions move $\rho$", ylabel="share", ylim=(0, 1.05)
-    )
-    for panel in (stored, given):
-        style.place_legend(panel)
+    supplied.axhline(bound, color=style.INK, linestyle="--", label="lower bound")
+    supplied.set(title=r"Work of the operator $\int f \cdot v\, dt$", ylabel="work in J")
+    scaling.plot(log.time, log["region_rate"].values[:, 0], color="C3")
+    scaling.set(title=r"Time scaling of moving regions $\rho$", ylabel="share", ylim=(0, 1.05))
+    for panel in (stored, supplied):
+        style.add_legend(panel)
     caption = (
-        "The tank pays for what moving or pushing regions give to the hand, and damping fills it; "
-        "the work of the hand never falls below what was stored at the start."
+        "The tank supplies the energy of moving or pushing regions, and damping fills it; the work "
+        "of the operator is bounded below by minus the energy stored at the start."
     )
     return style.Drawing("energy", "Energy of the fixtures", caption, canvas)
 

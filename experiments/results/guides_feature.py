@@ -1,4 +1,4 @@
-"""Paths that attract the tool: which one does, how far it is, and what that stores."""
+"""Attracting paths: active guide, distance, force and stored energy."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from pfsc_drake.controller.tasks.space_task import SpaceTask
 from reporting import style
 from reporting.metrics import Metrics
 
-# name in the log of what the record has
+# names in the log of the record's fields
 _SIGNALS = {
     "kappa": "guide_stiffness",
     "share": "guide_share",
@@ -19,18 +19,18 @@ _SIGNALS = {
     "after": "guide_energy_after",
     "foot": "guide_foot",
 }
-# s, for which a guide must have pulled to have been followed
+# s, least active time of a followed guide
 _FOLLOWED = 0.5
 MILLI = 1e3
 
 
 def add_guides(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add which guide pulled, where on each the tool was, and how far it truly was from each.
+    """Add the active guide, and position along and actual distance from each guide.
 
     Args:
-        log: To add to, with ``rest_point`` and ``velocity_command``.
+        log: Log of the run, which is extended, with ``rest_point`` and ``velocity_command``.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     task = station.task
     if "guides" not in raw or not isinstance(task, SpaceTask):
@@ -49,7 +49,7 @@ def add_guides(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def guide_metrics(log: RunLog) -> Metrics:
-    """Return which guides were followed, and what it took to change from one to the next.
+    """Return the number of followed guides, changes between them, and forces.
 
     Args:
         log: Log of a run; without ``guide`` there are no such metrics.
@@ -73,12 +73,12 @@ def guide_metrics(log: RunLog) -> Metrics:
 
 
 def draw_guides(log: RunLog) -> style.Drawing:
-    """Which guide pulls, the distance from each, the way along it, forces, and the speed."""
+    """Draw the active guide, distances, position along it, forces and speed."""
     canvas, (which, distance, along, force, speed) = style.make_panels(5)
     names = log["guide"].labels
     active = log["guide"].values[:, 0]
     which.step(log.time, active, where="post", color=style.INK)
-    which.set(title="Guide that pulls", yticks=range(len(names)), ylim=(-0.3, len(names) - 0.7))
+    which.set(title="Active guide", yticks=range(len(names)), ylim=(-0.3, len(names) - 0.7))
     which.set_yticklabels(names)
     distance.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
     for k, name in enumerate(names[1:]):
@@ -89,23 +89,23 @@ def draw_guides(log: RunLog) -> style.Drawing:
         eta = np.where(pulls, log["guide_eta"].values[:, k], np.nan)
         along.plot(log.time, eta, color=colour, label=name)
     distance.set(title="Distance from the guides", ylabel="distance in mm")
-    along.set(title="Way along the guide that pulls", ylabel=r"$\eta$ in m")
+    along.set(title="Position along the active guide", ylabel=r"$\eta$ in m")
     pull = log.norm("guide_force")
     hand = log.norm("guiding_force")
-    force.plot(log.time, hand, color=style.INK, linewidth=0.8, label="of the hand")
-    force.plot(log.time, pull, color="C1", label="of the guide")
+    force.plot(log.time, hand, color=style.INK, linewidth=0.8, label="operator")
+    force.plot(log.time, pull, color="C1", label="guide")
     force.set(title="Forces", ylabel="force in N")
     command = log.norm("velocity_command")
     speed.plot(log.time, command, color="C0")
-    speed.set(title="Speed that is asked of the tool", ylabel="speed in m/s")
+    speed.set(title="Commanded speed of the tool", ylabel="speed in m/s")
     shade_pushes([distance], log)
     for panel in (distance, force):
-        style.place_legend(panel)
+        style.add_legend(panel)
     caption = (
-        "Which of the paths pulls the tool; how far the tool truly is from each, thick from the "
-        "one that pulls; the way along it; forces of the hand and of the guide; and the speed."
+        "Active guide; actual distance of the tool from each guide, thick from the active one; "
+        "position along it; forces of operator and guide; and commanded speed."
     )
-    return style.Drawing("guides", "Paths that attract", caption, canvas)
+    return style.Drawing("guides", "Attracting paths", caption, canvas)
 
 
 FEATURE = Feature(

@@ -1,4 +1,4 @@
-"""Limits of the robot that hold the hand which guides it."""
+"""Forces of the robot's own limits on the guiding hand."""
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from reporting.metrics import Metrics
 
 
 def add_hand_limits(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add forces of the robot's own limits on a hand, with compliance or within virtual fixtures.
+    """Add forces of the robot's own limits on the operator, for compliance or virtual fixtures.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     joints = station.robot.dimension
     if "guidance" in raw and isinstance(station.task, SpaceTask):
@@ -31,11 +31,11 @@ def add_hand_limits(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str], FloatArray]:
-    """Return by what forces the limits of the robot itself held the tool.
+    """Return the forces of the robot's own limits on the tool.
 
     Args:
         near: Slots as recorded, shape (samples, slots x 10).
-        regions: Number of regions, behind which the limits are numbered.
+        regions: Number of regions, after which the limits are numbered.
         joints: N.
 
     Returns:
@@ -53,7 +53,7 @@ def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str]
 
 
 def limit_metrics(log: RunLog) -> Metrics:
-    """Return for how long, and how hard, the robot's own limits held the hand.
+    """Return duration and largest force of the robot's own limits on the operator.
 
     Args:
         log: Log of a run; without ``limit_force`` there are no such metrics.
@@ -63,14 +63,14 @@ def limit_metrics(log: RunLog) -> Metrics:
         return metrics
     forces = np.nan_to_num(log["limit_force"].values)
     period = log.period
-    held = np.count_nonzero(np.any(forces > 0.0, axis=1))
-    metrics.add("time_at_limits", held * period)
+    active = np.count_nonzero(np.any(forces > 0.0, axis=1))
+    metrics.add("time_at_limits", active * period)
     metrics.add("largest_limit_force", float(np.max(forces)))
     return metrics
 
 
 def draw_limits(log: RunLog) -> style.Drawing | None:
-    """Which joint, at its speed or its end, or which singular posture held the tool, and how."""
+    """Draw forces of joint limits, speed limits and singular postures on the tool."""
     forces = log["limit_force"]
     shown = np.flatnonzero(np.any(forces.values > 0.0, axis=0))
     if not shown.size:
@@ -80,14 +80,14 @@ def draw_limits(log: RunLog) -> style.Drawing | None:
         colour = f"C{k}"
         label = _limit_label(forces.labels[column])
         force.plot(log.time, forces.values[:, column], color=colour, label=label)
-    force.set(title="Forces by which the robot's own limits hold the hand", ylabel="force in N")
+    force.set(title="Forces of the robot's own limits on the operator", ylabel="force in N")
     velocity = np.gradient(log["y_t"].values, log.time, axis=0)
     speed.plot(log.time, np.linalg.norm(velocity, axis=1), color="C0")
     speed.set(title="Speed of the tool", ylabel="speed in m/s")
-    style.place_legend(force)
+    style.add_legend(force)
     caption = (
-        "Where joints are at their speeds or ends, or the arm is nearly singular, the hand feels a "
-        "wall as that of a region."
+        "At limits of joint position or speed, or near a singular posture, the operator feels a "
+        "wall, as at a region."
     )
     return style.Drawing("limits", "Limits of the robot", caption, canvas)
 

@@ -1,4 +1,4 @@
-"""Workpiece that moves: the robot or turntable that carries it, and the tool on it."""
+"""Moving workpiece: its robot or turntable, and the tool on it."""
 
 import numpy as np
 
@@ -16,19 +16,19 @@ from pfsc_drake.geometry.rotation import placed_points
 from reporting import style
 from reporting.metrics import Metrics
 
-_SMOOTHED = 5  # samples, of speeds that are differences of true positions
+_SMOOTHED = 5  # samples, of speeds that are differences of actual positions
 
 
 def workpiece_motion(station: Station, raw: Raw) -> FloatArray | None:
-    """Return the true motion of the workpiece, up to its velocity.
+    """Return the actual motion of the workpiece, up to its velocity.
 
     Args:
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
 
     Returns:
-        Derivatives 0..r of ``[p_WC, R_WC by rows]``, those from the second on zero, shape
-        (samples, 12 (r + 1)); None of a station where nothing carries one.
+        Derivatives 0..r of ``[p_WC, R_WC by rows]``, zero from the second on, shape (samples, 12 (r
+        + 1)); None of a station without moving workpiece.
     """
     holder, turntable = station.holder, station.turntable
     order = station.task.manifold.layout.order
@@ -50,8 +50,8 @@ def workpiece_motion(station: Station, raw: Raw) -> FloatArray | None:
     return motion
 
 
-def seen_poses(pose: FloatArray, frames: FloatArray) -> FloatArray:
-    """Return poses in a frame that moves, ``[y_C, R_Ce by rows]``, shape (samples, 12).
+def relative_poses(pose: FloatArray, frames: FloatArray) -> FloatArray:
+    """Return poses relative to a moving frame, ``[y_C, R_Ce by rows]``, shape (samples, 12).
 
     Args:
         pose: ``[y_t, R_e by rows]`` in the world, shape (samples, 12).
@@ -64,12 +64,12 @@ def seen_poses(pose: FloatArray, frames: FloatArray) -> FloatArray:
 
 
 def add_holder_signals(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add where the workpiece is, and what the robot does that holds it.
+    """Add the pose of the workpiece, and signals of its robot or turntable.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     if "workpiece_motion" not in raw:
         return
@@ -96,11 +96,11 @@ def add_holder_signals(log: RunLog, station: Station, raw: Raw) -> None:
     log.add(f"{HOLDER}tau_d", own["law"][:, layout.drive], limits=holder.law.limits)
     coordinates = holder.law.linearization.manifold.coordinates
     m, kinds = len(coordinates), [coordinate.kind.value for coordinate in coordinates]
-    told, asked = own["law"][:, layout.manifold_state][:, :m], own["reference"][:, :m]
+    output, reference = own["law"][:, layout.manifold_state][:, :m], own["reference"][:, :m]
     for kind in dict.fromkeys(kinds):
         rows = [i for i, own_kind in enumerate(kinds) if own_kind == kind]
-        log.add(f"{HOLDER}{kind}", told[:, rows])
-        log.add(f"{HOLDER}{kind}_p", asked[:, rows])
+        log.add(f"{HOLDER}{kind}", output[:, rows])
+        log.add(f"{HOLDER}{kind}_p", reference[:, rows])
     labels = [fault.name.lower() for fault in Fault]
     status = own["law"][:, layout.status]
     log.add(f"{HOLDER}fault", status[:, 0].astype(int), labels=labels)
@@ -109,26 +109,26 @@ def add_holder_signals(log: RunLog, station: Station, raw: Raw) -> None:
     log.add("frame_error", frame_error(own["frame_jet"], frames))
 
 
-def frame_error(believed: FloatArray, true: FloatArray) -> FloatArray:
-    """Return how far the workpiece is from where its motion is told [m, rad], (samples, 2).
+def frame_error(nominal: FloatArray, actual: FloatArray) -> FloatArray:
+    """Return the pose error of the workpiece's reported motion [m, rad], shape (samples, 2).
 
     Args:
-        believed: ``[p_WC, R_WC by rows, ..]`` as told, shape (samples, 12 or more).
-        true: The same as it is.
+        nominal: Reported ``[p_WC, R_WC by rows, ..]``, shape (samples, 12 or more).
+        actual: Actual ``[p_WC, R_WC by rows, ..]``, same shape.
     """
-    off = np.linalg.norm(believed[:, :3] - true[:, :3], axis=1)
-    R_1, R_2 = (x[:, 3:POSE_SIZE].reshape(-1, 3, 3) for x in (believed, true))
-    # of a small turn, without loss of digits
+    off = np.linalg.norm(nominal[:, :3] - actual[:, :3], axis=1)
+    R_1, R_2 = (x[:, 3:POSE_SIZE].reshape(-1, 3, 3) for x in (nominal, actual))
+    # of a small rotation, without loss of digits
     chord = np.linalg.norm((R_1 - R_2).reshape(-1, 9), axis=1) / np.sqrt(8.0)
     return np.column_stack([off, 2.0 * np.arcsin(np.minimum(chord, 1.0))])
 
 
 def holder_metrics(log: RunLog, begin: float) -> Metrics:
-    """Return the metrics of two robots, none without one that holds a workpiece.
+    """Return the metrics of a moving workpiece, none without one.
 
     Args:
         log: Log of a run.
-        begin: Time from which on deviations count [s].
+        begin: Time from which deviations count [s].
     """
     metrics = Metrics()
     if "workpiece_pose" not in log or log.time.size < 2:
@@ -141,14 +141,14 @@ def holder_metrics(log: RunLog, begin: float) -> Metrics:
     )
     metrics.add("peak_workpiece_turning", peak(turning / np.diff(time)))
     metrics.add("peak_tool_speed_world", peak(_speeds(time, log["y_t_world"].values)))
-    held = f"{HOLDER}xi" in log
-    if held:
+    has_robot = f"{HOLDER}xi" in log
+    if has_robot:
         xi = log.norm(f"{HOLDER}xi")
         metrics.add("max_workpiece_deviation", peak(xi[counting]))
     error = log["frame_error"].values
     metrics.add("max_frame_error", peak(error[counting, 0]))
     metrics.add("max_frame_angle", peak(error[counting, 1]))
-    if not held:
+    if not has_robot:
         return metrics
     for axis, torque in enumerate(np.abs(log[f"{HOLDER}tau_d"].values).max(axis=0), start=1):
         metrics.add(f"peak_holder_torque_{axis}", float(torque), log[f"{HOLDER}tau_d"].unit)
@@ -162,45 +162,45 @@ def _speeds(time: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def draw_two_arms(log: RunLog) -> style.Drawing:
-    """Speeds of tool and workpiece, how the workpiece turns, and how far it is from its belief."""
+    """Draw speeds of tool and workpiece, the workpiece's rotation, and its pose error."""
     canvas, panels = style.make_panels(4)
     pose, time = log["workpiece_pose"].values, log.time
-    speeds, turning, slope, belief = panels
+    speeds, turning, slope, pose_error = panels
     speeds.plot(time, log["eta_dot"].values[:, 0], color="C0", label="along the path")
     speeds.plot(time, _speed(log["y_t_world"].values, time), color="C1", label="tool, world")
     speeds.plot(time, _speed(pose[:, :3], time), color="C2", label="workpiece, world")
     speeds.set(ylabel="speed in m/s", title="Speeds of tool and workpiece")
-    style.place_legend(speeds)
+    style.add_legend(speeds)
     R = pose[:, 3:].reshape(-1, 3, 3)
     turned = np.rad2deg([angle_between(R[:, :, k], R[:1, :, k]) for k in range(3)])
     style.draw_components(turning, time, turned.T, ["x axis", "y axis", "z axis"])
-    turning.set(ylabel="angle in deg", title="How far the workpiece's axes are from the start")
-    style.place_legend(turning)
+    turning.set(ylabel="angle in deg", title="Rotation of the workpiece's axes from the start")
+    style.add_legend(turning)
     if "holder_xi" in log:
         own = log["holder_xi"].values
         scale, unit = style.fitting_unit(own, "m")
         style.draw_components(slope, time, scale * own, [r"$\xi_1$", r"$\xi_2$"])
-        title = "The workpiece beside its own path, as measured"
+        title = "Measured deviation of the workpiece from its own path"
         slope.set(ylabel=f"deviation in {unit}", title=title)
     else:
         angles = np.rad2deg(log["turntable_angles"].values)
         labels = [f"axis {k + 1}" for k in range(angles.shape[1])]
         style.draw_components(slope, time, angles, labels)
         slope.set(ylabel="angle in deg", title="Axes of the turntable")
-    style.place_legend(slope)
+    style.add_legend(slope)
     error = log["frame_error"].values
     scale, unit = style.fitting_unit(error[:, :1], "m")
-    belief.plot(time, scale * error[:, 0], color="C0")
-    belief.set(ylabel=f"distance in {unit}", title="Where it is against where its motion is told")
+    pose_error.plot(time, scale * error[:, 0], color="C0")
+    pose_error.set(ylabel=f"distance in {unit}", title="Position error of the reported motion")
     caption = (
-        "Speeds of the tool on the workpiece and of both in the world, how the workpiece turns, "
-        "what carries it, and what the tool's controller cannot know of where it is."
+        "Speeds of the tool on the workpiece and of both in the world, rotation of the workpiece, "
+        "motion of its robot or turntable, and position error unknown to the tool's controller."
     )
     return style.Drawing("two_arms", "Two arms", caption, canvas)
 
 
 def draw_holder_torques(log: RunLog) -> style.Drawing:
-    """Drive torques of the robot that holds the workpiece, three axes per panel."""
+    """Draw drive torques of the workpiece robot, three axes per panel."""
     signal = log["holder_tau_d"]
     groups = [range(i, min(i + 3, signal.dim)) for i in range(0, signal.dim, 3)]
     canvas, panels = style.make_panels(len(groups))
@@ -209,9 +209,9 @@ def draw_holder_torques(log: RunLog) -> style.Drawing:
         chosen = [labels[i] for i in group]
         style.draw_components(panel, log.time, signal.values[:, group], chosen)
         panel.set(ylabel=f"torque in {signal.unit}")
-        style.place_legend(panel)
-    caption = "Torques of the drives of the robot that holds the workpiece."
-    return style.Drawing("holder_torques", "Drive torques of the holder", caption, canvas)
+        style.add_legend(panel)
+    caption = "Drive torques of the workpiece robot."
+    return style.Drawing("holder_torques", "Drive torques of the workpiece robot", caption, canvas)
 
 
 def _speed(points: FloatArray, time: FloatArray) -> FloatArray:

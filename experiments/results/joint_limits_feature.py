@@ -1,7 +1,7 @@
-"""Limits of joints: how near a run comes to them, or how far beyond.
+"""Joint limits: margins of a run, or violations.
 
-A simulated joint goes on beyond its limits, a real one does not. Signals used, as in the log:
-``q_J``, ``v_J`` [samples, axes].
+A simulated joint does not stop at its limits. Signals used, as in the log: ``q_J``, ``v_J``
+[samples, axes].
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from pfsc_drake.robot.coordinate_text import coordinate_text
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from reporting.metrics import Metrics
 
-# relative; a limit that is missed by rounding is not passed
+# relative; exceeding a limit by rounding is no violation
 _ROUNDING = 1e-9
 # names of the position metric by whether a joint turns
 _MARGIN = {True: "joint_limit_margin", False: "slide_limit_margin"}
@@ -53,18 +53,18 @@ class DriveLimitsOfRun:
         )
 
     def metric_names(self) -> list[str]:
-        """Return the names of the metrics that :meth:`metrics` gives."""
+        """Return the names of the metrics of :meth:`metrics`."""
         bounded = np.isfinite(self.position).any(axis=1)
         names = [name for kind, name in _MARGIN.items() if (bounded & self._turns(kind)).any()]
         return [*names, *([_SHARE] if np.isfinite(self.velocity).any() else [])]
 
     def metrics(self, log: RunLog) -> Metrics:
-        """Return how near a run came to the limits, with joint and time as the source.
+        """Return the margins of a run to the limits, with joint and time as the source.
 
-        ``joint_limit_margin`` [rad] is the least distance of a turning joint from a limit of its
-        position, negative if it passed it; ``slide_limit_margin`` [m] that of a sliding one.
-        ``joint_velocity_share`` is the largest ratio of a joint's speed to its limit. Each is
-        there if a joint has such a limit. What is not a number does not count.
+        ``joint_limit_margin`` [rad] is the least distance of a revolute joint from its position
+        limits, negative beyond; ``slide_limit_margin`` [m] of a prismatic one.
+        ``joint_velocity_share`` is the largest ratio of a joint's speed to its limit. Each exists
+        if a joint has such a limit. NaN does not count.
 
         Args:
             log: With ``q_J`` and ``v_J``.
@@ -81,7 +81,7 @@ class DriveLimitsOfRun:
         return metrics
 
     def warnings(self, log: RunLog) -> list[str]:
-        """Return one sentence for each limit that a run passed.
+        """Return one sentence for each violated limit.
 
         Args:
             log: With ``q_J`` and ``v_J``.
@@ -105,7 +105,7 @@ class DriveLimitsOfRun:
         values: FloatArray,
         beyond: FloatArray,
     ) -> str:
-        """Return a sentence if a joint is ``beyond`` a limit of position or speed anywhere."""
+        """Return a sentence if a joint is ``beyond`` a limit of position or speed at any time."""
         passed = np.flatnonzero(beyond > 0.0)
         if not passed.size:
             return ""
@@ -115,9 +115,10 @@ class DriveLimitsOfRun:
             for value in (limit, values[farthest, i])
         )
         return (
-            f"joint {i + 1} '{self.names[i]}' passes its {'speed ' if per else ''}limit of {at} at "
+            f"joint {i + 1} '{self.names[i]}' exceeds its {'speed ' if per else ''}limit of {at} "
+            "at "
             f"t = {time[passed[0]]:.3f} s and reaches {reached} at t = {time[farthest]:.3f} s; "
-            "the simulation lets it pass"
+            "the simulation does not stop it"
         )
 
     def _turns(self, kind: object) -> NDArray[np.bool_]:
@@ -130,7 +131,7 @@ class DriveLimitsOfRun:
 
 
 def _least(values: FloatArray, log: RunLog) -> tuple[float, str | None]:
-    """Return the least of some joints' values, shape (samples, N), and where it is."""
+    """Return the least of some joints' values, shape (samples, N), with joint and time."""
     known = np.where(np.isnan(values), np.inf, values)
     if not np.isfinite(known).any():
         return np.nan, None

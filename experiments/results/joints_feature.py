@@ -1,6 +1,6 @@
 """Joints: positions and velocities of links and motors, and deflection between them.
 
-Rotary joints are in rad, sliding ones, slides, in m; the words follow the units of the signals.
+Revolute joints are in rad, prismatic ones (slides) in m; texts follow the units of the signals.
 """
 
 from typing import TYPE_CHECKING
@@ -22,17 +22,17 @@ _MILLI_UNITS = {"rad": "mrad", "m": "mm"}
 POSITION_UNITS = {"rad": (180.0 / np.pi, "deg")}
 _REACH = 0.1  # of the range of an axis, below which its distance from a limit matters
 _NEAR = 0.5  # of the span that a joint's panel shows, within which a limit is shown, too
-_ROOM = 0.15  # of that span, beyond what has to be seen
+_BORDER = 0.15  # of that span, around the shown values
 _FORBIDDEN, _BEYOND = "#E5E7EB", "#FECACA"
 
 
 def add_joints(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add positions and velocities of links and of the motors of elastic joints, also as measured.
+    """Add actual and measured positions and velocities of links and of motors of elastic joints.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     limits = {
         "q_J": station.robot.gather("position_limits"),
@@ -49,13 +49,13 @@ def add_joints(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def has_spare_joints(log: RunLog) -> bool:
-    """Return whether a run's robot has more joints than the coordinates that it follows."""
+    """Return whether a run's robot has more joints than task coordinates."""
     outputs = sum(log[name].dim for name in ("eta", "xi", "phi") if name in log)
     return 0 < outputs < log["q_J"].dim
 
 
 def draw_velocities(log: RunLog) -> style.Drawing:
-    """Velocities of joints or slides and of motors, and their difference where both are logged."""
+    """Draw velocities of joints or slides and of motors, and their difference."""
     signals = {name: log[name] for name in ("v_J", "v_M") if name in log}
     mover = MOVERS.get(signals["v_J"].unit, "joint and slide")
     titles = {
@@ -69,7 +69,7 @@ def draw_velocities(log: RunLog) -> style.Drawing:
         for axis in range(signal.dim):
             draw_limit(panel, signal, axis)
         panel.set(ylabel=f"velocity in {signal.unit}", title=titles[name])
-    style.place_legend(panels[0])
+    style.add_legend(panels[0])
     limited = any(nears_limit(signals["v_J"], axis) for axis in range(signals["v_J"].dim))
     limits = "; dashed lines are limits within reach" if limited else ""
     if not both:
@@ -81,36 +81,36 @@ def draw_velocities(log: RunLog) -> style.Drawing:
     style.draw_components(panels[2], log.time, difference, axis_labels(difference.shape[1]))
     title = r"Difference $\dot q_M - \dot q_J$"
     panels[2].set(ylabel=f"velocity in {log['v_M'].unit}", title=title)
-    caption = "They differ through the elastic transmissions, where the load on them changes"
+    caption = "They differ by the deflection rate of the elastic transmissions"
     title = f"{mover.capitalize()} and motor velocities"
     return style.Drawing("velocities", title, f"{caption}{limits}.", canvas)
 
 
 def draw_deflection(log: RunLog) -> style.Drawing:
-    """Deflection of the elastic joints."""
+    """Draw deflection of the elastic joints."""
     canvas, (panel,) = style.make_panels(1, height=3.2)
     deflection = MILLI * (log["q_M"].values - log["q_J"].values)
     panel.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
     style.draw_components(panel, log.time, deflection, axis_labels(deflection.shape[1]))
     unit = _MILLI_UNITS.get(log["q_M"].unit, "mrad or mm")
     panel.set(ylabel=f"deflection in {unit}", title=r"Deflection $q_M - q_J$")
-    style.place_legend(panel)
-    caption = "Deflection of the elastic transmissions, motor coordinate less joint coordinate."
+    style.add_legend(panel)
+    caption = "Deflection of the elastic transmissions, motor minus joint coordinate."
     return style.Drawing("deflection", "Joint deflection", caption, canvas)
 
 
 def axis_labels(count: int) -> list[str]:
-    """Labels ``axis 1`` and so on."""
+    """Return labels ``axis 1`` and so on."""
     return [f"axis {i + 1}" for i in range(count)]
 
 
 def plural(words: str) -> str:
-    """``joints and slides`` of ``joint and slide``."""
+    """Return the plural, e.g. ``joints and slides`` of ``joint and slide``."""
     return " and ".join(f"{word}s" for word in words.split(" and "))
 
 
 def draw_limit(panel: "Axes", signal: Signal, axis: int) -> None:
-    """The limit of an axis and its negative, if near enough to matter."""
+    """Draw the limit of an axis and its negative, if near enough to matter."""
     if signal.limits is None or not nears_limit(signal, axis):
         return
     limit = float(signal.limits[axis])
@@ -121,17 +121,16 @@ def draw_limit(panel: "Axes", signal: Signal, axis: int) -> None:
 
 
 def nears_limit(signal: Signal, axis: int) -> bool:
-    """Whether an axis comes within a factor of two of its limit."""
+    """Return whether an axis comes within a factor of two of its limit."""
     if signal.limits is None or not np.isfinite(signal.limits[axis]):
         return False
     return style.largest(signal.values[:, axis]) >= 0.5 * float(signal.limits[axis])
 
 
 def draw_positions(log: RunLog) -> style.Drawing:
-    """Positions of joints or slides; each in a panel of its own where limits or postures matter.
+    """Draw positions of joints or slides, in separate panels where limits or postures matter.
 
-    That is with more joints than coordinates of the path, with a reference posture, or where a
-    joint comes near its limits.
+    These are used for redundant robots, with a reference posture, or near joint limits.
 
     Args:
         log: With ``q_J``, perhaps with ``q_posture``.
@@ -147,23 +146,23 @@ def draw_positions(log: RunLog) -> style.Drawing:
         factor, unit = position_unit(signal)
         style.draw_components(panel, log.time, factor * signal.values, axis_labels(signal.dim))
         panel.set(ylabel=f"position in {unit}", title=f"{title} $q_J$")
-        style.place_legend(panel)
+        style.add_legend(panel)
         caption = ""
     return style.Drawing("positions", title, f"Positions of the {plural(mover)}{caption}.", canvas)
 
 
 def position_unit(signal: Signal) -> tuple[float, str]:
-    """Factor to the unit of an axis of positions, and its name."""
+    """Return the factor to the displayed unit of positions, and its name."""
     return POSITION_UNITS.get(signal.unit, (1.0, signal.unit))
 
 
 def _one_each(log: RunLog, near: dict[tuple[int, int], bool]) -> "tuple[Canvas, str]":
-    """A panel for each joint, and what it adds to the caption."""
+    """Draw a panel for each joint, and return the canvas and its part of the caption."""
     signal = log["q_J"]
     factor, unit = position_unit(signal)
     posture = log["q_posture"].values if "q_posture" in log else None
     canvas, panels = style.make_panels(signal.dim, height=1.15)
-    seen = False
+    has_limits = False
     for axis, panel in enumerate(panels):
         q = factor * signal.values[:, axis]
         panel.plot(log.time, q, color=f"C{axis}", label="position")
@@ -173,14 +172,14 @@ def _one_each(log: RunLog, near: dict[tuple[int, int], bool]) -> "tuple[Canvas, 
             panel.plot(log.time, reference, "--", color=style.INK, linewidth=1.1, label="posture")
             shown.append(reference)
         sides = {side: beyond for (joint, side), beyond in near.items() if joint == axis}
-        seen |= _draw_limits(panel, log, axis, np.concatenate(shown), sides)
+        has_limits |= _draw_limits(panel, log, axis, np.concatenate(shown), sides)
         panel.set(ylabel=unit)
         panel.set_title(f"axis {axis + 1}", fontsize=10)
     if posture is not None:
-        style.place_legend(panels[0])
-    caption = " each in a panel of its own"
-    caption += "; grey beyond its limits" if seen else "; limits are out of sight"
-    caption += ", red where they are passed" if any(near.values()) else ""
+        style.add_legend(panels[0])
+    caption = " each in its own panel"
+    caption += "; grey beyond its limits" if has_limits else "; limits are out of view"
+    caption += ", red where they are exceeded" if any(near.values()) else ""
     caption += "; dashed: the reference posture" if posture is not None else ""
     return canvas, f",{caption}"
 
@@ -188,15 +187,14 @@ def _one_each(log: RunLog, near: dict[tuple[int, int], bool]) -> "tuple[Canvas, 
 def _draw_limits(
     panel: "Axes", log: RunLog, axis: int, shown: FloatArray, near: dict[int, bool]
 ) -> bool:
-    """Scales a panel and shades what is beyond the limits that are in sight; whether one is.
+    """Scale a panel and shade the range beyond visible limits; return whether one is visible.
 
     Args:
         panel: Panel of one joint.
         log: The log.
         axis: The joint.
-        shown: What the panel has to show, in its unit.
-        near: The sides, 0 below and 1 above, on which a limit is within reach, and whether it is
-            passed.
+        shown: Values in the panel, in its unit.
+        near: The sides, 0 below and 1 above, with a limit within reach, and whether it is exceeded.
     """
     signal = log["q_J"]
     factor, _ = position_unit(signal)
@@ -210,8 +208,8 @@ def _draw_limits(
         distance = (low - limit) if side == 0 else (limit - high)
         if np.isfinite(limit) and (side in near or distance < _NEAR * span):
             low, high = min(low, limit), max(high, limit)
-    room = _ROOM * max(high - low, span)
-    low, high = low - room, high + room
+    border = _BORDER * max(high - low, span)
+    low, high = low - border, high + border
     panel.set_ylim(low, high)
     in_sight = False
     for side, limit in enumerate(limits):
@@ -229,7 +227,7 @@ def _draw_limits(
 
 
 def _limits_within_reach(signal: Signal) -> dict[tuple[int, int], bool]:
-    """Axis and side, 0 below and 1 above, of limits that axes come near; whether it is passed."""
+    """Return axis and side (0 below, 1 above) of nearby limits, and whether each is exceeded."""
     if signal.limits is None:
         return {}
     near = {}

@@ -1,4 +1,4 @@
-"""Link to a robot that is driven: delay of answers, missed and clipped samples."""
+"""Link to a driven robot: response time, missed and saturated samples."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from reporting.metrics import Metrics
 
 
 def link_metrics(log: RunLog) -> Metrics:
-    """Return what the link did, if there was one.
+    """Return response times and counts of missed and saturated ticks, if there was a link.
 
     Args:
         log: Log of the run.

@@ -1,11 +1,11 @@
-"""Plates that are mounted: signals, metrics and figures.
+"""Mounting of plates: signals, metrics and figures.
 
 Signals used, as in the log: ``seat_gap`` [samples, pins] m between a plate and the frame at its
-pins, ``seat_offset`` [samples, 1] m, how far beside its seat it is, ``frame_force`` and
-``magazine_force`` [samples, 3] N on the plates, ``held`` [samples, 1], share of the gripper's cups
-that hold, ``hand_wrench`` [samples, 6] N and Nm of the operator, ``xi`` [samples, 2] m and ``phi``
-[samples, 3] rad, how far the tool is off the path; from the first touch of the frame until the
-plate is seated their means are ``insertion_deviation`` and ``insertion_rotation``.
+pins, ``seat_offset`` [samples, 1] m, its lateral distance from the seat, ``frame_force`` and
+``magazine_force`` [samples, 3] N on the plates, ``held`` [samples, 1], share of the gripper's
+attached cups, ``hand_wrench`` [samples, 6] N and Nm of the operator, ``xi`` [samples, 2] m and
+``phi`` [samples, 3] rad, deviation of the tool from the path; from the first touch of the frame
+until the plate is seated their means are ``insertion_deviation`` and ``insertion_rotation``.
 """
 
 import math
@@ -26,21 +26,21 @@ from reporting.metrics import Metrics
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SEATED = 2e-4  # m, gap at every pin up to which a plate is seated
-BESIDE = 2e-3  # m, beside its seat at most, for a gap to be one
-REACHED = 0.02  # m, gap and distance beside its seat at which a plate is at the frame
-TOUCHING = 0.5  # N, from which on a plate counts as touching
+SEATED = 2e-4  # m, largest gap at every pin of a seated plate
+BESIDE = 2e-3  # m, largest lateral distance from the seat
+REACHED = 0.02  # m, gap and lateral distance of a plate at the frame
+TOUCHING = 0.5  # N, least force of a contact
 # panels as in Fig. 5.13: title, signal, its factor, unit, columns, names
 _PANELS: list[tuple[str, str, float, str, slice, list[str]]] = [
     ("Along the path", "eta", 1.0, "m", slice(None), [r"$\eta$"]),
-    ("Beside the path", "xi", 1e3, "mm", slice(None), [r"$\xi_1$", r"$\xi_2$"]),
+    ("Deviation from the path", "xi", 1e3, "mm", slice(None), [r"$\xi_1$", r"$\xi_2$"]),
     (
         *("Measured forces", "manifold_force", 1.0, "N", slice(0, 3)),
         [r"$\tau_\parallel$", r"$\tau_\perp$", r"$\tau_\times$"],
     ),
     (r"Damping $d_\parallel$", "damping", 1e-3, "kNs/m", slice(0, 1), [""]),
     (
-        *("Orientation off the path's", "phi", 1e3, "mrad", slice(None)),
+        *("Orientation error", "phi", 1e3, "mrad", slice(None)),
         [rf"$\phi_{axis}$" for axis in "zyx"],
     ),
     (
@@ -61,7 +61,7 @@ _PHASE_COLOURS = ("#DBEAFE", "#F3F4F6", "#FEF3C7", "#DCFCE7", "#FCE7F3", "#E5E7E
 
 
 def seated_samples(log: RunLog) -> NDArray[np.bool_]:
-    """Return at which samples the plate is seated, shape (samples,)."""
+    """Return the samples at which the plate is seated, shape (samples,)."""
     flush = np.all(np.abs(log["seat_gap"].values) <= SEATED, axis=1)
     return np.asarray(flush & (log["seat_offset"].values[:, 0] <= BESIDE))
 
@@ -83,19 +83,19 @@ def time_to_seat(log: RunLog) -> float:
 
 
 def grip_time(log: RunLog) -> float:
-    """Return the last time at which all cups have taken hold of a plate [s].
+    """Return the last time at which all cups attached to a plate [s].
 
-    It is the start for a plate that is held from there on, NaN if none is.
+    It is the start for a plate that is grasped initially, NaN without a grasped plate.
     """
-    held = log["held"].values[:, 0] >= 1.0
-    taken = np.flatnonzero(held & ~np.append(False, held[:-1]))
+    grasped = log["held"].values[:, 0] >= 1.0
+    taken = np.flatnonzero(grasped & ~np.append(False, grasped[:-1]))
     return float(log.time[taken[-1]]) if taken.size else math.nan
 
 
 def release_time(log: RunLog) -> float:
-    """Return the first time at which no cup holds a plate that was held [s]; NaN without."""
-    held = log["held"].values[:, 0] > 0.0
-    return _first(log.time, ~held & np.append(False, held[:-1]))
+    """Return the first time at which all cups released a grasped plate [s]; NaN without."""
+    grasped = log["held"].values[:, 0] > 0.0
+    return _first(log.time, ~grasped & np.append(False, grasped[:-1]))
 
 
 def mounting_metrics(log: RunLog) -> Metrics:
@@ -132,12 +132,12 @@ def _first(time: FloatArray, where: NDArray[np.bool_]) -> float:
 
 
 def add_mounting_signals(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add where plates are, what they touch, and what the operator does.
+    """Add poses and contact forces of plates, and phase and forces of the operator.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     if station.mounting is None:
         return
@@ -173,28 +173,28 @@ def plate_poses(state: FloatArray) -> FloatArray:
 
 
 def seat_distances(mounting: Mounting, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return how far a plate is from its seat.
+    """Return the distances of a plate from its seat.
 
     Args:
-        mounting: Where the seat is.
+        mounting: Parameters of the seat.
         pose: ``[p, R by rows]`` of the plate, shape (samples, 12).
 
     Returns:
-        The gap between underside and frame at each pin, negative for what is below its surface,
-        shape (samples, pins), and the distance beside the seat, shape (samples, 1) [m].
+        Gap between underside and frame at each pin, negative below its surface, shape (samples,
+        pins), and lateral distance from the seat, shape (samples, 1) [m].
     """
     pins, seat = np.array(mounting.parameters.pins.positions), mounting.X_WF
     roots = np.column_stack([pins, np.zeros(len(pins))])
     R = pose[:, 3:].reshape(-1, 3, 3)
     points = pose[:, np.newaxis, :3] + np.einsum("tij,nj->tni", R, roots)
-    # the face that is gripped is as far from its seat as the underside
+    # the gripped face is as far from its seat as the underside
     in_frame = (points - seat.translation()) @ seat.rotation().matrix()
     beside = np.linalg.norm(in_frame[:, :, :2] - pins, axis=2).max(axis=1, keepdims=True)
     return -in_frame[:, :, 2], beside
 
 
 def draw_use_case(log: RunLog) -> style.Drawing:
-    """Eight panels over time: coordinates, forces, damping and drive torques."""
+    """Draw eight panels over time: coordinates, forces, damping and drive torques."""
     canvas = style.make_canvas(style.WIDTH, _HEIGHT)
     panels = canvas.subplots(4, 2, sharex=True).ravel()
     for letter, panel, row in zip("abcdefgh", panels, _PANELS, strict=True):
@@ -216,15 +216,15 @@ def draw_use_case(log: RunLog) -> style.Drawing:
     canvas.tight_layout()
     caption = (
         "Tangential and transversal coordinates over their references (broad), generalized forces "
-        "of operator and contact together, damping along the path, orientation over its "
-        "reference, generalized moments, and drive torques; dotted: the frame is touched, the "
-        "plate is seated."
+        "of operator and contact, damping along the path, orientation over its reference, "
+        "generalized moments, and drive torques; dotted: first contact with the frame, plate "
+        "seated."
     )
     return style.Drawing("use_case", "Plate mounting", caption, canvas)
 
 
 def draw_mounting(log: RunLog) -> style.Drawing:
-    """Gap between plate and frame, contact forces and the operator's, and what is held."""
+    """Draw gap between plate and frame, forces of contacts and operator, and attached cups."""
     canvas, (near, contact, hand) = style.make_panels(3, height=2.4)
     gap = 1e3 * log["seat_gap"].values
     style.draw_components(near, log.time, gap, [f"pin {i + 1}" for i in range(gap.shape[1])])
@@ -244,15 +244,15 @@ def draw_mounting(log: RunLog) -> style.Drawing:
             label="moment in 0.1 Nm"
         )  # fmt: skip
         _shade_phases([near, contact, hand], log)
-    held = 10.0 * log["held"].values
-    hand.plot(log.time, held, color="C2", label="cups that hold, tenfold")
+    attached = 10.0 * log["held"].values
+    hand.plot(log.time, attached, color="C2", label="share of attached cups, times 10")
     hand.set(title="Operator" if "hand_wrench" in log else "Gripper")
     for panel, columns in ((near, 5), (contact, None), (hand, None)):
-        style.place_legend(panel, columns)
+        style.add_legend(panel, columns)
     caption = (
-        "Gap between the plate's underside and the frame at each pin around the insertion, "
-        "what frame, magazine and gripper do to the plates, and the operator; shaded: what the "
-        "operator is doing."
+        "Gap between the plate's underside and the frame at each pin during insertion, forces of "
+        "frame, magazine and gripper on the plates, and forces of the operator; shaded: phases of "
+        "the operator."
     )
     return style.Drawing("mounting", "Plate at the frame", caption, canvas)
 

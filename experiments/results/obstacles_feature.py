@@ -1,4 +1,4 @@
-"""Obstacles that cross a path: distance from the arm, scaled speed of the reference, time lost.
+"""Obstacles that cross a path: distance from the arm, speed scaling, time lost.
 
 Signals used, as in the log: ``obstacle_position`` [samples, 3K] m, ``obstacle_distance``
 [samples, K] m, ``arm_speed`` [samples, 1] m/s, ``time_lost`` [samples, 1] s.
@@ -18,15 +18,15 @@ from reporting import style
 from reporting.metrics import Metrics
 
 _PASSES, _WAITS = "#DCFCE7", "#FEF3C7"
-_RESTING = 0.05  # of the planned pace, below which the reference waits
-_FAR = 2.0  # m, distances above which nobody needs to see
+_RESTING = 0.05  # speed scaling below which the reference waits
+_FAR = 2.0  # m, larger distances are not shown
 
 
 def add_obstacles(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add where obstacles are, how far the true arm is from them, and how progress waits.
+    """Add positions of obstacles, their actual distance from the arm, and speed scaling.
 
     Args:
-        log: To add to; nothing without obstacles.
+        log: Log of the run, which is extended; nothing without obstacles.
         station: The station that was simulated.
         raw: Its logged signals.
     """
@@ -50,13 +50,13 @@ def add_obstacles(log: RunLog, station: Station, raw: Raw) -> None:
     margin = np.array([[crossing.watch.margin, np.inf]])
     names = [f"obstacle_{k + 1}" for k in range(count)]
     log.add("obstacle_distance", distance, labels=names, limits=margin)
-    own_time, pace = raw["clock"][:, 0], raw["clock"][:, 1]
+    own_time, scaling = raw["clock"][:, 0], raw["clock"][:, 1]
     end = station.reference_duration
-    log.add("waiting_pace", np.where(own_time < end, pace, 0.0))
+    log.add("waiting_pace", np.where(own_time < end, scaling, 0.0))
     log.add("permitted_pace", raw["watch"][:, 1])
     log.add("passing", raw["watch"][:, 2])
     late = log.time - own_time
-    # where the motion has ended nothing is lost
+    # no time is lost after the end of the motion
     running = np.flatnonzero(own_time < end)
     if running.size:
         late[running[-1] + 1 :] = late[running[-1]]
@@ -76,7 +76,7 @@ def _positions(states: FloatArray, count: int) -> FloatArray:
 
 
 def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metrics:
-    """Return how near obstacles came, and what waiting for them cost, if there were any.
+    """Return the least distances of obstacles, and the time lost by waiting, if there are any.
 
     Args:
         log: Log of a run.
@@ -86,10 +86,10 @@ def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metric
     if crossing is None or "obstacle_distance" not in log or not log.time.size:
         return metrics
     least = log["obstacle_distance"].values.min(axis=1)
-    # where the robot stands elsewhere nobody may have told of them
+    # obstacles of a driven robot may never have been reported
     known = np.isfinite(least)
     metrics.add("least_distance", float(least[known].min()) if known.any() else np.nan)
-    # however it moves: along its path, to it, beside it, or with its elbow
+    # any motion counts: along the path, to it, beside it, or of the elbow
     moving = known & (log["arm_speed"].values[:, 0] > crossing.watch.resting_speed)
     metrics.add(
         "least_distance_while_moving", float(least[moving].min()) if moving.any() else np.nan
@@ -102,12 +102,12 @@ def obstacle_metrics(log: RunLog, crossing: CrossingParameters | None) -> Metric
 
 
 def draw_obstacles(log: RunLog) -> style.Drawing:
-    """Distance between arm and obstacles, pace of the reference, and time lost.
+    """Draw distance between arm and obstacles, speed scaling, and time lost.
 
     Args:
         log: With ``obstacle_distance``, ``waiting_pace``, ``permitted_pace``, ``time_lost``.
     """
-    canvas, (distance, pace, lost) = style.make_panels(3, height=2.4)
+    canvas, (distance, scaling, lost) = style.make_panels(3, height=2.4)
     signal = log["obstacle_distance"]
     for k, column in enumerate(signal.values.T):
         name = signal.labels[k].replace("_", " ")
@@ -119,23 +119,23 @@ def draw_obstacles(log: RunLog) -> style.Drawing:
     distance.set(ylabel="distance in m", title="Arm and obstacles", ylim=(0.0, top))
     going = log["waiting_pace"].values[:, 0]
     permitted = log["permitted_pace"].values[:, 0]
-    pace.plot(log.time, going, color="C0", label="pace")
-    pace.plot(log.time, permitted, "--", color=style.REFERENCE, label="permitted, whatever they do")
-    pace.set(ylabel="pace / planned", title="Pace of the reference")
-    pace.set_ylim(min(-0.02, 1.05 * float(going.min(initial=0.0))), 1.05)
+    scaling.plot(log.time, going, color="C0", label="speed scaling")
+    scaling.plot(log.time, permitted, "--", color=style.REFERENCE, label="safe for any motion")
+    scaling.set(ylabel="speed / planned speed", title="Speed scaling of the reference")
+    scaling.set_ylim(min(-0.02, 1.05 * float(going.min(initial=0.0))), 1.05)
     lost.plot(log.time, log["time_lost"].values[:, 0], color="C1")
     lost.set(ylabel="time in s", title="Time lost", ylim=(0.0, None))
     running = np.flatnonzero(going)
     waits = np.abs(going) < _RESTING
     if running.size:
         waits[: running[0]] = waits[running[-1] :] = False
-    style.shade([distance, pace, lost], log.time, waits, "waits", _WAITS)
-    for panel in (distance, pace):
-        style.place_legend(panel)
+    style.shade([distance, scaling, lost], log.time, waits, "waits", _WAITS)
+    for panel in (distance, scaling):
+        style.add_legend(panel)
     caption = (
-        "True distance between the surfaces of the arm and of what crosses its path; the share of "
-        "its planned pace at which the reference moves, and what could still be stopped in time; "
-        "how much later than planned the reference is."
+        "Actual distance between the surfaces of arm and obstacles; speed scaling of the "
+        "reference, "
+        "and the largest one that permits a stop in time; delay of the reference."
     )
     return style.Drawing("obstacles", "Obstacles", caption, canvas)
 

@@ -1,4 +1,4 @@
-"""Orientation of the tool against that of its reference."""
+"""Orientation of the tool and its reference."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from experiments.results.coordinates_feature import (
 from experiments.results.feature import Feature, Raw
 from experiments.results.forces_feature import shade_pushes
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.control.manifolds.manifold import PlaceManifold
+from pfsc_drake.control.manifolds.manifold import ProjectedManifold
 from pfsc_drake.geometry import angle_between, matrix_to_zyx, matrix_to_zyz, turn_about
 from reporting import style
 
@@ -27,48 +27,48 @@ if TYPE_CHECKING:
 # subject, its error, and caption by the number of angles
 _TEXTS = {
     1: (
-        "Turn of the tool",
-        "Error of the tool's turn",
-        "Angle by which the tool is turned about the yaw axis against the orientation that belongs "
-        "to its place; its tilt is no task",
+        "Rotation of the tool",
+        "Error of the tool's rotation",
+        "Angle of the tool about the yaw axis relative to the path's orientation at its "
+        "projection; its tilt is not controlled",
     ),
     2: (
         "Orientation of the tool's axis",
         "Error of the tool's axis",
-        "Angles by which the tool's axis is turned away from the direction that belongs to its "
-        "place, about two directions across it; the turn about the axis is free",
+        "Angles of the tool's axis relative to the path's direction at its projection, about two "
+        "perpendicular directions; the rotation about the axis is free",
     ),
     3: (
         "Orientation",
         "Orientation error",
-        "{} angles of the tool against the orientation that belongs to its place",
+        "{} angles of the tool relative to the path's orientation at its projection",
     ),
 }
-MIN_SPAN = 2.0  # degrees, that an axis of angles shows at least
+MIN_SPAN = 2.0  # degrees, least range of an axis of angles
 
 
 def add_orientation(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add the ZYX angles of the tool and of the reference that the law compares it with.
+    """Add the ZYX angles of the tool and of its reference orientation.
 
-    They are ZYZ angles where those are coordinates. And how far that reference is away from the
-    orientation that belongs to the tool's place. Where only an axis of the tool matters, its
-    directions take the place of the angles; where only its turn about an axis in space does, the
-    turn since the reference that the run begins with.
+    They are ZYZ angles where those are coordinates. The signal ``orientation_lead`` is the angle
+    between the reference and the path's orientation at the tool's projection. If only the tool's
+    axis is controlled, its directions replace the angles; if only its rotation about an axis in
+    space, the rotation relative to the initial reference.
 
     Args:
-        log: To add to; nothing without an orientation to follow.
+        log: Log of the run, which is extended; nothing without an orientation to follow.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
-    if not station.task.place.is_oriented:
+    if not station.task.projected_manifold.is_oriented:
         return
-    place, pose = raw["true_points"], raw["true_pose"]
+    projection, pose = raw["true_points"], raw["true_pose"]
     follows_time = station.law.linearization.manifold.follows_time
-    point = raw["manifold_point"] if follows_time else place
-    R_e, R_d = _rotations(station.task.place, pose, point)
-    _, R_place = _rotations(station.task.place, pose, place)
+    point = raw["manifold_point"] if follows_time else projection
+    R_e, R_d = _rotations(station.task.projected_manifold, pose, point)
+    _, R_path = _rotations(station.task.projected_manifold, pose, projection)
     unknown = np.logical_not(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
-    tool = station.task.place.tool
+    tool = station.task.projected_manifold.tool
     axis, yaw_axis = tool.tool_axis, tool.yaw_axis
     begin = R_d[int(np.argmin(unknown))] if len(R_d) else np.eye(3)
     for name, R in {"e": R_e, "d": R_d}.items():
@@ -83,21 +83,21 @@ def add_orientation(log: RunLog, station: Station, raw: Raw) -> None:
         else:
             directions = np.where(unknown[:, None], np.nan, R @ axis)
             log.add(f"axis_{name}", directions)
-    lead = np.full(len(place), np.nan)
+    lead = np.full(len(projection), np.nan)
     if yaw_axis is not None:
-        lead[~unknown] = np.abs(turn_about(yaw_axis, R_d, R_place))[~unknown]
+        lead[~unknown] = np.abs(turn_about(yaw_axis, R_d, R_path))[~unknown]
     elif axis is not None:
-        lead[~unknown] = angle_between(R_place @ axis, R_d @ axis)[~unknown]
+        lead[~unknown] = angle_between(R_path @ axis, R_d @ axis)[~unknown]
     elif not unknown.all():
-        between = np.swapaxes(R_place, 1, 2) @ R_d
+        between = np.swapaxes(R_path, 1, 2) @ R_d
         lead[~unknown] = Rotation.from_matrix(between[~unknown]).magnitude()
     log.add("orientation_lead", lead)
 
 
 def _rotations(
-    manifold: PlaceManifold, pose: np.ndarray, point: np.ndarray
+    manifold: ProjectedManifold, pose: np.ndarray, point: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tool's and the place's orientation, each (samples, 3, 3); I where not finite."""
+    """Return the tool's and the path's orientation, each (samples, 3, 3); I where not finite."""
     finite = np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1)
     R_e = np.where(finite[:, None], pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
     R_d = np.tile(np.eye(3), (len(point), 1, 1))
@@ -107,7 +107,7 @@ def _rotations(
 
 
 def draw_orientation(log: RunLog) -> style.Drawing:
-    """Orientation errors: components with references and, on a logarithmic scale, their norm."""
+    """Draw orientation errors: components with references, and their norm."""
     canvas, panels = style.make_panels(3 if is_used(log, "phi_p") else 2)
     angles = log["phi"].dim
     labels = [r"$\varphi$ (about z)", r"$\vartheta$ (about y)", r"$\psi$ (about x)"]
@@ -125,21 +125,21 @@ def draw_orientation(log: RunLog) -> style.Drawing:
         draw_enlarged(panels[1], log.time, error, "rad", labels, title)
         sizes[r"from the reference $\|\phi - \phi^p\|$"] = error
     panels[-1].set(ylabel="norm in mrad")
-    draw_sizes(panels[-1], log.time, sizes, "Size of the angles")
+    draw_sizes(panels[-1], log.time, sizes, "Norm of the angles")
     shade_pushes(panels, log)
-    style.place_legend(panels[0])
+    style.add_legend(panels[0])
     caption = caption.format(_convention(log["phi"].labels))
-    caption += "." if error is None else ", over the reference that yields to torques (broad)."
+    caption += "." if error is None else ", over the compliant reference (broad)."
     return style.Drawing("orientation", name, caption, canvas)
 
 
 def _convention(labels: Sequence[str]) -> str:
-    """Return the convention of Euler angles with these labels, of which ZYZ's second z has a 2."""
+    """Return the Euler angle convention of labels; the last label of ZYZ ends with ``z2``."""
     return "ZYZ" if labels[-1].endswith("z2") else "ZYX"
 
 
 def draw_angles(log: RunLog) -> style.Drawing:
-    """Angles of the tool over those of the reference orientation, a panel for each."""
+    """Draw the angles of tool and reference orientation, in one panel each."""
     tool, path = (np.rad2deg(log[name].values) for name in ("angles_e", "angles_d"))
     tool = tool + _whole_turns(path - tool)
     canvas, panels = style.make_panels(tool.shape[1], height=1.9)
@@ -151,22 +151,22 @@ def draw_angles(log: RunLog) -> style.Drawing:
     shade_pushes(panels, log)
     # the tool has another colour in each panel
     for panel in panels:
-        style.place_legend(panel)
+        style.add_legend(panel)
     angles = f"{_convention(log['angles_e'].labels)} angles"
     if tool.shape[1] == 1:
-        angles = "Turns about the yaw axis since the start"
+        angles = "Rotation about the yaw axis since the start"
     caption = (
-        f"{angles} of tool and reference in the world: the reference belongs to a point that"
-        " moves with time and runs on, whatever holds the tool."
+        f"{angles} of tool and reference in the world: the reference is a function of time,"
+        " independent of the tool."
         if "tracking_error" in log
-        else f"{angles} of tool and path in the world: the reference belongs to the place of the"
-        " tool on the path and waits where the tool waits."
+        else f"{angles} of tool and path in the world: the reference is a function of the tool's"
+        " projection on the path, and waits if the tool waits."
     )
     return style.Drawing("angles", "Orientation of tool and reference", caption, canvas)
 
 
 def draw_axis(log: RunLog) -> style.Drawing:
-    """Direction of the tool's axis over that of its reference, and the angle between them."""
+    """Draw the direction of the tool's axis and its reference, and the angle between them."""
     tool, path = log["axis_e"].values, log["axis_d"].values
     canvas, (direction, between) = style.make_panels(2)
     style.draw_reference(direction, log.time, path, "reference")
@@ -176,23 +176,23 @@ def draw_axis(log: RunLog) -> style.Drawing:
     between.set(ylabel="angle in mrad")
     draw_sizes(between, log.time, {"and its reference": angle[:, None]}, "Angle between the axis")
     shade_pushes([direction, between], log)
-    style.place_legend(direction)
+    style.add_legend(direction)
     waits = (
-        "belongs to a point that moves with time and runs on, whatever holds the tool."
+        "is a function of time, independent of the tool."
         if "tracking_error" in log
-        else "belongs to the place of the tool on the path and waits where the tool waits."
+        else "is a function of the tool's projection on the path, and waits if the tool waits."
     )
     caption = (
-        "Axis of the tool, about which it may turn as it likes, and the direction that it is to"
-        f" have, which {waits}"
+        "Axis of the tool, about which its rotation is free, and reference direction, which "
+        f"{waits}"
     )
     return style.Drawing("axis", "Direction of the tool's axis and its reference", caption, canvas)
 
 
 def _whole_turns(difference: FloatArray) -> FloatArray:
-    """Whole turns [deg] in each column of a difference of angles, shape (columns,).
+    """Return whole turns [deg] in each column of a difference of angles, shape (columns,).
 
-    A tool that points down is at 180 deg as well as at -180 deg.
+    180 deg and -180 deg are the same orientation.
     """
     known = difference[np.isfinite(difference).all(axis=1)]
     if not len(known):
@@ -201,7 +201,7 @@ def _whole_turns(difference: FloatArray) -> FloatArray:
 
 
 def _keep_span(panel: "Axes", span: float) -> None:
-    """Widens an axis that shows less, so that rounding does not look like motion."""
+    """Widen an axis to a least span, so that rounding does not appear as motion."""
     low, high = panel.get_ylim()
     if high - low < span:
         centre = 0.5 * (low + high)
@@ -209,7 +209,7 @@ def _keep_span(panel: "Axes", span: float) -> None:
 
 
 def _known(_station: Station, settings: Scenario) -> set[str]:
-    """Return the signal of an orientation, which may be no task."""
+    """Return the signal of an orientation that is not controlled."""
     surface = settings.surface
     free = settings.path.orientation.task == "none"
     return {"phi"} if free or (surface and surface.orientation.kind == "none") else set()

@@ -20,17 +20,17 @@ from pfsc_drake import jets
 from reporting import style
 from reporting.metrics import Metrics
 
-REST = 0.1  # s, end of a run over which the joints' speeds are looked at
+REST = 0.1  # s, end of a run over which the joints' speeds are evaluated
 AT_REST = 1e-3  # m/s, below which the tool rests
-AWAY = 1e-2  # m, from where on the tool has set off
-_WORTH_A_LOOK = 10.0  # times the threshold, below which conditioning is drawn of any arm
+AWAY = 1e-2  # m, distance from the start of a departed tool
+_WORTH_A_LOOK = 10.0  # multiple of the threshold below which conditioning is drawn for any arm
 
 
 def add_posture(log: RunLog, station: Station, raw: Raw) -> None:
-    """Log the posture reference, the coordinate that is kept, and what damping lets slip.
+    """Log the posture reference, the controlled posture coordinate, and the damping residual.
 
     Args:
-        log: Where to add.
+        log: Log of the run.
         station: The station.
         raw: Its logged signals, each (samples, size).
     """
@@ -51,25 +51,25 @@ def add_posture(log: RunLog, station: Station, raw: Raw) -> None:
     if len(reference):
         q = ca.SX.sym("q", n)
         angle = law.posture.coordinate([jets.constant(q[i], 1) for i in range(n)]).coefficients[0]
-        kept = ca.Function("coordinate", [q], [angle]).map(len(reference))
+        evaluate = ca.Function("coordinate", [q], [angle]).map(len(reference))
         both = (raw["joint_state"][:, :n], reference)
-        swivel = np.array([np.unwrap(np.array(kept(x.T)).ravel()) for x in both])
+        swivel = np.array([np.unwrap(np.array(evaluate(x.T)).ravel()) for x in both])
     log.add("swivel", swivel.T, labels=["swivel", "swivel_p"])
 
 
-def posture_metrics(log: RunLog, lap: float | None) -> Metrics:
-    """Return the metrics of posture that a run has.
+def posture_metrics(log: RunLog, revolution: float | None) -> Metrics:
+    """Return the posture metrics whose signals a run has.
 
     Args:
         log: Log of a run.
-        lap: Length of its path [m] if that is closed.
+        revolution: Length of its closed path [m], or None.
     """
     metrics, angle = Metrics(), log["q_J"].unit
     if "q_posture" in log:
         metrics.add("max_posture_error", max_posture_error(log), angle)
     if has_spare_joints(log):
-        if lap is not None:
-            metrics.add("posture_return", posture_return(log, lap), angle)
+        if revolution is not None:
+            metrics.add("posture_return", posture_return(log, revolution), angle)
         metrics.add("final_joint_speed", final_joint_speed(log), log["v_J"].unit)
     return metrics
 
@@ -90,40 +90,39 @@ def final_joint_speed(log: RunLog) -> float:
 
 
 def _progress_rate(log: RunLog) -> np.ndarray:
-    """Return the rate of progress [m/s]; velocity servos leave it to be told from progress."""
+    """Return the rate of progress [m/s]; with velocity servos by differentiation."""
     if "eta_dot" in log:
         return log["eta_dot"].values
     eta = log["eta"].values
     return np.gradient(eta, log.time, axis=0) if len(eta) > 1 else np.zeros_like(eta)
 
 
-def posture_return(log: RunLog, lap: float) -> float:
-    """Largest difference of a joint from where it was in the first lap at the same place.
+def posture_return(log: RunLog, revolution: float) -> float:
+    """Return the largest difference of a joint from the first revolution at the same path position.
 
-    The first lap begins where the tool sets off, so that what it does beside the path before
-    does not count.
+    The first revolution begins at the tool's departure; the approach to the path does not count.
 
     Args:
         log: With ``q_J``, ``eta`` and ``eta_dot`` of a closed path.
-        lap: Length of the path [m].
+        revolution: Length of the path [m].
 
     Returns:
-        rad (m of slides); NaN if there is no second lap.
+        rad (m for slides); NaN without a second revolution.
     """
     begin = _setting_off(log)
     eta, q = log["eta"].values[begin:, 0], log["q_J"].values[begin:]
     along = np.maximum.accumulate(eta)
-    first = along <= eta[0] + lap
-    later = eta > eta[0] + lap
+    first = along <= eta[0] + revolution
+    later = eta > eta[0] + revolution
     if not later.any():
         return math.nan
-    place = eta[0] + np.mod(eta[later] - eta[0], lap)
-    expected = [np.interp(place, along[first], column[first]) for column in q.T]
+    position = eta[0] + np.mod(eta[later] - eta[0], revolution)
+    expected = [np.interp(position, along[first], column[first]) for column in q.T]
     return finite_peak(q[later] - np.stack(expected, axis=1))
 
 
 def _setting_off(log: RunLog) -> int:
-    """Return the last sample at rest before the tool goes away from where it starts."""
+    """Return the last sample at rest before the tool's departure."""
     eta, speed = log["eta"].values[:, 0], _progress_rate(log)[:, 0]
     away = eta - eta[0] > AWAY
     gone = int(np.argmax(away)) if away.any() else len(eta)
@@ -132,9 +131,9 @@ def _setting_off(log: RunLog) -> int:
 
 
 def draw_conditioning(log: RunLog) -> style.Drawing | None:
-    """Reciprocal condition number of the decoupling matrix over time and along the path.
+    """Draw reciprocal condition number of the decoupling matrix over time and along the path.
 
-    It is worth a look of redundant arms, and near its threshold.
+    It is drawn for redundant arms, and near its threshold.
 
     Args:
         log: With ``rcond``, perhaps with ``eta``.
@@ -157,14 +156,14 @@ def draw_conditioning(log: RunLog) -> style.Drawing | None:
                 least, linestyle="--", color=style.ALERT, linewidth=1.2, label="threshold"
             )
         panel.set(xlabel=label, ylabel="1 / condition", title=f"Conditioning {title}")
-    style.place_legend(panels[0])
+    style.add_legend(panels[0])
     caption = "Reciprocal condition number of the decoupling matrix; 0 at a singular posture"
-    caption += ", dashed: the least that the law accepts" if signal.limits is not None else ""
+    caption += ", dashed: the law's threshold" if signal.limits is not None else ""
     return style.Drawing("conditioning", "Conditioning along the path", f"{caption}.", canvas)
 
 
 def draw_posture(log: RunLog) -> style.Drawing:
-    """How far the joints are from the reference posture, and the swivel angle where it is logged.
+    """Draw the joints' distance from the reference posture, and the swivel angle if logged.
 
     Args:
         log: With ``q_J`` and ``q_posture``, perhaps with ``swivel`` and its reference.
@@ -187,20 +186,22 @@ def draw_posture(log: RunLog) -> style.Drawing:
         panels[1].set(ylabel="angle in deg", title="Swivel angle of the elbow")
     shade_pushes(panels, log)
     for panel in panels:
-        style.place_legend(panel)
-    caption = "Joint coordinates less those of the reference posture; the tool needs the difference"
+        style.add_legend(panel)
+    caption = (
+        "Joint coordinates minus reference posture; the difference is due to the tool's motion"
+    )
     return style.Drawing("posture", "Posture", f"{caption}.", canvas)
 
 
 def _known(station: Station, _settings: Scenario) -> list[str]:
-    """Return properties of robot and path that metrics of posture need."""
-    properties = {"redundant": is_redundant(station), "closed": station.task.lap is not None}
+    """Return properties of robot and path required by posture metrics."""
+    properties = {"redundant": is_redundant(station), "closed": station.task.revolution is not None}
     return [name for name, is_so in properties.items() if is_so]
 
 
 FEATURE = Feature(
     signals=add_posture,
-    metrics=lambda log, station, settings: posture_metrics(log, station.task.lap),
+    metrics=lambda log, station, settings: posture_metrics(log, station.task.revolution),
     known=_known,
     figures={"posture": draw_posture, "conditioning": draw_conditioning},
 )

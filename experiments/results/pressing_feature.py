@@ -1,4 +1,4 @@
-"""Pressing on a workpiece: force along its normal and the reference of that force.
+"""Pressing on a workpiece: normal force and its reference.
 
 Signals used, as in the log: ``normal_force`` and ``press`` [samples, 1] N, ``xi`` [samples, 1] m.
 """
@@ -18,26 +18,26 @@ from reporting.metrics import Metrics
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TOUCHING = 0.5  # N, from which on the tool counts as on the workpiece
-SETTLING = 0.2  # s, from touch-down and full force on, until the force shall keep
-_FULL = 0.999  # of the largest reference, from which on it counts as full
-_SMALL = 0.1  # of the same; below it there is nothing to overshoot
+TOUCHING = 0.5  # N, least force of a contact
+SETTLING = 0.2  # s, settling time after touch-down and full reference
+_FULL = 0.999  # of the largest reference, least share of a full one
+_SMALL = 0.1  # of the same; overshoot is not evaluated below
 BAND = 2.0  # N, to either side of the reference
 _SIZE = (7.0, 4.6)  # inches
 _DOT = 7.0  # points^2
 
 
 def add_pressing(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add the force with which a workpiece presses along its normal, and what it is to be.
+    """Add the normal force of a workpiece, and its reference.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     if "press" in raw:
         log.add("press", raw["press"])
-    workpiece, axes = station.workpiece, station.task.place.axes
+    workpiece, axes = station.workpiece, station.task.projected_manifold.axes
     if workpiece is None or workpiece.normal(np.eye(3)) is None:
         return
     normals = np.array(
@@ -56,7 +56,7 @@ def press_metrics(log: RunLog) -> Metrics:
         metrics.add("touch_down", touch_down(log))
         metrics.add("touch_down_overshoot", touch_down_overshoot(log))
         metrics.add("contact_losses", contact_losses(log))
-        error = force_error(log)[held_samples(log)]
+        error = force_error(log)[full_force_samples(log)]
         metrics.add("max_force_error", peak(np.abs(error)))
         rms = float(np.sqrt(np.mean(error**2))) if error.size else math.nan
         metrics.add("rms_force_error", rms)
@@ -64,13 +64,13 @@ def press_metrics(log: RunLog) -> Metrics:
 
 
 def touch_down(log: RunLog) -> float:
-    """Return the first time at which the tool is on the workpiece [s]; NaN if it never is."""
+    """Return the first time of contact with the workpiece [s]; NaN without contact."""
     touching = np.flatnonzero(log["normal_force"].values[:, 0] > TOUCHING)
     return float(log.time[touching[0]]) if touching.size else math.nan
 
 
-def held_samples(log: RunLog) -> NDArray[np.bool_]:
-    """Return which samples are of the time in which the full force shall keep, (samples,)."""
+def full_force_samples(log: RunLog) -> NDArray[np.bool_]:
+    """Return the samples with settled full reference force, shape (samples,)."""
     press = log["press"].values[:, 0]
     full = press >= _FULL * press.max()
     begin = log.time[int(np.argmax(full))]
@@ -78,32 +78,32 @@ def held_samples(log: RunLog) -> NDArray[np.bool_]:
 
 
 def force_error(log: RunLog) -> FloatArray:
-    """Return the force on the workpiece less its reference [N], shape (samples,)."""
+    """Return the force on the workpiece minus its reference [N], shape (samples,)."""
     return np.asarray((log["normal_force"].values - log["press"].values)[:, 0])
 
 
 def touch_down_overshoot(log: RunLog) -> float:
-    """Return the largest force above the reference of the moment, by it, until it shall keep.
+    """Return the largest overshoot relative to the current reference, until it has settled.
 
-    NaN if the tool never touches.
+    NaN without contact.
     """
-    press, held = log["press"].values[:, 0], held_samples(log)
+    press, settled = log["press"].values[:, 0], full_force_samples(log)
     if math.isnan(touch_down(log)):
         return math.nan
-    until = log.time[int(np.argmax(held))] if held.any() else math.inf
+    until = log.time[int(np.argmax(settled))] if settled.any() else math.inf
     counted = (log.time >= touch_down(log)) & (log.time < until) & (press >= _SMALL * press.max())
     return max(0.0, peak((force_error(log) / np.where(counted, press, 1.0))[counted]))
 
 
 def contact_losses(log: RunLog) -> float:
-    """Return how often the tool leaves the workpiece while it is to press."""
-    wanted = (log.time >= touch_down(log)) & (log["press"].values[:, 0] > TOUCHING)
-    off = (log["normal_force"].values[:, 0] <= 0.0)[wanted]
+    """Return the number of contact losses while the reference force is positive."""
+    desired = (log.time >= touch_down(log)) & (log["press"].values[:, 0] > TOUCHING)
+    off = (log["normal_force"].values[:, 0] <= 0.0)[desired]
     return float(np.count_nonzero(np.diff(off.astype(int)) > 0))
 
 
 def draw_pressing(log: RunLog) -> style.Drawing:
-    """Force along the workpiece's normal with its reference, its error, and what xi does for it."""
+    """Draw the normal force with reference and error, and the transversal coordinate."""
     time, force = log.time, log["normal_force"].values[:, 0]
     is_pressed = "press" in log
     canvas, panels = style.make_panels(3 if is_pressed else 2, height=2.4)
@@ -112,24 +112,24 @@ def draw_pressing(log: RunLog) -> style.Drawing:
         press = log["press"].values[:, 0]
         upper.plot(time, press, label="reference", **style.BROAD)
         _draw_error(panels[1], log)
-    upper.plot(time, force, color="C0", label="acting")
+    upper.plot(time, force, color="C0", label="actual")
     upper.set(ylabel="force in N", title="Force along the workpiece's normal")
     lower.axhline(0.0, color=style.REFERENCE, linewidth=0.8, label="taught surface")
     lower.plot(time, 1e3 * log["xi"].values[:, 0], color="C0", label="tool point")
     lower.set(ylabel=r"$\xi$ in mm", title="Distance from the taught surface")
     for panel in panels:
         if panel.get_legend_handles_labels()[1]:
-            style.place_legend(panel)
+            style.add_legend(panel)
     caption = (
-        "Force with which the workpiece presses back along its normal, and the tool point's "
-        "distance from where the surface was taught"
+        "Normal force of the workpiece on the tool, and distance of the tool point from the taught "
+        "surface"
     )
     caption += f"; the band is {BAND:g} N to either side of the full force." if is_pressed else "."
     return style.Drawing("pressing", "Force on the workpiece", caption, canvas)
 
 
 def draw_force_map(log: RunLog) -> style.Drawing:
-    """Force along the normal over the workpiece, along the way of the tool on it."""
+    """Draw the normal force over the workpiece, along the tool's path."""
     force = log["normal_force"].values[:, 0]
     on = force > TOUCHING
     along, across = 1e3 * log["eta"].values[on].T
@@ -142,14 +142,14 @@ def draw_force_map(log: RunLog) -> style.Drawing:
     canvas.colorbar(dots, ax=panel, label="force in N", extend="both")
     panel.set(xlabel=r"$\eta_1$ in mm", ylabel=r"$\eta_2$ in mm", aspect="equal")
     panel.set_title("Force along the normal over the workpiece")
-    caption = "Force on the workpiece along the tool's way, over the tangential coordinates."
+    caption = "Force on the workpiece along the tool's path, over the tangential coordinates."
     return style.Drawing("force_map", "Force over the workpiece", caption, canvas)
 
 
 def _draw_error(panel: "Axes", log: RunLog) -> None:
-    """Force error while the full force shall keep, in its band."""
-    held = held_samples(log)
-    error = np.where(held, force_error(log), np.nan)
+    """Draw the force error at settled full reference, with its band."""
+    settled = full_force_samples(log)
+    error = np.where(settled, force_error(log), np.nan)
     panel.axhspan(-BAND, BAND, color=style.REFERENCE, alpha=0.15, linewidth=0.0)
     panel.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
     panel.plot(log.time, error, color="C0")

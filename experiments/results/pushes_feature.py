@@ -1,4 +1,4 @@
-"""Pushes on links, and how far they move the elbow.
+"""Pushes on links, and the resulting motion of the elbow.
 
 Signals used, as in the log: ``push_force`` [samples, 3K] N, ``elbow`` and perhaps
 ``elbow_undisturbed`` [samples, 3] m, ``eta`` [samples, 1] m.
@@ -17,11 +17,11 @@ from pfsc_drake.physics.link_forces import link_points_function
 from reporting import style
 from reporting.metrics import Metrics
 
-# what stands in a station's log where links are pushed
+# signal of a station with pushed links
 _PUSHES = "push_wrench"
-# of a lap, by which a tool that rests after a lap may miss its end
+# of a revolution, tolerance for a tool that rests after a full one
 _SAME = 1e-4
-PUSHED = 0.05  # share of a run's largest force, from which on it counts as a push
+PUSHED = 0.05  # share of a run's largest force, least force of a push
 MILLI = 1e3
 
 
@@ -31,16 +31,16 @@ def is_redundant(station: Station) -> bool:
 
 
 def has_elbow(station: Station) -> bool:
-    """Return whether a point of a station's arm is worth a look beside its tool."""
+    """Return whether a station's arm has an elbow to be evaluated."""
     arm = isinstance(station.part, Arm)
     return arm and (_PUSHES in station.log.rows or is_redundant(station))
 
 
 def elbow_motion(station: Station, joint_state: FloatArray) -> FloatArray:
-    """Return where the elbow is [m], shape (samples, 3).
+    """Return positions of the elbow [m], shape (samples, 3).
 
-    It is the point that is pushed, the first of several; else, of a redundant arm, the origin of
-    the middle link's joint frame.
+    The elbow is the first pushed point; without pushes, for a redundant arm, the origin of the
+    middle link's joint frame.
 
     Args:
         station: The station, with an elbow, see :func:`has_elbow`.
@@ -52,14 +52,14 @@ def elbow_motion(station: Station, joint_state: FloatArray) -> FloatArray:
     chain = station.part.robot
     point = (chain.dimension // 2, np.zeros(3))
     if _PUSHES in station.log.rows:
-        first = station.diagram.GetSubsystemByName("link_pushes").places[0]
+        first = station.diagram.GetSubsystemByName("link_pushes").points[0]
         point = (first.link, first.p_LQ)
     function = link_points_function(chain, [point]).map(len(joint_state))
     return np.array(function(joint_state[:, : chain.dimension].T)).T
 
 
 def push_metrics(log: RunLog) -> Metrics:
-    """Return the size of pushes on links and how far they moved the elbow, if there were any.
+    """Return the largest push on links and the elbow's displacement, if there are pushes.
 
     Args:
         log: Log of a run.
@@ -83,7 +83,7 @@ def push_forces(raw: Raw) -> FloatArray:
 
 
 def add_link_signals(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add pushes, three columns for each point, and where the elbow is and would have been.
+    """Add pushes, three columns for each point, and actual and undisturbed elbow positions.
 
     Args:
         log: With ``eta``.
@@ -92,8 +92,8 @@ def add_link_signals(log: RunLog, station: Station, raw: Raw) -> None:
     """
     labels = [f"{station.robot.names[station.robot.dimension // 2]} {axis}" for axis in "xyz"]
     if _PUSHES in raw:
-        places = station.diagram.GetSubsystemByName("link_pushes").places
-        labels = [f"{place.name} {axis}" for place in places for axis in "xyz"]
+        points = station.diagram.GetSubsystemByName("link_pushes").points
+        labels = [f"{point.name} {axis}" for point in points for axis in "xyz"]
         log.add("push_force", push_forces(raw), labels=labels)
         log.add("push_point", raw["push_point"], labels=labels)
     if not has_elbow(station):
@@ -101,50 +101,52 @@ def add_link_signals(log: RunLog, station: Station, raw: Raw) -> None:
     elbow = elbow_motion(station, raw["joint_state"])
     log.add("elbow", elbow, labels=labels[:3])
     undisturbed = None
-    if _PUSHES in raw and station.task.lap is not None:
+    if _PUSHES in raw and station.task.revolution is not None:
         force, eta = log["push_force"].values, log["eta"].values[:, 0]
-        undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.task.lap)
+        undisturbed = previous_revolution(
+            eta, elbow, np.any(force != 0.0, axis=1), station.task.revolution
+        )
     if undisturbed is not None:
         log.add("elbow_undisturbed", undisturbed, labels=labels[:3])
 
 
-def lap_before(
-    eta: FloatArray, values: FloatArray, disturbed: NDArray[np.bool_], lap: float
+def previous_revolution(
+    eta: FloatArray, values: FloatArray, disturbed: NDArray[np.bool_], revolution: float
 ) -> FloatArray | None:
-    """Return what was at the same place of a closed path in the lap before a disturbance.
+    """Return values at the same path position in the revolution before a disturbance.
 
     Args:
-        eta: Arc length, laps counted [m], shape (samples,).
+        eta: Arc length over several revolutions [m], shape (samples,).
         values: Shape (samples, dim).
-        disturbed: Whether something disturbs, shape (samples,).
-        lap: Length of the path [m].
+        disturbed: Whether there is a disturbance, shape (samples,).
+        revolution: Length of the path [m].
 
     Returns:
-        Shape (samples, dim), the values themselves before the disturbance; None where it never
-        comes, or before a whole lap forwards is driven.
+        Shape (samples, dim), equal to ``values`` before the disturbance; None without disturbance,
+        or with one before the first full revolution.
     """
     if not disturbed.any():
         return None
     first = int(np.argmax(disturbed))
-    if not eta[first] - eta[0] >= lap * (1.0 - _SAME):
+    if not eta[first] - eta[0] >= revolution * (1.0 - _SAME):
         return None
     along = np.maximum.accumulate(eta[:first])
-    beyond = np.maximum(np.ceil((eta[first:] - along[-1]) / lap - _SAME), 0.0)
-    place = eta[first:] - lap * beyond
-    expected = [np.interp(place, along, column[:first]) for column in values.T]
+    beyond = np.maximum(np.ceil((eta[first:] - along[-1]) / revolution - _SAME), 0.0)
+    position = eta[first:] - revolution * beyond
+    expected = [np.interp(position, along, column[:first]) for column in values.T]
     return np.vstack([values[:first], np.stack(expected, axis=1)])
 
 
 def push_size(log: RunLog) -> FloatArray:
-    """Return the size of the largest force on a point of a link [N], shape (samples,)."""
+    """Return the magnitude of the largest force on a point of a link [N], shape (samples,)."""
     force = log["push_force"].values.reshape(len(log.time), -1, 3)
     return np.asarray(np.linalg.norm(force, axis=2).max(axis=1))
 
 
 def elbow_shift(log: RunLog) -> FloatArray:
-    """Return how far the elbow is from where it would have been [m], shape (samples, 3).
+    """Return the displacement of the elbow from its undisturbed motion [m], shape (samples, 3).
 
-    Without ``elbow_undisturbed``, from where it was when it was first pushed, zero before.
+    Without ``elbow_undisturbed``, from its position at the first push, zero before.
     """
     elbow = log["elbow"].values
     if "elbow_undisturbed" in log:
@@ -157,9 +159,9 @@ def elbow_shift(log: RunLog) -> FloatArray:
 
 
 def elbow_travel(log: RunLog) -> float:
-    """Return the largest distance of the elbow from where it would have been [m].
+    """Return the largest distance of the elbow from its undisturbed motion [m].
 
-    Without ``elbow_undisturbed``, from where it was when it was first pushed, while it is pushed.
+    Without ``elbow_undisturbed``, from its position at the first push, during pushes.
     """
     distance = np.linalg.norm(elbow_shift(log), axis=1)
     if "elbow_undisturbed" not in log:
@@ -175,7 +177,7 @@ def finite_peak(values: FloatArray) -> float:
 
 
 def draw_pushes(log: RunLog) -> style.Drawing | None:
-    """Forces on links, and how far the first pushed point is from its undisturbed motion.
+    """Draw forces on links, and the displacement of the first pushed point.
 
     Args:
         log: With ``push_force`` and ``elbow``, perhaps with ``elbow_undisturbed``.
@@ -196,12 +198,12 @@ def draw_pushes(log: RunLog) -> style.Drawing | None:
     distance = np.linalg.norm(shift, axis=1)
     panels[-1].plot(log.time, distance, "--", color=style.INK, linewidth=1.1, label="distance")
     compared, name = "elbow_undisturbed" in log, log["elbow"].labels[0].rsplit(" ", 1)[0]
-    title = f"{name} against the lap before" if compared else f"Way of {name} since the first push"
-    panels[-1].set(ylabel="way in mm", title=title)
+    title = f"Displacement of {name}"
+    panels[-1].set(ylabel="displacement in mm", title=title)
     for panel in panels:
-        style.place_legend(panel)
-    what = "its motion in the lap before" if compared else "where it was when the push began"
-    caption = f"Forces on links, and how far {name} is from {what}, at the point that is pushed."
+        style.add_legend(panel)
+    base = "its motion in the previous revolution" if compared else "its position at the first push"
+    caption = f"Forces on links, and displacement of the pushed point of {name} from {base}."
     return style.Drawing("pushes", "Forces on links", caption, canvas)
 
 

@@ -1,4 +1,4 @@
-"""What a recording of a run draws, picked from its log."""
+"""Motion of a recording, selected from the log of a run."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,25 +18,25 @@ from experiments.results.guidance_feature import region_times
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.controller.tasks.space_task import SpaceTask
 
-# of the tool's way over what it presses on, where it would be hidden [m]
+# height of the tool's trace above a pressed surface, which would hide it [m]
 _LIFT = 3e-3
-# share of the samples whose distance fits the colours, and of the largest distance that it takes
+# share of the samples within the colour scale, and least share of the largest distance
 _LASTING, _LEAST_COLOR = 0.9, 0.1
-# where obstacles are drawn of which nobody has told [m]
+# drawn position of unreported obstacles [m]
 _OUT_OF_SIGHT = 1e3
 
 
 def collect_motion(
     station: Station, root: Context, period: float, log: RunLog, start: float
 ) -> RecordedMotion:
-    """Return the motion of a run at the frames of a recording, as far as it is finite.
+    """Return the finite motion of a run at the frames of a recording.
 
     Args:
         station: The station that was simulated.
         root: Its context at the end.
         period: Time between frames [s].
-        log: What :func:`experiments.results.run_signals.collect_log` made of it.
-        start: How long the tool comes to the manifold [s]; its distance counts from then on.
+        log: Its log from :func:`experiments.results.run_signals.collect_log`.
+        start: Duration of the approach to the manifold [s]; its distance counts afterwards.
     """
     _, raw = station.log.read(root)
     finite = np.isfinite(np.hstack([raw["manifold_point"], raw["joint_state"]])).all(axis=1)
@@ -50,10 +50,10 @@ def collect_motion(
     if "push_force" in log:
         pushes = RecordedPushes(log["push_point"].values[frames], log["push_force"].values[frames])
     elif "led_point" in log:
-        # the hand far away, where it has the tool
+        # the operator's force, at the commanded point
         hand = log["leader_hand"].values[frames]
         pushes = RecordedPushes(log["led_point"].values[frames], hand)
-    points = raw["manifold_point"][frames, : station.task.place.layout.size]
+    points = raw["manifold_point"][frames, : station.task.projected_manifold.layout.size]
     return RecordedMotion(
         log.time[frames],
         positions,
@@ -74,7 +74,7 @@ def collect_motion(
 def _holder(
     station: Station, raw: Raw, log: RunLog, frames: NDArray[np.int_]
 ) -> RecordedHolder | None:
-    """Return how the workpiece moves, if it does, and what a robot does that holds it."""
+    """Return the motion of a moving workpiece and its robot, if any."""
     if station.turntable is not None:
         return RecordedHolder(None, log["workpiece_pose"].values[frames])
     if station.holder is None:
@@ -87,7 +87,7 @@ def _holder(
 
 
 def _obstacles(station: Station, log: RunLog, frames: NDArray[np.int_]) -> RecordedObstacles | None:
-    """Return what moves across the path, if anything does."""
+    """Return the motion of obstacles, if there are any."""
     crossing = station.crossing
     if crossing is None:
         return None
@@ -97,33 +97,37 @@ def _obstacles(station: Station, log: RunLog, frames: NDArray[np.int_]) -> Recor
 
 
 def _region_times(station: Station, log: RunLog, frames: NDArray[np.int_]) -> FloatArray | None:
-    """Return the clock of moving regions that the tool meets, if there is one, shape (frames,)."""
+    """Return the clock of moving regions, if there is one, shape (frames,)."""
     task = station.task
-    return region_times(log, task.lead.lag)[frames] if isinstance(task, SpaceTask) else None
+    return (
+        region_times(log, task.command_dynamics.lag)[frames]
+        if isinstance(task, SpaceTask)
+        else None
+    )
 
 
 def _lifted(station: Station, y_t: FloatArray, points: FloatArray) -> FloatArray | None:
-    """Return the tool's way above the workpiece that it gives way to, shape (frames, 3)."""
-    workpiece, place = station.workpiece, station.task.place
+    """Return the tool's trace, lifted above a compliant workpiece, shape (frames, 3)."""
+    workpiece, manifold = station.workpiece, station.task.projected_manifold
     if workpiece is None or len(points) == 0:
         return None
-    normals = [workpiece.normal(place.axes(point).full()) for point in points]
+    normals = [workpiece.normal(manifold.axes(point).full()) for point in points]
     return None if normals[0] is None else y_t + _LIFT * np.array(normals)
 
 
 def _distance(times: FloatArray, xi: FloatArray, start: float) -> RecordedDistance | None:
-    """Return the distance from a surface; None from a path, which has no sign.
+    """Return the signed distance from a surface; None for a path.
 
     Args:
         times: Times of the frames [s], shape (frames,).
         xi: Transversal coordinates [m], shape (frames, 1) of a surface.
-        start: Time from which on the distance counts [s].
+        start: Time from which the distance counts [s].
     """
     if xi.shape[1] != 1:
         return None
     counting = np.abs(xi[times >= start, 0])
     if not counting.size or not counting.any():
         return None
-    # what lasts, such as the shape of a workpiece, is to be seen beside a short way to it
+    # lasting distances, such as a workpiece's shape, determine the scale, not a short approach
     largest = float(max(np.quantile(counting, _LASTING), _LEAST_COLOR * counting.max()))
     return RecordedDistance(xi[:, 0], largest)

@@ -1,8 +1,7 @@
-"""Requirements of a run: targets checked before it, and which of them it missed.
+"""Requirements of a run: check of targets before it, and missed targets after it.
 
-A requirement is a metric with a target that can be compared: those that a scenario names in
-``targets``, and those that features have in every run. They are measured on the ground truth, not
-on what the controller measures or commands.
+A requirement is a metric with a target: those in a scenario's ``targets``, and those of features
+for every run. Metrics refer to ground truth, not to measurements or commands of the controller.
 """
 
 import math
@@ -15,13 +14,13 @@ from pfsc_drake.errors import InputError, did_you_mean
 from reporting.metrics import Metric, Metrics, format_quantity
 from reporting.registry import possible_metrics
 
-# metrics that only grow while a run lasts, or only fall, by how their names begin
+# prefixes of metrics that only increase or only decrease during a run
 _GROWING = (
     *("max_", "peak_", "largest_", "deepest_", "audit_", "rest_", "joint_velocity_share"),
     *("limit_reversals", "saturated_samples", "clipped_ticks", "missed_ticks", "waited_time"),
 )
 _FALLING = ("least_", "joint_limit_margin", "slide_limit_margin")
-# errors of the last sample, the worst of all axes
+# errors of the last sample, worst axis
 _OF_THE_END = ("max_coulomb_error", "max_viscous_error")
 # signals that another law may log on the same robot
 _OF_OTHER_LAWS = {"xi_M", "eta_dot", "tau_d"}
@@ -32,14 +31,14 @@ _WORTH_A_WORD = 1e-3
 
 
 def check_targets(settings: Scenario, station: Station) -> None:
-    """Refuse targets for metrics that a run with their law would not have.
+    """Reject targets for metrics that do not exist with their law.
 
     Args:
         settings: The scenario.
         station: Its station.
 
     Raises:
-        InputError: One line that names law, metric and the metrics that there are.
+        InputError: With law, metric and the available metrics.
     """
     if not settings.targets:
         return
@@ -58,7 +57,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
 
 
 def set_targets(metrics: Metrics, settings: Scenario) -> None:
-    """Give metrics their targets: those of every run, then those of the scenario.
+    """Set targets of metrics: those of every run, then those of the scenario.
 
     Args:
         metrics: Metrics of the run.
@@ -67,7 +66,7 @@ def set_targets(metrics: Metrics, settings: Scenario) -> None:
     own = settings.targets.get(settings.controller.law, {})
     for targets in (*(feature.requirements(settings) for feature in FEATURES), own):
         for name, target in targets.items():
-            # what another choice of options would measure has been checked, and is no metric here
+            # checked metrics of other options do not exist in this run
             if name in metrics:
                 metrics.set_target(name, target.bound, target.source)
 
@@ -76,8 +75,8 @@ def missed_targets(metrics: Metrics) -> list[str]:
     """Return the targets that were missed, one phrase each.
 
     Args:
-        metrics: With their targets. One without a value has missed its target, unless it is
-            not judged.
+        metrics: Metrics with targets. A metric without value misses its target, unless it is not
+            judged.
     """
     return [
         _phrase(name, metric)
@@ -87,15 +86,14 @@ def missed_targets(metrics: Metrics) -> list[str]:
 
 
 def leave_unjudged(metrics: Metrics, *, fault: bool) -> None:
-    """Take back the verdict on metrics for which a run that was cut short is too short.
+    """Withdraw the verdict on metrics that an incomplete run does not determine.
 
-    It is judged by what holds at every instant, and by extremes that have passed their bound:
-    nothing that follows could mend them. After a fault the tool does not follow its reference,
-    so that extremes do not count.
+    It is judged by requirements at every instant, and by extremes beyond their bound, which cannot
+    recover. After a fault the tool does not follow its reference, so that extremes do not count.
 
     Args:
-        metrics: With their targets.
-        fault: Whether a fault cut it short.
+        metrics: Metrics with targets.
+        fault: Whether a fault ended the run early.
     """
     always = {name for feature in FEATURES for name in feature.always}
     for name, metric in metrics.items():
@@ -106,7 +104,7 @@ def leave_unjudged(metrics: Metrics, *, fault: bool) -> None:
 
 
 def _is_exceeded_extreme(name: str, metric: Metric) -> bool:
-    """Whether a metric has passed a bound that it cannot come back to."""
+    """Return whether a monotonic metric has exceeded its bound."""
     assert metric.bound is not None
     begins = _GROWING if metric.bound[0].startswith("<") else _FALLING
     extreme = name.startswith(begins) and name not in _OF_THE_END
@@ -114,25 +112,25 @@ def _is_exceeded_extreme(name: str, metric: Metric) -> bool:
 
 
 def unjudged_distance(metrics: Metrics, law: str) -> list[str]:
-    """Return what there is to say of a tool that was far from where no target wants it nearer.
+    """Return a warning about a large deviation of the tool without target.
 
     Args:
-        metrics: With their targets.
-        law: That moved the tool.
+        metrics: Metrics with targets.
+        law: Name of the control law.
     """
     name = next((name for name in _DISTANCES if name in metrics), None)
     if name is None or metrics[name].target is not None or not metrics[name].value > _WORTH_A_WORD:
         return []
     far = format_quantity(metrics[name].value, "m")
     return [
-        f"the tool was up to {far} from where it should be ({name}), and no target says whether "
-        f"that is too far: with targets: {{{law}: {{{name}: {{bound: '< 1e-3'}}}}}} such a run "
+        f"the tool deviated by up to {far} ({name}), and there is no target to judge this: with "
+        f"targets: {{{law}: {{{name}: {{bound: '< 1e-3'}}}}}} such a run "
         "ends with status 3"
     ]
 
 
 def _phrase(name: str, metric: Metric) -> str:
-    """Return what was missed, with its target."""
+    """Return a missed metric with its target as a phrase."""
     assert metric.bound is not None
     comparison, number = metric.bound
     target = f"target {comparison} {format_quantity(number, metric.unit)}"

@@ -1,9 +1,9 @@
-"""Robots at rest: vibration where the reference rests, and the motion after a fault.
+"""Robots at rest: vibration with resting reference, and motion after a fault.
 
-Signals used, as in the log: the references ``eta_p``, ``xi_p``, ``phi_p`` and ``q_posture`` as far
-as there are any, ``tau_d`` [samples, axes] with its limits, ``q_J``, ``v_J`` [samples, axes] and
-``y_t`` [samples, 3], the actual tool point; of a workpiece that moves ``turntable_angles``, or
-references and torques of the robot that holds it.
+Signals used, as in the log: the references ``eta_p``, ``xi_p``, ``phi_p`` and ``q_posture``, if
+they exist, ``tau_d`` [samples, axes] with its limits, ``q_J``, ``v_J`` [samples, axes] and ``y_t``
+[samples, 3], the actual tool point; for a moving workpiece ``turntable_angles``, or references and
+torques of its robot.
 """
 
 import numpy as np
@@ -16,12 +16,12 @@ from experiments.results.joint_limits_feature import DriveLimitsOfRun
 from experiments.results.run_log import FloatArray, RunLog
 from reporting.metrics import Metrics, format_quantity
 
-# s; of a rest that counts, of what is looked at, and of what comes after: there a motion begins
+# s; shortest rest, its evaluated part, and the part left out at its end: there a motion begins
 # whose derivatives are felt before its speed is
 _SHORTEST, _WINDOW, _LEFT_OUT = 0.5, 0.2, 0.02
-# derivative of a reference that rests [m/s or rad/s]; a posture comes to its end slowly
+# rate of a resting reference [m/s or rad/s]; a posture converges slowly
 _RESTS, _POSTURE_RESTS = 1e-6, 1e-4
-# of a path, and of a robot that holds the workpiece
+# of a path, and of the workpiece robot
 _COORDINATES = ("eta_p", "xi_p", "phi_p")
 _REFERENCES = (
     *_COORDINATES,
@@ -29,30 +29,30 @@ _REFERENCES = (
     *("q_posture", "turntable_angles"),
 )
 _TORQUES = ("tau_d", f"{HOLDER}tau_d")
-# share of a drive's limit, peak to peak, and speed of the tool [m/s], that a robot at rest may have
+# allowed share of a drive's limit, peak to peak, and speed of the tool [m/s] at rest
 _ALLOWED_AT_REST = {"rest_vibration": 0.02, "rest_speed": 2e-3}
 # names of the metric by whether a joint turns
 _MOTION = {True: "motion_after_fault", False: "slide_motion_after_fault"}
-# units of a joint's position and the motion that is allowed beside that of the stop
+# units of a joint's position, and allowed motion beside that of the stop
 _UNITS, _ALLOWED = {True: "rad", False: "m"}, {True: 0.1, False: 0.02}
-# s, the longest stop that is allowed; with the rate 1 - 3 x^2 + 2 x^3 it takes half of v T
+# s, longest allowed stop; with the rate 1 - 3 x^2 + 2 x^3 it takes half of v T
 _LONGEST_STOP = 1.0
 # speed of a joint that rests [rad/s or m/s]
 _AT_REST = 0.01
-# change of a position that is worth a word [rad or m]
+# least reported change of a position [rad or m]
 _WORTH_A_WORD = 1e-3
 
 
 def rest_metrics(log: RunLog, begin: float) -> Metrics:
-    """Return how much drives and tool move over 0.2 s at the end of each rest of the references.
+    """Return vibration of drives and tool over 0.2 s at the end of each rest of the references.
 
     ``rest_vibration`` is the largest torque, peak to peak, as a share of the drive's limit,
-    ``rest_speed`` the largest speed of the tool on the workpiece [m/s]. Rests below 0.5 s do not
-    count, nor does what comes after a fault.
+    ``rest_speed`` the largest speed of the tool on the workpiece [m/s]. Rests below 0.5 s and
+    motion after a fault do not count.
 
     Args:
         log: Log of a run.
-        begin: Until when the tool comes to the path [s].
+        begin: End of the approach to the path [s].
     """
     metrics = Metrics()
     windows = _rests(log, begin) if {"tau_d", "eta_p", "y_t"} <= set(log) else []
@@ -77,7 +77,7 @@ def _vibration(log: RunLog, name: str, window: slice) -> tuple[float, str]:
     limits = np.inf if signal.limits is None else np.max(np.abs(signal.limits.T), axis=0)
     shares = np.ptp(signal.values[window], axis=0) / limits
     axis = int(np.argmax(shares))
-    whose = "" if name == "tau_d" else " of the robot that holds the workpiece"
+    whose = "" if name == "tau_d" else " of the workpiece robot"
     return float(shares[axis]), f"axis {axis + 1}{whose}"
 
 
@@ -139,11 +139,11 @@ class MotionAfterFault:
         return bool(np.all(self._speed < _AT_REST))
 
     def metrics(self) -> Metrics:
-        """Return the motion of the joint that went farthest beyond its stop, with its bound.
+        """Return the largest motion of a joint relative to its allowed stop, with its bound.
 
-        ``motion_after_fault`` [rad] of joints that turn, ``slide_motion_after_fault`` [m] of
-        others. The bound is 0.1 rad or 20 mm beside a stop within a second from the speed at the
-        fault.
+        ``motion_after_fault`` [rad] of revolute joints, ``slide_motion_after_fault`` [m] of
+        prismatic ones. The bound is 0.1 rad or 20 mm beyond a stop within one second from the speed
+        at the fault.
         """
         metrics, share = Metrics(), self._moved / self._allowed
         for kind, name in _MOTION.items():
@@ -155,7 +155,7 @@ class MotionAfterFault:
         return metrics
 
     def sentence(self) -> str:
-        """Return the motion in words, for the last line of a run."""
+        """Return a sentence about the motion, for the last line of a run."""
         state = "stopped" if self.rests else "still moving"
         words, i = [f"{state} at t = {self._end:.3f} s"], int(np.argmax(self._moved))
         if not self.rests:
@@ -172,9 +172,9 @@ class MotionAfterFault:
         return _UNITS[bool(self._limits.revolute[joint])]
 
 
-def _farthest(way: FloatArray) -> FloatArray:
+def _farthest(travel: FloatArray) -> FloatArray:
     """Return the largest magnitude of each column, shape (N,); NaN does not count."""
-    return np.asarray(np.nanmax(np.abs(way), axis=0, initial=0.0))
+    return np.asarray(np.nanmax(np.abs(travel), axis=0, initial=0.0))
 
 
 FEATURE = Feature(

@@ -1,4 +1,4 @@
-"""The log of one run: named signals over time, kept in one HDF5 file."""
+"""Log of one run: named signals over time, stored in one HDF5 file."""
 
 import stat
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pfsc_drake.errors import InputError, nearest_file, suggestion
 from pfsc_drake.yaml.reading import find_status
-from reporting.hdf5_reading import opened
+from reporting.hdf5_reading import open_hdf5
 from reporting.registry import SIGNALS, KnownSignal
 
 FloatArray = NDArray[np.float64]
@@ -40,8 +40,8 @@ class Signal:
     def __post_init__(self) -> None:
         self.values = _as_columns(self.values)
         if self.limits is not None:
-            given, dim = np.asarray(self.limits, dtype=float), self.values.shape[1]
-            self.limits = np.broadcast_to(given, (dim, 2)[: max(given.ndim, 1)]).copy()
+            limits, dim = np.asarray(self.limits, dtype=float), self.values.shape[1]
+            self.limits = np.broadcast_to(limits, (dim, 2)[: max(limits.ndim, 1)]).copy()
 
     @property
     def dim(self) -> int:
@@ -53,14 +53,14 @@ class Signal:
 class RunLog:
     """All signals of one run on one time axis.
 
-    ``log["xi"]`` is the signal ``xi``; ``"xi" in log`` tells whether the run had it; ``for name in
-    log`` goes through all names.
+    ``log["xi"]`` is the signal ``xi``; ``"xi" in log`` is whether the run has it; ``for name in
+    log`` iterates over all names.
 
     Attributes:
         time: [samples] s.
         signals: By name, as listed in :meth:`write`; each has as many samples as ``time``.
-        attributes: What identifies the run, see ``provenance.standard_attributes``.
-        turning: Whether each joint turns, else it slides; decides on units.
+        attributes: Identification of the run, see ``provenance.standard_attributes``.
+        turning: Whether each joint is revolute, else prismatic; determines units.
     """
 
     time: FloatArray
@@ -104,14 +104,14 @@ class RunLog:
         Args:
             name: Name in the log, e.g. ``"q_J"``.
             values: [samples, dim] or [samples], in ``unit``.
-            unit: Unit of all components; by default that of the registry.
-            labels: One name per column; by default those of the registry, or the name itself,
-                numbered from 1 if dim > 1.
+            unit: Unit of all components; by default from the registry.
+            labels: One name per column; by default from the registry, or the name itself, numbered
+                from 1 if dim > 1.
             limits: [dim] or scalar, magnitude of the admissible range, or [dim, 2], its lower
                 and upper end, in ``unit``.
 
         Returns:
-            The signal that was added.
+            The added signal.
         """
         columns = _as_columns(values)
         known = SIGNALS[name] if unit is None else SIGNALS.get(name, KnownSignal(name, unit, ""))
@@ -135,13 +135,13 @@ class RunLog:
         return np.asarray(np.linalg.norm(self[name].values, axis=1))
 
     def write(self, path: Path) -> None:
-        """Writes the log, see :meth:`to_hdf5`, to a file, which is replaced if it exists."""
+        """Write the log, see :meth:`to_hdf5`, to a file, which is replaced if it exists."""
         path.write_bytes(self.to_hdf5())
 
     def to_hdf5(self) -> bytes:
-        """Returns the log as the content of an HDF5 file.
+        """Return the log as the content of an HDF5 file.
 
-        It is made in memory: HDF5 itself cannot be relied on to say that a disk is full.
+        It is created in memory, since HDF5 does not reliably report a full disk.
 
         Dataset ``t`` [s] and one dataset [samples, dim] per signal with attributes ``unit``,
         ``labels`` and, where known, ``limits``; ``attributes`` become the root's attributes.
@@ -162,7 +162,7 @@ class RunLog:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Reads a log that :meth:`write` wrote.
+        """Read a log written by :meth:`write`.
 
         Args:
             path: HDF5 file.
@@ -177,7 +177,7 @@ class RunLog:
         if status is None or not stat.S_ISREG(status.st_mode):
             hint = nearest_file(path) or nearest_file(path.parent)
             raise InputError(f"{path}: no such file; allowed: the log of a run (HDF5){hint}")
-        with opened(path, "run log (HDF5 with 't')") as content:
+        with open_hdf5(path, "run log (HDF5 with 't')") as content:
             datasets = dict(content.datasets())
             time = datasets.pop("t")[:]
             signals = {name: _read_signal(dataset) for name, dataset in datasets.items()}
@@ -185,7 +185,7 @@ class RunLog:
             return cls(time, signals, attributes)
 
     def _check(self, name: str, signal: Signal) -> None:
-        """Refuses a signal whose number of samples is not that of the time axis."""
+        """Reject a signal whose number of samples differs from the time axis."""
         if signal.values.shape[0] != self.time.size:
             raise ValueError(
                 f"signal {name!r} has {signal.values.shape[0]} samples, time has {self.time.size}"
@@ -198,7 +198,7 @@ def peak(values: FloatArray) -> float:
 
 
 def _as_columns(values: ArrayLike) -> FloatArray:
-    """Values as [samples, dim]; a vector becomes one column. Integers stay integers (modes)."""
+    """Return values as [samples, dim]; a vector becomes one column, integers remain integers."""
     array = np.asarray(values)
     if array.dtype.kind not in "iu":
         array = array.astype(float)
@@ -206,7 +206,7 @@ def _as_columns(values: ArrayLike) -> FloatArray:
 
 
 def _read_signal(dataset: h5py.Dataset) -> Signal:
-    """One signal from its dataset."""
+    """Return one signal from its dataset."""
     labels = [str(label) for label in dataset.attrs["labels"]]
     limits = dataset.attrs.get("limits")
     return Signal(dataset[:], str(dataset.attrs["unit"]), labels, limits)

@@ -1,4 +1,4 @@
-"""The signals of a run, from what its station logged."""
+"""Signals of a run, from the signals logged by its station."""
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -7,7 +7,7 @@ from diagrams.station import Station
 from experiments.results.coordinates_feature import acts_on_truth
 from experiments.results.feature import Raw
 from experiments.results.features import FEATURES
-from experiments.results.holder_feature import seen_poses, workpiece_motion
+from experiments.results.holder_feature import relative_poses, workpiece_motion
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.robot.robot_model import pose_function
 
@@ -15,10 +15,10 @@ from pfsc_drake.robot.robot_model import pose_function
 def collect_log(station: Station, root: Context) -> RunLog:
     """Return the signals of a run, named and with units as scripts expect them.
 
-    Joint state, tool pose and path coordinates are the true ones, those of the links, also
-    where the law acts on motor coordinates, on the errors from a moving reference point, or
-    on what imperfect encoders measure. What it acted on is beside them: ``xi_M``,
-    ``tracking_error``, ``q_J_measured``, ``y_t_measured``, ``xi_measured`` and so on.
+    Joint state, tool pose and path coordinates are the actual ones of the links, also if the law
+    acts on motor coordinates, on errors from a moving reference point, or on imperfect
+    measurements. The law's own signals are logged beside them: ``xi_M``, ``tracking_error``,
+    ``q_J_measured``, ``y_t_measured``, ``xi_measured`` and so on.
 
     Args:
         station: The station that was simulated.
@@ -28,9 +28,9 @@ def collect_log(station: Station, root: Context) -> RunLog:
 
 
 def expected_signals(station: Station) -> set[str]:
-    """Return the names of the signals that a station's run will have.
+    """Return the names of the signals of a station's run.
 
-    Those that need a whole lap, or another event, may come beside them.
+    Signals that need a full revolution, or another event, may be added.
 
     Args:
         station: The station, simulated or not.
@@ -40,7 +40,7 @@ def expected_signals(station: Station) -> set[str]:
 
 
 def _named(station: Station, times: FloatArray, raw: Raw) -> RunLog:
-    """Return signals of what a station logged."""
+    """Return the log of a run from logged signals of a station."""
     log = RunLog(times, turning=station.robot.gather("is_revolute").tolist())
     raw = _with_truth(station, raw)
     for feature in FEATURES:
@@ -49,11 +49,11 @@ def _named(station: Station, times: FloatArray, raw: Raw) -> RunLog:
 
 
 def _with_truth(station: Station, raw: Raw) -> Raw:
-    """Return logged signals with the ground truth of where the tool is.
+    """Return logged signals with the ground truth of the tool's pose.
 
     ``true_pose`` is ``[y_t, R_e by rows]`` of the links, shape (samples, 12); ``true_points`` are
-    the points of the manifold that belong to it; ``workpiece_motion`` is that of a workpiece that
-    moves, in whose frame the other two are then.
+    its projections on the manifold; ``workpiece_motion`` is the motion of a moving workpiece, whose
+    frame then is the frame of the other two.
     """
     raw = dict(raw)
     q_J = raw["joint_state"][:, : station.robot.dimension]
@@ -62,19 +62,21 @@ def _with_truth(station: Station, raw: Raw) -> Raw:
         pose = np.array(pose_function(station.robot).map(len(q_J))(q_J.T)).T
     frames = workpiece_motion(station, raw)
     if frames is not None:
-        raw["workpiece_motion"], pose = frames, seen_poses(pose, frames)
+        raw["workpiece_motion"], pose = frames, relative_poses(pose, frames)
     raw["true_pose"], raw["true_points"] = pose, raw["manifold_point"]
     if not acts_on_truth(station, raw):
-        raw["true_points"] = raw["true_place"] if "true_place" in raw else _project(station, pose)
+        raw["true_points"] = (
+            raw["actual_projection"] if "actual_projection" in raw else _project(station, pose)
+        )
     return raw
 
 
 def _project(station: Station, pose: FloatArray) -> FloatArray:
     """Project a motion of the tool on the manifold, sample by sample; shape (samples, size)."""
-    task, memory = station.task, station.initial_place
-    points = np.full((len(pose), task.place.layout.size), np.nan)
+    task, memory = station.task, station.initial_projection
+    points = np.full((len(pose), task.projected_manifold.layout.size), np.nan)
     for k, y_t in enumerate(pose[:, :3]):
         if np.isfinite(y_t).all():
             points[k] = task.evaluate(y_t, memory)
-            memory = points[k, task.place.layout.memory]
+            memory = points[k, task.projected_manifold.layout.memory]
     return points

@@ -22,17 +22,17 @@ if TYPE_CHECKING:
 ARROW_COUNT = 5
 ELEVATION = 28.0  # degrees, of the viewer
 _BINS = 40
-_ROOM = 1.05  # of the largest distance
+_BORDER = 1.05  # of the largest distance
 
 
 def shape_metrics(
     shape: ShapeReport | SurfaceReport | None, fit: Residuals | None = None
 ) -> Metrics:
-    """Return the numbers of a path's or a surface's shape that exist.
+    """Return the metrics of a path's or surface's shape.
 
     Args:
         shape: From :func:`shape_report` or :func:`surface_report`.
-        fit: Where the points stand that a surface was fitted to, if it was.
+        fit: Residuals of the points that a surface was fitted to, if any.
     """
     metrics = Metrics()
     if isinstance(shape, SurfaceReport):
@@ -61,11 +61,11 @@ def shape_metrics(
 
 
 def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> style.Drawing:
-    """Path and driven output with start, end and direction of travel; equal scales on all axes.
+    """Draw path and tool point with start, end and direction of travel, with equal scales.
 
     Args:
         log: With ``y_t`` [samples, 3] m.
-        outline: Lines that show what is followed, each [k, 3] m; one of a path.
+        outline: Lines that show the path or surface, each [k, 3] m; a single line for a path.
     """
     canvas = style.make_canvas(style.WIDTH, 5.6)
     axes = cast("Axes3D", canvas.add_subplot(projection="3d", computed_zorder=False))
@@ -73,11 +73,11 @@ def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> style.Drawing:
     output = output[np.all(np.isfinite(output), axis=1)]
     lines = [np.asarray(line, dtype=float).reshape(-1, 3) for line in outline]
     floor = _set_equal_scales(axes, np.vstack([*lines, output]))
-    comes = "way_left" in log  # its way points do
+    comes = "way_left" in log  # as waypoints
     if len(lines) == 1 or comes:
         for i, line in enumerate(lines):
             axes.plot(*line[:, :2].T, floor, color="#D1D5DB", linewidth=1.0, zorder=1)
-            name = "way points" if comes else "path $\\gamma$"
+            name = "waypoints" if comes else "path $\\gamma$"
             axes.plot(*line.T, label=None if i else name, zorder=2, **style.BROAD)
     for i, line in enumerate([] if comes else lines[1:] and lines):
         label = None if i else r"surface $\mathcal{S}$"
@@ -96,22 +96,20 @@ def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> style.Drawing:
     axes.set_zlabel("z in m", labelpad=4)
     canvas.legend(loc="outside upper left", ncols=4, handlelength=1.6, columnspacing=1.4)
     if comes:
-        caption = (
-            "Way points, joined by lines, their shadow on the floor, and the tool point's way."
-        )
-        return style.Drawing("path", "Way points and driven output", caption, canvas)
+        caption = "Waypoints, joined by lines, their projection on the floor, and the tool point."
+        return style.Drawing("path", "Waypoints and tool point", caption, canvas)
     if len(lines) > 1:
-        caption = "The surface, by lines of its parameters, and the tool point's way."
-        return style.Drawing("path", "Surface and driven output", caption, canvas)
-    caption = "The path, its shadow on the floor, and the tool point's way."
-    return style.Drawing("path", "Path and driven output", caption, canvas)
+        caption = "Parameter lines of the surface, and motion of the tool point."
+        return style.Drawing("path", "Surface and tool point", caption, canvas)
+    caption = "Path, its projection on the floor, and motion of the tool point."
+    return style.Drawing("path", "Path and tool point", caption, canvas)
 
 
 def _set_equal_scales(axes: "Axes3D", points: FloatArray) -> float:
-    """Sets limits around all points, equal scales, few ticks and a quiet background.
+    """Set limits around all points, equal scales, few ticks and a light background.
 
     Returns:
-        Lower limit of z [m], where the path's shadow is drawn.
+        Lower limit of z [m], where the path's projection is drawn.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -133,7 +131,7 @@ def _set_equal_scales(axes: "Axes3D", points: FloatArray) -> float:
 
 
 def _zoom(span: FloatArray, azimuth: float) -> float:
-    """Zoom at which a box fills the picture, higher or wider, and its labels are still inside."""
+    """Return the zoom at which a box fills the picture with its labels inside."""
     x, y, z = span / np.linalg.norm(span)
     sin_a, cos_a = np.abs([np.sin(np.deg2rad(azimuth)), np.cos(np.deg2rad(azimuth))])
     sin_e, cos_e = np.sin(np.deg2rad(ELEVATION)), np.cos(np.deg2rad(ELEVATION))
@@ -142,7 +140,7 @@ def _zoom(span: FloatArray, azimuth: float) -> float:
 
 
 def _draw_direction(axes: "Axes3D", output: FloatArray) -> None:
-    """Arrow heads along the way, at equal distances travelled."""
+    """Draw arrow heads along the path, at equal distances."""
     steps = np.linalg.norm(np.diff(output, axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     if travelled[-1] == 0.0:
@@ -168,13 +166,13 @@ def _draw_direction(axes: "Axes3D", output: FloatArray) -> None:
 
 
 def draw_surface_fit(fit: Residuals) -> style.Drawing:
-    """Distances of points from a surface: where over it, and how many of which size.
+    """Draw distances of points from a fitted surface: map and histogram.
 
     Args:
-        fit: Where the points stand.
+        fit: Residuals of the points.
     """
     scale, unit = style.fitting_unit(fit.distances, "m")
-    distances, reach = scale * fit.distances, _ROOM * scale * fit.largest or 1.0
+    distances, reach = scale * fit.distances, _BORDER * scale * fit.largest or 1.0
     canvas = style.make_canvas(style.WIDTH, 4.2)
     over, counted = canvas.subplots(1, 2, width_ratios=(3, 2))
     dots = over.scatter(
@@ -190,19 +188,19 @@ def draw_surface_fit(fit: Residuals) -> style.Drawing:
     counted.set(xlabel=f"distance in {unit}", ylabel="points", title=" ")
     counted.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
     caption = (
-        f"Distances of {len(distances)} points from the surface fitted to them, along its normal, "
-        f"at most {np.abs(distances).max():.3g} {unit}; they should show no pattern."
+        f"Distances of {len(distances)} points from the fitted surface along its normal, at most "
+        f"{np.abs(distances).max():.3g} {unit}; they should show no pattern."
     )
     return style.Drawing("surface_fit", "Points and the surface fitted to them", caption, canvas)
 
 
 def add_tool(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add the pose of the tool, as it is and as the controller takes it.
+    """Add the actual pose of the tool, and the controller's measurement.
 
     Args:
-        log: To add to.
+        log: Log of the run, which is extended.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     poses = {"": raw["true_pose"]}
     if not measures_truth(station, raw):

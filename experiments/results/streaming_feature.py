@@ -1,4 +1,4 @@
-"""Waypoints that come while the tool moves."""
+"""Waypoints received while the tool moves."""
 
 import math
 
@@ -12,20 +12,20 @@ from pfsc_drake.control.streams.messages import StreamStatus
 from reporting import style
 from reporting.metrics import Metrics
 
-_GOES = 1e-3  # m/s, from which on the tool counts as on its way
-# m, by which a tool may be past the end of what it knows of its path: it follows its reference
+_GOES = 1e-3  # m/s, least speed of a moving reference
+# m, allowed travel of the tool past the end of the known path: it follows its reference
 _PAST = 1e-3
-_ARRIVED = 1e-3  # m, from where it ends
+_ARRIVED = 1e-3  # m, distance from the end
 _MM = 1e3
 
 
 def add_stream(log: RunLog, station: Station, raw: Raw) -> None:
-    """Add what became of way points.
+    """Add status and progress of a waypoint stream.
 
     Args:
-        log: To add to; nothing where the path is known beforehand.
+        log: Log of the run; unchanged if the path is known beforehand.
         station: The station that was simulated.
-        raw: What it logged.
+        raw: Its logged signals.
     """
     if "stream" not in raw:
         return
@@ -38,10 +38,10 @@ def add_stream(log: RunLog, station: Station, raw: Raw) -> None:
 
 
 def stream_metrics(log: RunLog) -> Metrics:
-    """Return the metrics of a path whose way points come; none of another.
+    """Return the metrics of a streamed path; none of another.
 
-    ``past_known_way`` is how far the tool was beyond the end of what the way points that had come
-    make of the path, on the truth; negative if it always stayed before.
+    ``past_known_way`` is the largest actual travel of the tool beyond the end of the path known
+    from received waypoints; negative if it always stayed before it.
 
     Args:
         log: Log of a run.
@@ -61,14 +61,14 @@ def stream_metrics(log: RunLog) -> Metrics:
 
 
 def _going(log: RunLog) -> np.ndarray:
-    """Return at which samples the reference is on its way, not about to end, (samples,)."""
+    """Return the samples with moving reference that is not about to end, shape (samples,)."""
     speed = np.gradient(log["eta_p"].values[:, 0], log.time) if log.time.size > 1 else np.zeros(1)
     running = log["stream_status"].values[:, 0] == StreamStatus.RUNNING
     return np.asarray((speed > _GOES) & running)
 
 
 def travel_time(log: RunLog) -> float:
-    """Return the time from when the tool leaves until it is where it ends [s]."""
+    """Return the time from the tool's departure to its arrival [s]."""
     eta = log["eta_p"].values[:, 0]
     on = np.flatnonzero(np.abs(eta - eta[0]) > _ARRIVED)
     if not on.size:
@@ -78,7 +78,7 @@ def travel_time(log: RunLog) -> float:
 
 
 def draw_stream(log: RunLog) -> style.Drawing:
-    """Speed with what bends allow, the way left, and way points, over time.
+    """Draw speed with its curvature limit, remaining path, and waypoints over time.
 
     Args:
         log: With ``way_left``, ``bend_speed``, ``way_points``, ``stream_status``.
@@ -86,28 +86,28 @@ def draw_stream(log: RunLog) -> style.Drawing:
     canvas, (speed, left, points) = style.make_panels(3, height=2.0)
     speed.plot(log.time, log["eta_dot"].values, color="C0", label="tool")
     limit = log["bend_speed"].values
-    speed.plot(log.time, limit, "--", color=style.REFERENCE, label="bends allow")
+    speed.plot(log.time, limit, "--", color=style.REFERENCE, label="curvature limit")
     speed.set(ylabel="m/s", title="Speed along the path")
-    way = log["way_left"].values[:, 0]
-    left.plot(log.time, _MM * way, color="C1")
+    remaining = log["way_left"].values[:, 0]
+    left.plot(log.time, _MM * remaining, color="C1")
     left.axhline(0.0, color=style.REFERENCE, linewidth=0.8)
-    left.set(ylabel="mm", title="Way left that is known")
+    left.set(ylabel="mm", title="Remaining known path")
     points.step(log.time, log["way_points"].values[:, 0], where="post", color="C2")
     ends = log["stream_status"].values[:, 0] >= StreamStatus.ENDING
-    style.shade([speed, left, points], log.time, ends, "goes to the last one, to rest", "#E5E7EB")
-    points.set(ylabel="way points", xlabel="t in s", title="Way points taken")
-    style.place_legend(speed)
+    style.shade([speed, left, points], log.time, ends, "stops at the last one", "#E5E7EB")
+    points.set(ylabel="waypoints", xlabel="t in s", title="Accepted waypoints")
+    style.add_legend(speed)
     caption = (
-        "Speed of the tool along its path, and what bends allow where it is; how far the path is "
-        "known ahead of it; how many way points have been taken."
+        "Speed of the tool along its path, and limit by curvature; length of the known path ahead; "
+        "number of accepted waypoints."
     )
-    return style.Drawing("stream", "Way points on the fly", caption, canvas)
+    return style.Drawing("stream", "Streamed waypoints", caption, canvas)
 
 
 FEATURE = Feature(
     signals=add_stream,
     metrics=lambda log, station, settings: stream_metrics(log),
-    requirements=lambda settings: {"past_known_way": Target(f"<= {_PAST:g}", "room to stop")},
+    requirements=lambda settings: {"past_known_way": Target(f"<= {_PAST:g}", "distance to stop")},
     always=("past_known_way",),
     figures={"stream": draw_stream},
 )

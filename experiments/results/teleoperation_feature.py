@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _AXES = ("x", "y", "z")
-_LONGEST = 1.5  # s, by which a tool may follow late
-_OWED = 1e-3  # m, that leader and follower may be apart in the end for want of energy
+_LONGEST = 1.5  # s, largest delay that is tried
+_OWED = 1e-3  # m, allowed final distance of leader and follower due to missing energy
 _ALWAYS = ("least_port_tank", "energy_margin")
-_STEP = 4  # ticks between delays that are tried
+_STEP = 4  # ticks between tried delays
 
 
 def add_teleoperation(log: RunLog, _station: Station | None, raw: Raw) -> None:
-    """Add what leader, channel and both ports did.
+    """Add signals of leader, channel and both ports.
 
     Args:
-        log: To add to.
-        _station: The station, of which nothing is needed.
-        raw: What it logged.
+        log: Log of the run, which is extended.
+        _station: The station, unused.
+        raw: Its logged signals.
     """
     here = [side for side in SIDES if f"{side}_record" in raw]
     if not here:
@@ -54,30 +54,32 @@ def add_teleoperation(log: RunLog, _station: Station | None, raw: Raw) -> None:
 
 
 def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
-    """Return how well a tool followed from afar, and what the audit of its energy finds.
+    """Return tracking of a teleoperated tool, and the audit of its energy.
 
     Args:
         log: Log of a run.
         settings: Its scenario.
 
     Returns:
-        ``following_delay`` [s] and ``following_error`` [m]: by which delay the tool follows best,
-        and how far it is from there, rms; ``led_distance_end`` [m]: between the two when all is
-        over; ``owed_distance_end`` [m]: what of it a side could not tell for want of energy;
+        ``following_delay`` [s] and ``following_error`` [m]: delay of best tracking, and rms error
+        with it; ``led_distance_end`` [m]: final distance of leader and follower;
+        ``owed_distance_end`` [m]: part of it that a side could not transmit for lack of energy;
         ``largest_handle_speed`` [m/s]; ``largest_felt_force`` [N]; ``least_port_tank`` [J];
-        ``energy_margin`` [J]: how far the work of the hand and of what the tool touches, as it
-        truly was, stayed above what was stored at the start; with six axes ``led_turn_end`` [rad]
-        and ``largest_felt_moment`` [Nm], and moments do work, too; ``audit_ports`` [J]: beside the
-        law of the tanks; ``audit_channel`` [J]: what arrived beyond what was sent. Of a follower
-        alone, whose leader is in another process, what its own tank tells.
+        ``energy_margin`` [J]: actual work of operator and environment plus initial stored energy,
+        minimum; with six axes ``led_turn_end`` [rad] and ``largest_felt_moment`` [Nm], and moments
+        do work, too; ``audit_ports`` [J]: deviation from the balance of the tanks;
+        ``audit_channel`` [J]: energy received beyond the energy sent. For a follower whose leader
+        is another process, only metrics of its own tank.
     """
     metrics = Metrics()
-    way = settings.teleoperation
-    if way is None or "port_force" not in log or log.time.size < 2:
+    coupling = settings.teleoperation
+    if coupling is None or "port_force" not in log or log.time.size < 2:
         return metrics
     metrics.add("least_port_tank", float(log["port_tank"].values.min()))
     metrics.add("owed_distance_end", float(log["port_owed"].values[-1].max()))
-    metrics.add("audit_ports", tank_residual(log, way.tank.capacity if way.passive else np.inf))
+    metrics.add(
+        "audit_ports", tank_residual(log, coupling.tank.capacity if coupling.passive else np.inf)
+    )
     if "led_point" not in log:
         return metrics
     delay, error = _following(log)
@@ -93,7 +95,7 @@ def teleoperation_metrics(log: RunLog, settings: Scenario) -> Metrics:
         metrics.add("led_turn_end", float(np.linalg.norm(turns_between(*ends))))
         moment = log.norm("leader_moment")
         metrics.add("largest_felt_moment", float(moment.max()))
-    scale = way.motion_scale / way.force_scale
+    scale = coupling.motion_scale / coupling.force_scale
     metrics.add("energy_margin", float(energy_above_bound(log, scale).min()))
     metrics.add("audit_channel", float(np.max(-stored_in_channel(log), initial=0.0)))
     return metrics
@@ -110,33 +112,33 @@ def handle_speed(log: RunLog) -> float:
 
 
 def handle_warnings(log: RunLog, settings: Scenario) -> list[str]:
-    """Return a sentence if the handle was faster than its side may count on.
+    """Return a warning if the handle was faster than its parameter.
 
     Args:
         log: Log of a run.
         settings: Its scenario.
     """
-    way = settings.teleoperation
-    if way is None or "leader_position" not in log or log.time.size < 2:
+    coupling = settings.teleoperation
+    if coupling is None or "leader_position" not in log or log.time.size < 2:
         return []
-    speed, largest = handle_speed(log), way.leader.largest_speed
+    speed, largest = handle_speed(log), coupling.leader.largest_speed
     if speed <= largest:
         return []
     return [
         f"the handle moved at up to {speed:.3g} m/s, faster than teleoperation.leader.largest_speed"
         f" = {largest:g} m/s: a force may take more energy in a sample than the leader's reserve "
-        "holds, and its tank may fall below zero until that is paid back"
+        "holds, and its tank may be negative until this is compensated"
     ]
 
 
 def _following(log: RunLog) -> tuple[float, float]:
-    """Return the delay by which the tool follows best [s], and how far it is then, rms [m]."""
-    led, tool = log["led_point"].values, log["y_t"].values
+    """Return the delay of best tracking [s], and the rms error with it [m]."""
+    commanded, tool = log["led_point"].values, log["y_t"].values
     period = log.period
     longest = min(round(_LONGEST / period), len(tool) // 2)
     delays = range(0, max(longest, 1), _STEP)
     errors = [
-        float(np.sqrt(np.mean(np.sum((led[: len(led) - d] - tool[d:]) ** 2, axis=1))))
+        float(np.sqrt(np.mean(np.sum((commanded[: len(commanded) - d] - tool[d:]) ** 2, axis=1))))
         for d in delays
     ]
     best = int(np.argmin(errors))
@@ -144,7 +146,7 @@ def _following(log: RunLog) -> tuple[float, float]:
 
 
 def works(log: RunLog) -> FloatArray:
-    """Return the work that each port's force did by each tick [J], shape (samples, sides).
+    """Return the accumulated work of each port's force [J], shape (samples, sides).
 
     Args:
         log: Log of a run.
@@ -162,11 +164,11 @@ def works(log: RunLog) -> FloatArray:
 
 
 def energy_above_bound(log: RunLog, scale: float) -> FloatArray:
-    """Return how far the true work on both ends is above minus what was stored [J], (samples,).
+    """Return the actual work on both ends plus initial stored energy [J], shape (samples,).
 
     Args:
         log: Log of a run.
-        scale: Work at the follower by that at the leader, motion scale by force scale.
+        scale: Ratio of work at follower and leader, motion scale by force scale.
     """
     hand = log["leader_hand"].values[:-1] * np.diff(log["leader_position"].values, axis=0)
     total = scale * hand.sum(axis=1)
@@ -181,7 +183,7 @@ def energy_above_bound(log: RunLog, scale: float) -> FloatArray:
 
 
 def _touching(log: RunLog) -> FloatArray:
-    """Return the work at each tick of what the tool touches, shape (samples - 1,) [J]."""
+    """Return the work of the environment on the tool at each tick [J], shape (samples - 1,)."""
     wrench, y_t = log["wrench_ext"].values[:-1], log["y_t"].values
     R = log["R_e"].values.reshape(-1, 3, 3)
     moved = np.hstack([np.diff(y_t, axis=0), turns_between(R[:-1], R[1:])])
@@ -189,18 +191,18 @@ def _touching(log: RunLog) -> FloatArray:
 
 
 def _turning(log: RunLog, moment: str, orientation: str) -> FloatArray:
-    """Return the work at each tick of a moment that is held, shape (samples - 1,) [J]."""
+    """Return the work of a sampled moment at each tick [J], shape (samples - 1,)."""
     R = log[orientation].values.reshape(-1, 3, 3)
     steps = log[moment].values[:-1] * turns_between(R[:-1], R[1:])
     return np.asarray(steps.sum(axis=1))
 
 
 def turns_between(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return by how much rotations are turned against others, shape (.., 3) [rad].
+    """Return rotation vectors between rotations, shape (.., 3) [rad].
 
     Args:
         before: Shape (.., 3, 3).
-        after: The same; NaN where one is.
+        after: Shape (.., 3, 3); NaN gives NaN.
     """
     turned = (after @ np.swapaxes(before, -1, -2)).reshape(-1, 3, 3)
     known = np.isfinite(turned).all(axis=(1, 2))
@@ -210,7 +212,7 @@ def turns_between(before: FloatArray, after: FloatArray) -> FloatArray:
 
 
 def stored_in_channel(log: RunLog) -> FloatArray:
-    """Return what each side sent that has not arrived [J], leader's first, shape (samples, 2).
+    """Return the energy in transit from each side [J], leader's first, shape (samples, 2).
 
     Args:
         log: Log of a run.
@@ -220,11 +222,11 @@ def stored_in_channel(log: RunLog) -> FloatArray:
 
 
 def tank_residual(log: RunLog, capacity: float) -> float:
-    """Return how much the tanks are off their law at worst [J].
+    """Return the largest deviation from the energy balance of the tanks [J].
 
     Args:
         log: Log of a run.
-        capacity: Most that a tank holds [J].
+        capacity: Capacity of a tank [J].
     """
     tank, sent, received = (log[f"port_{name}"].values for name in ("tank", "sent", "received"))
     work = np.diff(works(log), axis=0)
@@ -234,94 +236,95 @@ def tank_residual(log: RunLog, capacity: float) -> float:
 
 
 def draw_teleoperation(log: RunLog) -> style.Drawing:
-    """Where the leader has the tool and where that is, and what both sides feel."""
-    canvas, (way, apart, force) = style.make_panels(3)
-    led, tool = log["led_point"].values, log["y_t"].values
-    _plot_axes(way, log.time, tool - tool[0], led - led[0])
-    way.set(title="Way of the tool, and of the leader (dashed)", ylabel="way in m")
-    distance = np.linalg.norm((led - led[0]) - (tool - tool[0]), axis=1)
+    """Draw commanded and actual motion of the tool, their distance, and forces of both sides."""
+    canvas, (travel, apart, force) = style.make_panels(3)
+    commanded, tool = log["led_point"].values, log["y_t"].values
+    _plot_axes(travel, log.time, tool - tool[0], commanded - commanded[0])
+    travel.set(title="Displacement of tool and leader (dashed)", ylabel="displacement in m")
+    distance = np.linalg.norm((commanded - commanded[0]) - (tool - tool[0]), axis=1)
     apart.plot(log.time, 1e3 * distance, color="C0")
-    apart.set(title="Between where the leader is and the tool", ylabel="distance in mm")
-    _plot_sizes(force, log, "force", "that leads the tool")
+    apart.set(title="Distance of leader and tool", ylabel="distance in mm")
+    _plot_sizes(force, log, "force", "on the tool")
     force.set(title="Forces", ylabel="force in N")
-    style.place_legend(way)
-    style.place_legend(force)
+    style.add_legend(travel)
+    style.add_legend(force)
     caption = (
-        "Ways since the start in the follower's lengths. A force at rest holds the leader off by "
-        "the force times the delay, by the impedance of the waves."
+        "Displacements since the start in the follower's scale. A static force displaces the "
+        "leader "
+        "by force times delay over wave impedance."
     )
-    return style.Drawing("teleoperation", "Led from afar", caption, canvas)
+    return style.Drawing("teleoperation", "Teleoperation", caption, canvas)
 
 
-def draw_led_turns(log: RunLog) -> style.Drawing:
-    """How the leader has the tool turned and how it is, and the moments that both sides feel."""
+def draw_leader_turns(log: RunLog) -> style.Drawing:
+    """Draw commanded and actual orientation of the tool, and moments of both sides."""
     canvas, (turn, apart, moment) = style.make_panels(3)
-    led, tool = (log[name].values.reshape(-1, 3, 3) for name in ("led_orientation", "R_e"))
-    turned = [turns_between(np.broadcast_to(R[:1], R.shape), R) for R in (tool, led)]
+    commanded, tool = (log[name].values.reshape(-1, 3, 3) for name in ("led_orientation", "R_e"))
+    turned = [turns_between(np.broadcast_to(R[:1], R.shape), R) for R in (tool, commanded)]
     _plot_axes(turn, log.time, *turned)
-    turn.set(title="Turn of the tool, and of the leader (dashed)", ylabel="turn in rad")
-    angle = np.linalg.norm(turns_between(tool, led), axis=1)
+    turn.set(title="Rotation of tool and leader (dashed)", ylabel="rotation in rad")
+    angle = np.linalg.norm(turns_between(tool, commanded), axis=1)
     apart.plot(log.time, 1e3 * angle, color="C0")
-    apart.set(title="Between how the leader is turned and the tool", ylabel="angle in mrad")
-    _plot_sizes(moment, log, "moment", "that turns the tool")
+    apart.set(title="Angle between leader and tool", ylabel="angle in mrad")
+    _plot_sizes(moment, log, "moment", "on the tool")
     moment.set(title="Moments", ylabel="moment in Nm")
-    style.place_legend(turn)
-    style.place_legend(moment)
-    caption = "Turns since the start, axis times angle, along the world's axes."
-    return style.Drawing("led_turns", "Turned from afar", caption, canvas)
+    style.add_legend(turn)
+    style.add_legend(moment)
+    caption = "Rotation vectors since the start, world axes."
+    return style.Drawing("led_turns", "Teleoperated orientation", caption, canvas)
 
 
-def _plot_axes(panel: "Axes", time: np.ndarray, tool: np.ndarray, led: np.ndarray) -> None:
-    """Plot what the tool does along each axis, and dashed what the leader asks for."""
+def _plot_axes(panel: "Axes", time: np.ndarray, tool: np.ndarray, commanded: np.ndarray) -> None:
+    """Plot actual (solid) and commanded (dashed) motion of the tool along each axis."""
     for k, axis in enumerate(_AXES):
         panel.plot(time, tool[:, k], color=f"C{k}", label=axis)
-        panel.plot(time, led[:, k], "--", color=f"C{k}", linewidth=0.9)
+        panel.plot(time, commanded[:, k], "--", color=f"C{k}", linewidth=0.9)
 
 
-def _plot_sizes(panel: "Axes", log: RunLog, kind: str, given: str) -> None:
-    """Plot how large forces or moments are at both sides."""
+def _plot_sizes(panel: "Axes", log: RunLog, kind: str, label: str) -> None:
+    """Plot magnitudes of forces or moments at both sides."""
     felt = log.norm(f"leader_{kind}")
     at_tool = np.linalg.norm(log[f"port_{kind}"].values[:, 3:], axis=1)
-    panel.plot(log.time, felt, color="C1", label="that the hand feels")
-    panel.plot(log.time, at_tool, color=style.INK, linewidth=0.9, label=given)
+    panel.plot(log.time, felt, color="C1", label="on the operator")
+    panel.plot(log.time, at_tool, color=style.INK, linewidth=0.9, label=label)
 
 
 def draw_port_energy(log: RunLog) -> style.Drawing:
-    """Work of both ports, and the energy in channel and tanks."""
+    """Draw the work of both ports, and the energy in channel and tanks."""
     canvas, (work, stored, share) = style.make_panels(3)
     done = -works(log)
-    work.plot(log.time, done[:, 0], color="C0", label="taken from the hand")
-    work.plot(log.time, -done[:, 1], color="C1", label="given to the follower")
+    work.plot(log.time, done[:, 0], color="C0", label="from the operator")
+    work.plot(log.time, -done[:, 1], color="C1", label="to the follower")
     bound = float(log["port_tank"].values[0].sum())
     total = done.sum(axis=1)
-    work.plot(log.time, total, color=style.INK, label="taken less given")
-    work.axhline(-bound, color=style.INK, linestyle="--", linewidth=0.9, label="never below")
+    work.plot(log.time, total, color=style.INK, label="difference")
+    work.axhline(-bound, color=style.INK, linestyle="--", linewidth=0.9, label="lower bound")
     work.set(title="Work of the coupling's forces", ylabel="work in J")
-    tank, under_way = log["port_tank"].values, stored_in_channel(log)
+    tank, in_transit = log["port_tank"].values, stored_in_channel(log)
     for k, name in enumerate(("leader", "follower")):
         stored.plot(log.time, tank[:, k], color=f"C{k}", label=f"tank of the {name}")
         stored.plot(
             log.time,
-            under_way[:, k],
+            in_transit[:, k],
             ":",
             color=f"C{k}",
-            label=f"under way from the {name}",
+            label=f"in transit from the {name}",
         )
-    stored.set(title="Energy that is stored", ylabel="energy in J")
+    stored.set(title="Stored energy", ylabel="energy in J")
     for k, name in enumerate(("leader", "follower")):
         share.plot(log.time, log["port_share"].values[:, k], color=f"C{k}", label=name)
-    share.set(title="Share of force and wave that could be paid", ylabel="share", ylim=(0, 1.05))
+    share.set(title="Share of force and wave covered by the tank", ylabel="share", ylim=(0, 1.05))
     for panel in (work, stored, share):
-        style.place_legend(panel)
+        style.add_legend(panel)
     caption = (
-        "What the coupling takes from the hand, less what it gives to the follower, lies in tanks "
-        "and channel or is lost; it never gives more than was in the tanks at the start."
+        "Energy from the operator minus energy to the follower is stored in tanks and channel or "
+        "dissipated; it is bounded below by minus the initial energy of the tanks."
     )
     return style.Drawing("port_energy", "Energy of the teleoperation", caption, canvas)
 
 
 def _requirements(settings: Scenario) -> dict[str, Target]:
-    """Require passivity, and that leader and follower meet in the end."""
+    """Require passivity, and final agreement of leader and follower."""
     coupling = settings.teleoperation
     if coupling is None:
         return {}
@@ -336,12 +339,12 @@ FEATURE = Feature(
     metrics=lambda log, station, settings: teleoperation_metrics(log, settings),
     requirements=_requirements,
     always=_ALWAYS,
-    # a leader may be in another process
+    # a leader may be another process
     known=lambda station, settings: () if settings.teleoperation is None else ("led_point",),
     warnings=lambda log, station, settings: handle_warnings(log, settings),
     figures={
         "teleoperation": draw_teleoperation,
-        "led_turns": draw_led_turns,
+        "led_turns": draw_leader_turns,
         "port_energy": draw_port_energy,
     },
 )
