@@ -9,6 +9,9 @@ from experiments.calls import (
     first_command as first_command,
 )
 from experiments.calls import (
+    init as init,
+)
+from experiments.calls import (
     margins as margins,
 )
 from experiments.calls import (
@@ -28,10 +31,11 @@ from experiments.export import (
 )
 from experiments.hardware.driven_run import FirstCommand as FirstCommand
 from experiments.hardware.statics import StaticCheck as StaticCheck
-from experiments.kept_run import (
+from experiments.new_scenario.new_scenario import NewScenario as NewScenario
+from experiments.saved_run import (
     Run as Run,
 )
-from experiments.kept_run import (
+from experiments.saved_run import (
     load as load,
 )
 from experiments.studies.margins.margins_page import Margins as Margins

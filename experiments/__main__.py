@@ -1,4 +1,4 @@
-"""The start of ``python -m experiments`` and ``pfsc``, before anything slow is imported."""
+"""Entry point of ``python -m experiments`` and ``pfsc``, before any slow import."""
 
 import sys
 
@@ -10,7 +10,7 @@ def start(name: str) -> int:
     """Run the command line that the process was started with.
 
     Args:
-        name: How it is called, ``python -m experiments`` or ``pfsc``.
+        name: Name of the program, ``python -m experiments`` or ``pfsc``.
 
     Returns:
         Exit status, see :mod:`experiments.cli`.

@@ -1,4 +1,4 @@
-"""Runs, margins and driven robots from scripts and notebooks, as of the command line."""
+"""Functions for scripts and notebooks: runs, margins and driven robots."""
 
 import logging
 import math
@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import warnings
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
@@ -25,14 +25,16 @@ from experiments.hardware.driven_run import (
 from experiments.hardware.driven_run import first_command as ask_first_command
 from experiments.hardware.slow_motion import check_scenario
 from experiments.hardware.statics import StaticCheck
-from experiments.kept_run import Run, load
+from experiments.new_scenario.first_scenario import InitOptions
+from experiments.new_scenario.new_scenario import NewScenario, create_scenario, new_file
 from experiments.preparation import naming
-from experiments.scenario_file import ScenarioFile, apply_change, expand_home, read_scenario
+from experiments.saved_run import Run, load
+from experiments.scenario_file import ScenarioFile, expand_home, read_scenario
 from experiments.simulated_run import RunOptions, run_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.margins_page import Margins
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEndpoint
 from pfsc_drake.drivers.messages import dialect
 from pfsc_drake.errors import InputError, WriteError
 from pfsc_drake.yaml.dumping import typed_data
@@ -52,21 +54,21 @@ def run(
     after_fault: float = 0.0,
     quiet: bool = False,
 ) -> Run:
-    """Run a scenario, and return what it left.
+    """Run a scenario, and return its results.
 
-    A fault ends a run but is no exception: ``fault`` says which it was, and what was logged until
-    then is there.
+    A fault ends a run but raises no exception: ``fault`` names it, and the log up to then is
+    available.
 
     Args:
-        scenario: Name of a shipped scenario, path of a YAML file, or a scenario as made in Python,
-            whose relative names of files start in the current folder.
-        changes: Values by ``key.path``, as of ``--set`` of the command line; text is read as YAML.
+        scenario: Name of a shipped scenario, path of a YAML file, or a scenario created in Python,
+            whose relative file names start in the current folder.
+        changes: Values by ``key.path``, as for ``--set`` on the command line; text is read as YAML.
         duration: Simulated time [s] instead of the scenario's.
-        out: Folder for the results, a new one or that of an earlier run, which are replaced; None
-            for a temporary one that is gone with what is returned, see :meth:`Run.save`.
+        out: Folder for the results; results of an earlier run are replaced. None for a temporary
+            folder, deleted with the returned run, see :meth:`Run.save`.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
-        after_fault: How long to go on after a fault [s].
+        after_fault: Simulated time after a fault [s].
         quiet: Whether to show no progress.
 
     Raises:
@@ -78,9 +80,9 @@ def run(
         if not good:
             allowed = "a number of seconds, 0 or more" if least else "a positive number of seconds"
             raise InputError(f"{name} = {time}; allowed: {allowed}")
-    loaded = read_given(scenario, changes or {})
-    with only_own_words(), shown_progress(loaded.name, duration, quiet) as progress:
-        return keep_run(
+    loaded = resolve_scenario(scenario, changes or {})
+    with quiet_libraries(), shown_progress(loaded.name, duration, quiet) as progress:
+        return run_in_folder(
             out,
             lambda folder: run_scenario(
                 loaded,
@@ -88,6 +90,52 @@ def run(
                 options=RunOptions(duration, after_fault, figures=figures, recording=recording),
                 progress=progress,
             ),
+        )
+
+
+def init(
+    model: str | Path,
+    points: str | Path,
+    out: str | Path | None = None,
+    *,
+    tool_frame: str = "",
+    law: str = "",
+    unit: str = "",
+    orientation: str = "",
+    base_position: Sequence[float] = (),
+    replace: bool = False,
+    quiet: bool = False,
+) -> NewScenario:
+    """Write a scenario that runs, for a robot model and points; return its choices and deviations.
+
+    Options that are left out are chosen from the data of model and points. A trial run checks the
+    scenario before it is written.
+
+    Args:
+        model: URDF, SDF or MJCF file, or the name of a shipped model.
+        points: CSV file with columns x, y, z and more.
+        out: YAML file to write; None for MODEL_POINTS.yaml in the current folder.
+        tool_frame: Frame of the model that follows the points.
+        law: Control law, e.g. ``"rigid"``.
+        unit: Unit of the points, e.g. ``"mm"``.
+        orientation: Direction of the tool's z axis if the file has none: ``"down"``, ``"forward"``,
+            ``"up"``; ``"free"`` for the position alone.
+        base_position: Position of the robot's base in the world [m], three numbers.
+        replace: Whether an existing file is replaced.
+        quiet: Whether to show no progress.
+
+    Raises:
+        InputError: If model or points cannot be read, or do not suit each other; one line, and
+            nothing has been written then.
+    """
+    base = tuple(float(value) for value in base_position)
+    if len(base) not in (0, 3) or not all(map(math.isfinite, base)):
+        raise InputError(f"base_position = {list(base)}; allowed: three numbers in m")
+    file = new_file(str(model), str(points), out, replace=replace)
+    options = InitOptions(tool_frame, law, unit, orientation, base)
+    with quiet_libraries(), shown_progress(file.stem, None, quiet) as progress:
+        return create_scenario(
+            str(model), str(points), file, options, progress=progress, replace=replace
         )
 
 
@@ -101,24 +149,24 @@ def margins(
     tool: float = 0.1,
     quiet: bool = False,
 ) -> Margins:
-    """Tell what the sampled loop of a scenario bears, before anything moves.
+    """Compute stability margins of a scenario's sampled loop, before anything moves.
 
     Args:
         scenario: As of :func:`run`.
         changes: As of :func:`run`.
-        mass: Relative error of masses and inertias to be borne.
-        stiffness: Relative error of joint stiffnesses to be borne.
-        rotor: Relative error of rotor inertias to be borne.
-        tool: Error of the tool's mass to be borne [kg].
+        mass: Relative error of masses and inertias to tolerate.
+        stiffness: Relative error of joint stiffnesses to tolerate.
+        rotor: Relative error of rotor inertias to tolerate.
+        tool: Error of the tool's mass to tolerate [kg].
         quiet: Whether to show no progress.
 
     Raises:
         InputError: If the scenario or an argument is wrong; one line.
     """
-    loaded, box = read_given(scenario, changes or {}), ErrorBox(mass, stiffness, rotor, tool)
-    with only_own_words(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
-        settings = load_typed(Scenario, loaded.data, str(loaded.path))
-        with naming(loaded.path):
+    loaded, box = resolve_scenario(scenario, changes or {}), ErrorBox(mass, stiffness, rotor, tool)
+    with quiet_libraries(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
+        settings = load_typed(Scenario, loaded.data, loaded.source)
+        with naming(loaded.source):
             return Margins(loaded.name, analyse(settings, loaded.path.parent, box, progress))
 
 
@@ -136,7 +184,7 @@ def drive(
     recording: bool = True,
     quiet: bool = False,
 ) -> Run:
-    """Drive a robot by a scenario, and return what the run left. This is no safety function.
+    """Drive a robot by a scenario, and return the run's results. This is no safety function.
 
     An interruption (Ctrl-C, or the notebook's) brings the robot to rest.
 
@@ -144,10 +192,10 @@ def drive(
         scenario: As of :func:`run`.
         changes: As of :func:`run`.
         lcm: URL of the LCM bus; empty for LCM's default.
-        driver: Whose messages the robot understands, ``panda`` or ``iiwa``.
-        duration: How long it is driven [s], instead of the scenario's time.
-        override: Share of its planned pace at which the reference moves, 0.01 to 1.5.
-        native: Whether the controller drives in C, compiled with gcc first.
+        driver: Message set of the robot's driver, ``panda`` or ``iiwa``.
+        duration: Duration of the motion [s] instead of the scenario's.
+        override: Speed scaling of the reference, 0.01 to 1.5.
+        native: Whether the controller runs as C code, compiled with gcc first.
         out: Folder for the results; None for a temporary one, see :func:`run`.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
@@ -159,11 +207,13 @@ def drive(
     """
     if duration is not None and not (math.isfinite(duration) and duration > 0.0):
         raise InputError(f"duration = {duration}; allowed: a positive number of seconds")
-    loaded = read_given(scenario, changes or {})
+    loaded = resolve_scenario(scenario, changes or {})
     options = DriveOptions(duration, override, native, figures, recording)
     end = _link(lcm, driver)
-    with only_own_words(), shown_progress(loaded.name, duration, quiet) as progress:
-        return keep_run(out, lambda folder: drive_scenario(loaded, end, folder, options, progress))
+    with quiet_libraries(), shown_progress(loaded.name, duration, quiet) as progress:
+        return run_in_folder(
+            out, lambda folder: drive_scenario(loaded, end, folder, options, progress)
+        )
 
 
 def first_command(
@@ -174,9 +224,9 @@ def first_command(
     driver: str = "panda",
     quiet: bool = False,
 ) -> FirstCommand:
-    """Return what a robot would be told first, once it is the scenario's, at rest at its start.
+    """Check the robot, and return the first command that it would receive.
 
-    Nothing is sent.
+    The robot must be the scenario's, at rest at its start. Nothing is sent.
 
     Args:
         scenario: As of :func:`run`.
@@ -186,11 +236,11 @@ def first_command(
         quiet: Whether to show no progress.
 
     Raises:
-        InputError: If the scenario is wrong, or the robot is another one, silent, or moves.
+        InputError: If the scenario is wrong, or the robot is a different one, silent, or moving.
     """
-    loaded, options = read_given(scenario, changes or {}), DriveOptions(recording=False)
+    loaded, options = resolve_scenario(scenario, changes or {}), DriveOptions(recording=False)
     end = _link(lcm, driver)
-    with only_own_words(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
+    with quiet_libraries(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
         return ask_first_command(loaded, end, Path(), options, progress)
 
 
@@ -208,32 +258,32 @@ def check_robot(
     Args:
         scenario: As of :func:`run`.
         changes: As of :func:`run`.
-        move: How far each joint is moved, slowly, 0.5 to 20 [deg]; 0 to send nothing.
+        move: Amplitude of a slow motion of each joint, 0.5 to 20 [deg]; 0 to send nothing.
         lcm: As of :func:`drive`.
         driver: As of :func:`drive`.
         quiet: Whether to show no progress.
 
     Raises:
-        InputError: If the scenario is wrong, or the robot is another one, silent, or moves.
+        InputError: If the scenario is wrong, or the robot is a different one, silent, or moving.
     """
-    loaded = read_given(scenario, changes or {})
+    loaded = resolve_scenario(scenario, changes or {})
     end = _link(lcm, driver)
-    with only_own_words(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
+    with quiet_libraries(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
         return check_scenario(loaded, end, progress, move)
 
 
-def _link(lcm: str, driver: str) -> ControllerEnd:
-    """Return a link to a robot; the thread of LCM that hears goes before others, where allowed."""
+def _link(lcm: str, driver: str) -> ControllerEndpoint:
+    """Return a link to a robot; LCM's receiving thread gets real-time priority if allowed."""
     messages = dialect(driver)
     with real_time_priority():
-        return ControllerEnd(open_bus(lcm), messages)
+        return ControllerEndpoint(open_bus(lcm), messages)
 
 
-def read_given(scenario: str | Path | Scenario, changes: Mapping[str, Any]) -> ScenarioFile:
-    """Return a scenario with changes.
+def resolve_scenario(scenario: str | Path | Scenario, changes: Mapping[str, Any]) -> ScenarioFile:
+    """Read a scenario and apply changes.
 
     Args:
-        scenario: Name of a shipped scenario, path of a YAML file, or one as made in Python.
+        scenario: Name of a shipped scenario, path of a YAML file, or a scenario created in Python.
         changes: Values by ``key.path``.
 
     Raises:
@@ -245,17 +295,16 @@ def read_given(scenario: str | Path | Scenario, changes: Mapping[str, Any]) -> S
     else:
         loaded = read_scenario(str(scenario), [])
     for key, value in changes.items():
-        apply_change(loaded.data, key, value)
+        loaded.change(key, value)
     return loaded
 
 
-def keep_run(out: str | Path | None, make: Callable[[Path], RunOutcome]) -> Run:
-    """Make a run in a folder, and return it.
+def run_in_folder(out: str | Path | None, make: Callable[[Path], RunOutcome]) -> Run:
+    """Run in a folder, and load the results.
 
     Args:
-        out: The folder; None for a temporary one, which goes with the run that is returned, and
-            where nothing comes of it.
-        make: Makes the run in a folder, and returns how it ended.
+        out: The folder; None for a temporary one, deleted with the returned run or after a failure.
+        make: Performs the run in a folder, and returns its outcome.
 
     Raises:
         WriteError: If results could not be written.
@@ -279,13 +328,13 @@ def keep_run(out: str | Path | None, make: Callable[[Path], RunOutcome]) -> Run:
 def shown_progress(
     title: str, duration: float | None, quiet: bool, *, paced: bool = True
 ) -> AbstractContextManager[NotebookProgress | ProgressDisplay | NoProgress]:
-    """Return what shows progress here.
+    """Return the progress display for a notebook or a terminal.
 
     Args:
-        title: Name of what goes on.
+        title: Name of the task.
         duration: Simulated time [s], if it is known.
         quiet: Whether to show nothing.
-        paced: Whether there is a simulated time.
+        paced: Whether the task has a simulated time.
     """
     if quiet:
         return nullcontext(NoProgress())
@@ -295,8 +344,8 @@ def shown_progress(
 
 
 @contextmanager
-def only_own_words() -> Iterator[None]:
-    """Let libraries be silent: what matters is in the outcome, in words of its own."""
+def quiet_libraries() -> Iterator[None]:
+    """Silence logs and warnings of libraries; the outcome reports everything relevant."""
     drake = logging.getLogger("drake")
     level = drake.level
     drake.setLevel(logging.CRITICAL)

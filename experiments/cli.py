@@ -2,13 +2,13 @@
 
 It is called as ``python -m experiments`` from a clone's folder, or as ``pfsc`` in its environment,
 from any folder; ``pfsc --install-completion`` lets the shell complete commands, options and names.
-Wrong input is told in one line that names file and key, all that is wrong in a file together, the
-nearest word that there is, and what is allowed.
+A message about wrong input is one line with file, line or ``--set`` option, key, value, allowed
+values and the nearest known word; all errors of a file are reported together.
 
 Exit status: 0 the run completed, or every run of a sweep has a row that says how it ended; 2 the
-input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run, or a live session
-ended while one did, everything logged so far is kept; 4 results could not be written, one line
-says which and where they are instead; 130 interrupted, everything logged so far is kept.
+input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run or was active at the
+end of a live session, log written up to then; 4 results could not be written, one line names them
+and their substitute; 130 interrupted, log written up to then.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,7 +35,7 @@ from experiments.study_commands import (
 )
 from identification.cli import app as identification_app
 from reporting.provenance import version_line
-from reporting.terminal import grouped, run_app
+from reporting.terminal import flatten_options, run_app
 
 # by panel of the help: command and example
 _COMMANDS: dict[str, dict[str, tuple[Callable[..., None], str]]] = {
@@ -45,11 +45,11 @@ _COMMANDS: dict[str, dict[str, tuple[Callable[..., None], str]]] = {
         "run": (run_command, "pfc_elastic_6r --set controller.law=rigid"),
         "live": (live_command, "operator_hand_6r"),
         "compare": (compare_command, "out/mine out/mine_off"),
-        "schema": (schema_command, "> scenario.schema.json"),
+        "schema": (schema_command, "--tags"),
     },
     "Robustness": {
         "margins": (margins_command, "pfc_elastic_6r"),
-        "sweep": (sweep_command, "pfc_elastic_6r --set model_error.mass=0.9:1.1:5"),
+        "sweep": (sweep_command, "pfc_elastic_6r --vary model_error.mass=0.9:1.1 --samples 50"),
         "study": (study_command, "robustness"),
     },
     "Robots": {
@@ -82,14 +82,14 @@ def make_app(*, completion: bool = False) -> typer.Typer:
     for panel, commands in _COMMANDS.items():
         for name, (command, example) in commands.items():
             epilog = f"Example: `pfsc {name} {example}".rstrip() + "`"
-            app.command(name, rich_help_panel=panel, epilog=epilog)(grouped(command))
+            app.command(name, rich_help_panel=panel, epilog=epilog)(flatten_options(command))
     app.add_typer(identification_app, name="identify", rich_help_panel="Data")
     return app
 
 
-def _tell_version(asked: bool) -> None:
-    """Print one line and end the process, if that was asked."""
-    if asked:
+def _print_version(requested: bool) -> None:
+    """Print the version line and exit, if requested."""
+    if requested:
         typer.echo(version_line())
         raise typer.Exit
 
@@ -100,8 +100,8 @@ def _root(
         typer.Option(
             "--version",
             is_eager=True,
-            callback=_tell_version,
-            help="Tell versions of the program, Drake and CasADi, and the git revision.",
+            callback=_print_version,
+            help="Print the versions of the program, Drake and CasADi, and the git revision.",
         ),
     ] = False,
 ) -> None:
@@ -112,11 +112,11 @@ app = make_app()
 
 
 def main(arguments: Sequence[str] | None = None, program: str = "python -m experiments") -> int:
-    """Runs the command line.
+    """Run the command line.
 
     Args:
         arguments: Without the program's name; by default those of the process.
-        program: How it is called.
+        program: Name of the program.
 
     Returns:
         Exit status, see the module.

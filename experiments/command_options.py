@@ -1,4 +1,4 @@
-"""Arguments and options that several commands take, by groups, and how their text is read."""
+"""Arguments and options shared by several commands, and parsers of their text."""
 
 import glob
 import math
@@ -11,7 +11,7 @@ import typer
 
 from experiments.scenario_file import ScenarioFile, expand_home, read_scenario, scenario_names
 from pfsc_drake.checks import is_number
-from pfsc_drake.errors import InputError, shortened, suggestion
+from pfsc_drake.errors import InputError, shorten, suggestion
 
 if TYPE_CHECKING:
     from pydrake.lcm import DrakeLcm
@@ -21,10 +21,10 @@ IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
 
 
 def complete_scenario(incomplete: str) -> list[str]:
-    """Return the shipped scenarios, YAML files and folders whose names go on like this.
+    """Return the shipped scenarios, YAML files and folders that complete a name.
 
     Args:
-        incomplete: What has been written.
+        incomplete: Beginning of the name.
     """
     head, slash, tail = incomplete.rpartition("/")
     folder = Path(head or slash or ".").expanduser()
@@ -37,7 +37,7 @@ def complete_scenario(incomplete: str) -> list[str]:
     return found + [f"{head}{slash}{file.name}/" for file in files if file.is_dir()]
 
 
-# what several commands take
+# shared by several commands
 ScenarioName = Annotated[
     str,
     typer.Argument(
@@ -93,7 +93,7 @@ class TimedScenario(ChosenScenario):
 
 @dataclass
 class Drawn:
-    """What is drawn of a run."""
+    """Drawing options of a run."""
 
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True
     recording: Annotated[
@@ -103,12 +103,12 @@ class Drawn:
 
 @dataclass
 class Bus:
-    """An LCM bus, and the messages of a robot on it."""
+    """LCM bus and message set of a robot."""
 
     lcm: BusUrl = ""
     driver: Annotated[
         str,
-        typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone)."),
+        typer.Option(help="Message set: panda (drake-franka-driver) or iiwa (torques only)."),
     ] = "panda"
 
 
@@ -116,7 +116,7 @@ def folder_or(out: Path | None, name: str) -> Path:
     """Return the folder of ``--out``.
 
     Args:
-        out: As it was written, if it was.
+        out: Value of the option, or None.
         name: Name of the folder in ``out`` otherwise.
     """
     return Path("out") / name if out is None else expand_home(out)
@@ -126,16 +126,16 @@ def read_duration(text: str, longest: float = _LONGEST) -> float:
     """Return the value of ``--duration`` [s].
 
     Args:
-        text: As it was written.
+        text: Value of the option.
         longest: Largest value [s].
 
     Raises:
-        InputError: If it is no positive number, or larger.
+        InputError: If it is not a positive number, or larger.
     """
     seconds = float(text) if is_number(text) else math.nan
     if not 0.0 < seconds <= longest:
         raise InputError(
-            f"--duration {shortened(text)}: allowed: a positive number of seconds, at most "
+            f"--duration {shorten(text)}: allowed: a positive number of seconds, at most "
             f"{longest:,.0f} s"
         )
     return seconds
@@ -145,7 +145,7 @@ def open_bus(url: str) -> "DrakeLcm":
     """Return the LCM bus of ``--lcm``.
 
     Args:
-        url: As it was written; empty for LCM's default.
+        url: Value of the option; empty for LCM's default.
 
     Raises:
         InputError: If there is no such kind of bus.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml, read_text
 from reporting import style
 from reporting.folder import open_results
@@ -27,20 +27,22 @@ _COMPARED = (
     "max_external_force",
 )
 _NEEDED = ("xi", "eta", "eta_p")
-_DIFFERENT = "These runs were not asked for the same motion; compare their deviations with care: "
-# title, label and factor of what tells orientations in a log
+_DIFFERENT = (
+    "These runs do not have the same commanded motion; compare their deviations with care: "
+)
+# title, label and factor of a log's orientation signals
 _ORIENTATIONS = {
     "angles": ("Angle about {}", "angle in deg", math.degrees(1.0)),
     "axis": ("Axis of the tool, along {}", "component", 1.0),
 }
-# keys of a scenario that say where the tool is to be, and when
+# keys of a scenario that define the desired motion
 _MOTION = ("path", "surface", "reference", "duration")
 _FILE = "file"
 _MOST = 4  # differences that are named
 
 
 def write_comparison(folders: Sequence[Path], out: Path) -> Report:
-    """Write a page that shows what differs between runs.
+    """Write a page that compares runs.
 
     Args:
         folders: Folders of two or more runs.
@@ -83,7 +85,7 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Report:
 
 
 def _read_log(path: Path) -> RunLog:
-    """A log with the signals that are compared."""
+    """Read a log with the compared signals."""
     log = RunLog.read(path)
     for name in _NEEDED:
         if name not in log:
@@ -92,7 +94,7 @@ def _read_log(path: Path) -> RunLog:
 
 
 def _figures(logs: Mapping[str, RunLog]) -> list[style.Figure]:
-    """Draw what all runs have signals for."""
+    """Draw the figures whose signals all runs have."""
     figures = [
         _draw(
             logs,
@@ -113,8 +115,8 @@ def _figures(logs: Mapping[str, RunLog]) -> list[style.Figure]:
     ]
     first, shared = next(iter(logs.values())), set.intersection(*map(set, logs.values()))
     caption = (
-        "Tool and the reference that each law compares it with. With path following the "
-        "reference waits while the tool is held back; with trajectory tracking it runs on."
+        "Tool and reference of each control law. With path following the "
+        "reference waits for a delayed tool; with trajectory tracking it continues in time."
     )
     for kind, (title, ylabel, factor) in _ORIENTATIONS.items():
         if f"{kind}_e" in shared:
@@ -124,16 +126,16 @@ def _figures(logs: Mapping[str, RunLog]) -> list[style.Figure]:
             ]
             figures.append(_draw(logs, ("orientations", "Orientation", caption), panels))
     if "orientation_lead" in shared:
-        title = "Reference orientation ahead of the tool's place"
+        title = "Reference orientation ahead of the tool's projection"
         caption = (
-            "Angle between the orientation that each law asks for and the one that belongs to the "
-            "tool's place on the path: zero where the reference waits."
+            "Angle between the desired orientation of each law and the path's orientation at the "
+            "tool's projection: zero where the reference waits."
         )
         lead = {"": lambda log: np.rad2deg(log["orientation_lead"].values[:, 0])}
-        texts = ("orientation_lead", "Waiting or running on", caption)
+        texts = ("orientation_lead", "Reference ahead of the tool", caption)
         figures.append(_draw(logs, texts, [(title, "angle in deg", lead)]))
     if "wrench_ext" in shared:
-        caption = "Size of the force that acts on the tool, not what the sensor makes of it."
+        caption = "Magnitude of the actual force on the tool, without sensor errors."
         force = {"": lambda log: np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)}
         texts = ("forces", "Forces", caption)
         figures.append(_draw(logs, texts, [("Force on the tool", "force in N", force)]))
@@ -159,26 +161,25 @@ def _draw(
         texts: Name, title and caption.
         panels: Title, label of the vertical axis, and lines of each panel, the second one dashed.
     """
-    with style.styled():
+    with style.project_style():
         canvas, drawn = style.make_panels(len(panels))
         for panel, (title, ylabel, lines) in zip(drawn, panels, strict=True):
             for k, (run, log) in enumerate(logs.items()):
                 for line, (of, values) in zip(("-", "--"), lines.items(), strict=False):
                     panel.plot(log.time, values(log), line, color=f"C{k}", label=f"{run}{of}")
             panel.set(title=title, ylabel=ylabel)
-        style.place_legend(drawn[0], columns=len(panels[0][2]) if len(panels[0][2]) > 1 else None)
+        style.add_legend(drawn[0], columns=len(panels[0][2]) if len(panels[0][2]) > 1 else None)
         return style.render(style.Drawing(*texts, canvas))
 
 
 def motion_differences(scenarios: Mapping[str, str]) -> list[str]:
-    """Return in what the motions differ that runs were asked for, one phrase each.
+    """Return the differences between the commanded motions of runs, one phrase each.
 
-    Robots, laws, disturbances and what the tool meets are what one compares; they are no
+    Robots, laws, disturbances and contacts are the subject of a comparison; they do not count as
     differences here.
 
     Args:
-        scenarios: Each run's scenario as resolved, by the run's name. One that is no readable YAML
-            tells nothing.
+        scenarios: Each run's scenario as resolved, by the run's name. Unreadable YAML is ignored.
     """
     known = {}
     for name, text in scenarios.items():
@@ -197,7 +198,7 @@ def motion_differences(scenarios: Mapping[str, str]) -> list[str]:
 
 
 def _unlike(key: str, values: Sequence[Any]) -> Iterator[tuple[str, Sequence[Any]]]:
-    """Yield the keys below a key, and their values, that are not the same in all runs."""
+    """Iterate over keys below a key whose values differ between runs, with these values."""
     first = values[0] if values else None
     if all(value == first for value in values):
         return
@@ -213,7 +214,7 @@ def _unlike(key: str, values: Sequence[Any]) -> Iterator[tuple[str, Sequence[Any
 
 
 def _same_content(files: Sequence[Any]) -> bool:
-    """Return whether files hold the same; by their names where they are gone."""
+    """Return whether files have the same content, or the same names if they no longer exist."""
     try:
         return len({read_text(Path(str(file))) for file in files}) == 1
     except InputError:
@@ -221,7 +222,7 @@ def _same_content(files: Sequence[Any]) -> bool:
 
 
 def _values_by_run(key: str, values: Mapping[str, Any]) -> str:
-    """Return what a key is in which runs."""
+    """Return a phrase with the values of a key by run."""
     runs: dict[str, list[str]] = {}
     for run, value in values.items():
         runs.setdefault(_value_text(value), []).append(run)
@@ -241,4 +242,4 @@ def _value_text(value: Any) -> str:
         return f"{len(value)} entr{'y' if len(value) == 1 else 'ies'}"
     if isinstance(value, str) and "/" in value:
         return Path(value).name
-    return shortened(f"{value:g}" if isinstance(value, float) else str(value))
+    return shorten(f"{value:g}" if isinstance(value, float) else str(value))

@@ -1,4 +1,4 @@
-"""The controller of a scenario as C99, with the record of a run."""
+"""Export of a scenario's controller as C99, with the record of a run."""
 
 import json
 from collections.abc import Mapping
@@ -13,10 +13,10 @@ from pydrake.systems.analysis import Simulator
 from diagrams.controller_part import ControllerPart, controller_part
 from diagrams.scenario import Scenario, SimulationParameters
 from diagrams.station import Station
-from experiments.calls import only_own_words, read_given, shown_progress
+from experiments.calls import quiet_libraries, resolve_scenario, shown_progress
 from experiments.controller_replay import Commands, Replay, check_export, missing_tool, replay_log
-from experiments.kept_run import Run
 from experiments.preparation import naming, prepare
+from experiments.saved_run import Run
 from experiments.scenario_file import ScenarioFile, expand_home
 from experiments.simulation import configure
 from pfsc_drake.checks import require_positive
@@ -34,12 +34,12 @@ def export_scenario(
     Args:
         scenario: The scenario as read.
         out: Folder for the files.
-        duration: How much of the run is simulated and recorded [s].
-        progress: Told what goes on.
+        duration: Duration of the simulated and recorded run [s].
+        progress: Progress listener.
 
     Raises:
-        InputError: If the scenario is wrong, something in its controller is no block, or the folder
-            holds files that no export has written; nothing has been simulated then.
+        InputError: If the scenario is wrong, part of its controller is not a block, or the folder
+            holds files of other origin; nothing has been simulated then.
     """
     check_project(out)
     simulation = (scenario.data.get("simulation") or {}) | {"fused": False}
@@ -48,7 +48,7 @@ def export_scenario(
     station = prepared.station
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
-    with naming(scenario.path):
+    with naming(scenario.source):
         part = controller_part(station)
         controller = CController.of(
             part.network,
@@ -71,38 +71,38 @@ def record(
 ) -> np.ndarray:
     """Simulate a station, and return its controller's inputs and outputs.
 
-    They are what whatever is sampled sees at a tick. A discrete plant with sampled ports has made
-    the step that begins with the tick by then, while blocks remember what they did before it.
+    They are the values at the sampling instants. A discrete plant with sampled ports has then
+    performed the step that begins with the tick, while blocks hold their states from before it.
 
     Args:
         station: The station, block by block.
         part: Its controller.
-        how: How it is simulated.
+        how: Parameters of the simulation.
         duration: Duration of the run [s].
 
     Returns:
-        Of each tick, in the order of ``interface.json``, shape (ticks, inputs and outputs).
+        One row per tick in the order of ``interface.json``, shape (ticks, inputs and outputs).
     """
     simulator = Simulator(station.diagram)
     configure(simulator, how.integrator, how.max_step, how.accuracy)
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    seen, plant, step = root, station.part.plant, station.part.drives.step
+    sampled, plant, step = root, station.part.plant, station.part.drives.step
     if step is not None:
-        seen = root.Clone()
+        sampled = root.Clone()
     ports = [*part.inputs.values(), *part.outputs.values()]
-    contexts = [port.get_system().GetMyContextFromRoot(seen) for port in ports]
+    contexts = [port.get_system().GetMyContextFromRoot(sampled) for port in ports]
     rows = []
     for tick in range(round(duration / part.period)):
         # states are those before this tick's update, with which the next advance begins
         if tick > 0:
             simulator.AdvanceTo(tick * part.period)
         if step is not None:
-            seen.SetTimeStateAndParametersFrom(root)
+            sampled.SetTimeStateAndParametersFrom(root)
             simulator.AdvanceTo(tick * part.period + 0.5 * step)
             stepped = plant.GetMyContextFromRoot(root)
-            plant.GetMyMutableContextFromRoot(seen).SetStateAndParametersFrom(stepped)
+            plant.GetMyMutableContextFromRoot(sampled).SetStateAndParametersFrom(stepped)
         rows.append(
             np.concatenate([p.Eval(context) for p, context in zip(ports, contexts, strict=True)])
         )
@@ -114,10 +114,10 @@ class ExportedController:
     """A controller as C99, in a folder.
 
     Attributes:
-        folder: Where it is.
-        files: All that was written.
-        check: What it made of a recorded run, ``check.differing`` ticks of ``check.ticks``; None if
-            that was not asked for.
+        folder: Folder of the files.
+        files: All files written.
+        check: Comparison with the recorded run, ``check.differing`` ticks of ``check.ticks``; None
+            if not requested.
     """
 
     folder: Path
@@ -131,7 +131,7 @@ class ExportedController:
         return content
 
     def replay(self, log: Run | str | Path, *, quiet: bool = False) -> Commands:
-        """Return what it would have told the drives, tick by tick; needs gcc and make.
+        """Return the controller's drive commands for a log, tick by tick; needs gcc and make.
 
         Args:
             log: A run, its ``log.h5``, or a CSV file of a robot with columns ``t``, ``q_1``, ..,
@@ -139,7 +139,7 @@ class ExportedController:
             quiet: Whether to show no progress.
 
         Raises:
-            InputError: If it cannot be compiled, or the log does not tell what it needs.
+            InputError: If it cannot be compiled, or the log lacks a required signal.
         """
         file = log.folder / "log.h5" if isinstance(log, Run) else expand_home(Path(log))
         with shown_progress(self.folder.name, None, quiet, paced=False) as progress:
@@ -161,20 +161,20 @@ def export_controller(
         scenario: As of :func:`run`.
         changes: As of :func:`run`.
         out: Folder for the files.
-        check: Whether to compile it, let it repeat the run and compare; needs gcc and make.
+        check: Whether to compile it, replay the run and compare; needs gcc and make.
         duration: Simulated time of that run [s].
         quiet: Whether to show no progress.
 
     Raises:
-        InputError: If the scenario or an argument is wrong, something in the controller is no
-            block, or there is no compiler for a check.
+        InputError: If the scenario or an argument is wrong, part of the controller is not a block,
+            or there is no compiler for a check.
     """
     require_positive("duration", duration)
     lacking = missing_tool() if check else None
     if lacking is not None:
         raise InputError(f"check = True: there is no {lacking} here; allowed: check = False")
-    loaded, folder = read_given(scenario, changes or {}), expand_home(Path(out))
-    with only_own_words(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
+    loaded, folder = resolve_scenario(scenario, changes or {}), expand_home(Path(out))
+    with quiet_libraries(), shown_progress(loaded.name, None, quiet, paced=False) as progress:
         _, files = export_scenario(loaded, folder, duration, progress)
         replay = check_export(folder, progress) if check else None
     return ExportedController(folder, files, replay)

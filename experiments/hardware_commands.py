@@ -1,4 +1,4 @@
-"""Commands for robots behind messages: ``robot`` is one, simulated; ``drive`` drives one."""
+"""Commands for robots connected by messages: ``robot`` simulates, ``drive`` controls one."""
 
 import logging
 import math
@@ -32,58 +32,52 @@ if TYPE_CHECKING:
 
 @dataclass
 class DriverChoices:
-    """What a simulated driver makes of commands."""
+    """Options of a simulated driver."""
 
     expire: Annotated[
         float | None,
         typer.Option(
             metavar="SECONDS",
-            help="Age from which commands count no more. Default: the driver's, 0.1 or 0.05",
+            help="Age at which commands expire. Default: the driver's, 0.1 or 0.05",
         ),
     ] = None
     low_pass: Annotated[
         float | None,
         typer.Option(
             metavar="HZ",
-            help="Low pass of commanded torques; 0 for none. Default: driver.low_pass, or 30",
+            help="Low-pass filter of commanded torques, 0 for none. Default: driver.low_pass or 30",
         ),
     ] = None
     damping: Annotated[
         float,
-        typer.Option(
-            metavar="1/S", help="Rate with which joints lose their speed while no command counts."
-        ),
+        typer.Option(metavar="1/S", help="Damping rate of the joints while no command is valid."),
     ] = 10.0
 
 
 @dataclass
-class Way:
-    """What happens to messages on their way."""
+class LinkOptions:
+    """Packet loss and delay of the link."""
 
-    lose: Annotated[
-        float, typer.Option(metavar="SHARE", help="Share of packets that are lost.")
-    ] = 0.0
-    delay: Annotated[
-        int, typer.Option(metavar="TICKS", help="Ticks by which commands come later.")
-    ] = 0
+    lose: Annotated[float, typer.Option(metavar="SHARE", help="Share of lost packets.")] = 0.0
+    delay: Annotated[int, typer.Option(metavar="TICKS", help="Delay of commands in ticks.")] = 0
 
 
 def robot_command(
     *,
     bus: Bus,
     rules: DriverChoices,
-    way: Way,
+    link: LinkOptions,
     chosen: TimedScenario,
     meshcat: Annotated[
         bool, typer.Option("--meshcat/--no-meshcat", help="Draw the robot in Meshcat.")
     ] = True,
 ) -> None:
-    """Be the robot of a scenario: plant, friction, sensors and a driver's rules, in real time."""
+    """Simulate the robot of a scenario in real time: plant, friction, sensors, driver."""
     from diagrams.scenario import Scenario
     from experiments.hardware.driven_run import real_time_priority
     from experiments.hardware.simulated_robot import Transport, run_robot_scenario
     from pfsc_drake.drivers.driver_rules import DriverOptions
-    from pfsc_drake.drivers.link import RobotEnd
+    from pfsc_drake.drivers.link import RobotEndpoint
     from pfsc_drake.drivers.messages import dialect
     from pfsc_drake.yaml.typed import load_typed
 
@@ -91,15 +85,15 @@ def robot_command(
     with interruptible():
         loaded, messages, low_pass = chosen.read(), dialect(bus.driver), rules.low_pass
         if low_pass is None:
-            own = load_typed(Scenario, loaded.data, str(loaded.path)).driver.low_pass
+            own = load_typed(Scenario, loaded.data, loaded.source).driver.low_pass
             low_pass = own or DriverOptions.low_pass
         expiry = messages.expiry if rules.expire is None else rules.expire
         options = DriverOptions(expiry, low_pass, damping=rules.damping)
-        transport = Transport(way.lose, way.delay)
+        transport = Transport(link.lose, link.delay)
         with real_time_priority():
-            end = RobotEnd(open_bus(bus.lcm), messages)
+            end = RobotEndpoint(open_bus(bus.lcm), messages)
         run_robot_scenario(
-            loaded, end, options, transport, duration=seconds, drawn=meshcat, tell=_tell
+            loaded, end, options, transport, duration=seconds, drawn=meshcat, notify=_print_line
         )
 
 
@@ -108,48 +102,50 @@ def lead_command(
     lcm: BusUrl = "",
     chosen: TimedScenario,
 ) -> None:
-    """Be the operator of a scenario that is led from afar, its follower in another process."""
+    """Simulate the operator of a teleoperation scenario; the follower is another process."""
     from experiments.hardware.leader_process import lead_scenario
 
     seconds = chosen.seconds
     with interruptible():
-        led = lead_scenario(chosen.read(), open_bus(lcm), duration=seconds, tell=_tell)
-        _tell(
-            f"led for {led.duration:g} s, up to {led.way:.3g} m away; {led.received} messages of "
-            f"the follower; up to {led.largest_force:.3g} N felt; never less than "
-            f"{led.least_tank:.3g} J in the tank"
+        summary = lead_scenario(chosen.read(), open_bus(lcm), duration=seconds, notify=_print_line)
+        _print_line(
+            f"led for {summary.duration:g} s, up to {summary.travel:.3g} m away; "
+            f"{summary.received} messages received from the follower; largest force "
+            f"{summary.largest_force:.3g} N; least energy in the tank {summary.least_tank:.3g} J"
         )
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     print_line(Console(), line)
 
 
 @dataclass
 class Driving:
-    """How a robot is driven, or what is checked of it."""
+    """Options of driving or checking a robot."""
 
     dry_run: Annotated[
         bool,
-        typer.Option("--dry-run", help="Check the robot, tell the first command, send nothing."),
+        typer.Option("--dry-run", help="Check the robot, print the first command, send nothing."),
     ] = False
     check: Annotated[
         bool,
-        typer.Option("--check", help="Compare torques with the model's; send nothing by itself."),
+        typer.Option(
+            "--check", help="Compare joint torques with the model; sends nothing without --move."
+        ),
     ] = False
     move: Annotated[
         float,
         typer.Option(
-            metavar="DEG", help="With --check: moves each joint so far, slowly; 0.5 to 20."
+            metavar="DEG", help="With --check: amplitude of a slow motion of each joint; 0.5 to 20."
         ),
     ] = 0.0
     override: Annotated[
         float,
-        typer.Option(metavar="SHARE", help="Of the reference's speed at first, 0.01 to 1.5."),
+        typer.Option(metavar="SHARE", help="Initial speed scaling of the reference, 0.01 to 1.5."),
     ] = 1.0
     native: Annotated[
         bool,
-        typer.Option("--native", help="Let the controller drive in C, compiled with gcc first."),
+        typer.Option("--native", help="Run the controller as C code, compiled with gcc first."),
     ] = False
 
 
@@ -164,7 +160,7 @@ def drive_command(
     drawn: Drawn,
     quiet: Quiet = False,
 ) -> None:
-    """Drive a robot by a scenario: Ctrl-C brings it to rest. This is no safety function."""
+    """Control a robot by a scenario; Ctrl-C brings it to rest. This is no safety function."""
     from experiments.hardware.driven_run import (
         DriveOptions,
         drive_scenario,
@@ -173,7 +169,7 @@ def drive_command(
     )
     from experiments.hardware.keys import KEYS, DriveKeys, pressed_keys
     from experiments.hardware.slow_motion import check_scenario
-    from pfsc_drake.drivers.link import ControllerEnd
+    from pfsc_drake.drivers.link import ControllerEndpoint
     from pfsc_drake.drivers.messages import dialect
 
     seconds = chosen.seconds
@@ -181,9 +177,9 @@ def drive_command(
         loaded = chosen.read()
         folder = folder_or(out, f"{loaded.name}_driven")
         logging.getLogger("drake").setLevel(logging.CRITICAL)
-        # the thread of LCM that hears goes first, too
+        # LCM's receiving thread gets the priority, too
         with real_time_priority():
-            end = ControllerEnd(open_bus(bus.lcm), dialect(bus.driver))
+            end = ControllerEndpoint(open_bus(bus.lcm), dialect(bus.driver))
         console = Console(quiet=quiet)
         if driving.move and not driving.check:
             raise InputError(f"--move {driving.move:g}: without --check; allowed: together with it")
@@ -211,14 +207,14 @@ def drive_command(
                 folder,
                 options,
                 progress,
-                asked=lambda share: keys.requests(pressed(), share),
+                requests=lambda share: keys.requests(pressed(), share),
             )
         print_run(console, outcome)
         raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
 
 
 def _print_check(console: Console, found: "StaticCheck") -> None:
-    """Print what a robot measures at rest beside what it should, and how far off it is at most."""
+    """Print measured and expected joint torques, and the largest differences."""
     along = ("Largest along the motion [Nm]",) if len(found.q) > 1 else ()
     titles = ("Joint", "Position [deg]", "Measured [Nm]", "Model [Nm]", "Difference [Nm]", *along)
     table = number_table(*titles)
@@ -228,14 +224,14 @@ def _print_check(console: Console, found: "StaticCheck") -> None:
     for i, values in enumerate(np.column_stack(columns)):
         table.add_row(str(i + 1), f"{values[0]:.2f}", *(f"{value:.3f}" for value in values[1:]))
     console.print(table)
-    _tell(found.verdict)
+    _print_line(found.verdict)
 
 
 def _print_first(console: Console, first: "FirstCommand") -> None:
-    """Print what the robot would be told first."""
+    """Print the first command to the robot."""
     unit = "Nm, on top of its weight" if first.kind == "TORQUE" else "rad/s"
     table = number_table("Joint", f"First {first.kind.lower()} [{unit}]")
     for i, value in enumerate(np.asarray(first.values)):
         table.add_row(str(i + 1), f"{value:.4f}")
-    console.print("the robot is the scenario's, at rest and at its start; nothing was sent")
+    console.print("the robot matches the scenario, at rest and at its start; nothing was sent")
     console.print(table)

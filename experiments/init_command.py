@@ -1,6 +1,7 @@
 """The command ``init``: a first scenario for a model and points of the user's own."""
 
 import logging
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +14,6 @@ from rich.markup import escape
 
 from experiments.command_options import Quiet
 from experiments.outcomes import print_line, print_warning
-from experiments.scenario_file import expand_home
 from pfsc_drake.checks import is_number
 from pfsc_drake.errors import InputError
 from reporting.progress import ProgressDisplay
@@ -22,7 +22,7 @@ from reporting.terminal import interruptible
 
 @dataclass
 class Chosen:
-    """What the user has chosen already."""
+    """Choices of the user."""
 
     tool_frame: Annotated[str, typer.Option(help="Frame of the model that follows the points.")] = (
         ""
@@ -30,18 +30,18 @@ class Chosen:
     law: Annotated[
         str, typer.Option(help="velocity_servo, rigid, elastic, ... Default: by the model's data.")
     ] = ""
-    unit: Annotated[str, typer.Option(help="Of the points: m, mm, cm, inch. Default: m or mm.")] = (
-        ""
-    )
+    unit: Annotated[
+        str, typer.Option(help="Unit of the points: m, mm, cm, inch. Default: m or mm.")
+    ] = ""
     orientation: Annotated[
         str,
         typer.Option(
-            help="Of the tool's z axis where the file has none: down, forward, up; free: position "
-            "alone."
+            help="Direction of the tool's z axis if the file has none: down, forward, up; free: "
+            "position only."
         ),
     ] = ""
     base_position: Annotated[
-        str, typer.Option(metavar="X,Y,Z", help="Of the robot's base in the world [m].")
+        str, typer.Option(metavar="X,Y,Z", help="Position of the robot's base in the world [m].")
     ] = ""
 
     def position(self) -> tuple[float, ...]:
@@ -67,34 +67,26 @@ def init_command(
     quiet: Quiet = False,
 ) -> None:
     """Write a scenario that runs, for your robot model and your points."""
-    from experiments.init.first_scenario import FirstScenario, InitOptions
+    from experiments.new_scenario.first_scenario import InitOptions
+    from experiments.new_scenario.new_scenario import create_scenario, new_file
 
     with interruptible():
-        file = expand_home(out or Path(f"{Path(model).stem}_{Path(points).stem}.yaml"))
-        if file.suffix not in (".yaml", ".yml"):
-            raise InputError(f"--out {file}: allowed: the name of a new YAML file, FILE.yaml")
-        if file.exists():
-            raise InputError(f"{file}: exists; allowed: a new file, --out FILE.yaml")
-        if not file.parent.is_dir():
-            raise InputError(f"--out {file}: no folder {file.parent}; allowed: one that exists")
+        file = new_file(model, points, out, replace=False)
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console(quiet=quiet)
         options = InitOptions(
             chosen.tool_frame, chosen.law, chosen.unit, chosen.orientation, chosen.position()
         )
         with ProgressDisplay(console, file.stem, None) as progress:
-            first = FirstScenario(model, points, file, options, _ask)
-            first.find(progress)
-        first.write()
-        for key, value, reason in first.choices:
+            new = create_scenario(model, points, file, options, progress=progress, ask=_ask)
+        for key, value, reason in new.choices:
             console.print(
                 f"{key:<22} [bold]{escape(value)}[/]  [dim]{escape(reason)}[/]", soft_wrap=True
             )
-        for warning in first.outcome.warnings if first.outcome else []:
+        for warning in new.warnings:
             print_warning(console, warning)
-        for line in first.measured():
-            print_line(console, line)
-        print_line(Console(), f"Written to {file}; next: pfsc run {file}")
+        print_line(console, new.summary)
+        print_line(Console(), f"Written to {file}; next: pfsc run {shlex.quote(str(file))}")
 
 
 def _ask(question: str, names: Sequence[str]) -> str:

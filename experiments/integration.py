@@ -1,4 +1,4 @@
-"""The cheapest integration that is accurate enough: ``simulation.integrator: auto``."""
+"""Choice of the cheapest accurate integration: ``simulation.integrator: auto``."""
 
 import contextlib
 from collections.abc import Sequence
@@ -33,18 +33,18 @@ _HALVINGS_TO_BE_ACCURATE, _HALVINGS_TO_BE_STABLE = 2, 8
 def choose_integration(
     station: Station, parameters: SimulationParameters, begin: float
 ) -> Integration:
-    """Return how to integrate a station: as the scenario says, or with ``auto`` the cheapest way.
+    """Return the integration of a station: the scenario's, or with ``auto`` the cheapest.
 
     The station is tried in closed loop from its start, in contexts of their own, with every joint
-    in slow motion: all that can oscillate does so, wherever the scenario starts. Reference and
-    forces are those from ``begin`` on. The cheapest scheme is taken whose error, against steps
-    five times shorter, stays below 1e-6 rad and m; if there is none, shorter steps. A scheme that
-    lets a mode of the plant grow is never taken, whatever its error. Friction and encoders switch,
-    and an error that no shorter step makes smaller is taken as it is.
+    in slow motion, so that all modes are excited, wherever the scenario starts. Reference and
+    forces are those from ``begin`` on. The cheapest scheme is taken whose error, against steps five
+    times shorter, stays below 1e-6 rad and m; if there is none, shorter steps. A scheme that makes
+    a mode of the plant unstable is never taken, whatever its error. Friction and encoders switch,
+    and an error that no shorter step reduces is accepted.
 
     Args:
         station: The station.
-        parameters: What the scenario says.
+        parameters: Parameters of the scenario.
         begin: Time when the reference leaves its first rest [s].
 
     Raises:
@@ -67,7 +67,7 @@ def choose_integration(
 
 
 class _Search:
-    """A station that is tried with several schemes."""
+    """Trials of a station with several schemes."""
 
     def __init__(self, station: Station, begin: float) -> None:
         self._station, self._begin, self._duration = station, begin, 0.0
@@ -132,7 +132,7 @@ class _Search:
     def _errors(self, schemes: Sequence[str], step: float) -> list[float]:
         """Largest error of each scheme [rad, m], up to the first that is small enough.
 
-        It is infinite where a scheme gives up.
+        It is infinite where a scheme fails.
         """
         truth = self._positions(_BEST, step / _FINER)
         errors = []
@@ -146,7 +146,7 @@ class _Search:
         return errors
 
     def _positions(self, scheme: str, step: float) -> np.ndarray:
-        """Positions of links, motors and tool at the ticks, as far as they are finite.
+        """Return finite positions of links, motors and tool at the ticks.
 
         Returns:
             Shape (samples, 2N + 3) [rad, m].
@@ -165,12 +165,12 @@ class _Search:
         return np.hstack([q_J, q_M, y_t])
 
     def _start(self, scheme: str, step: float) -> Simulator:
-        """Put the robot at its start, in motion, when the reference begins to move."""
+        """Return a simulator with the robot at its start, in motion, as the reference departs."""
         simulator = Simulator(self._station.diagram)
         configure(simulator, scheme, step)
         root = simulator.get_mutable_context()
         root.SetTime(self._begin)
         self._station.set_start(root)
-        self._station.place_robot(root, self._state)
+        self._station.set_robot_state(root, self._state)
         simulator.Initialize()
         return simulator

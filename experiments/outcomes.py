@@ -1,4 +1,4 @@
-"""What a command says when it has ended, and the exit status that belongs to it."""
+"""Printed outcome and exit status of commands."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def print_line(console: Console, text: str) -> None:
-    """Print text as it is, on one line however long."""
+    """Print text without markup, on one line of any length."""
     console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
@@ -30,7 +30,7 @@ def number_table(*titles: str) -> Table:
     """Return a table of numbers, without rows.
 
     Args:
-        titles: Of its columns.
+        titles: Titles of the columns.
     """
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     for title in titles:
@@ -39,21 +39,21 @@ def number_table(*titles: str) -> Table:
 
 
 def print_warning(console: Console, sentence: str) -> None:
-    """Print a warning, a line of its own."""
+    """Print a warning on its own line."""
     console.print(f"\n[yellow]warning:[/] {escape(sentence)}", soft_wrap=True)
 
 
-def print_run(console: Console, outcome: "RunOutcome", said: Sequence[str] = ()) -> None:
-    """Print what came out of a run, as far as it is no reason for concern; quietly its last line.
+def print_run(console: Console, outcome: "RunOutcome", printed: Sequence[str] = ()) -> None:
+    """Print metrics, warnings and report of a run; only the last line in quiet mode.
 
     Args:
-        console: Where to.
-        outcome: What came out.
-        said: Warnings that have been printed before.
+        console: The console.
+        outcome: Outcome of the run.
+        printed: Warnings that have been printed before.
     """
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
-        if warning not in said:
+        if warning not in printed:
             print_warning(console, warning)
     if outcome.margins is not None:
         print_line(console, f"\nmargins: {outcome.margins}")
@@ -61,12 +61,12 @@ def print_run(console: Console, outcome: "RunOutcome", said: Sequence[str] = ())
 
 
 def _print_report(console: Console, report: Path | None) -> None:
-    """The last line, behind an empty one if others are shown."""
+    """Print the last line, after an empty one if others are shown."""
     print_page(Console(), f"{'' if console.quiet else chr(10)}Open the report", report)
 
 
 def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
-    """Says in one line what went wrong in a run, if anything did; returns the exit status."""
+    """Print fault, interruption and missed requirements of a run; return the exit status."""
     status, ends = 0, []
     if outcome.interrupted:
         status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
@@ -82,55 +82,55 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
 def _judge(
     status: int, ends: list[str], problems: Sequence[str], out: Path | None, interrupted: bool
 ) -> int:
-    """Print one line of how it ended, if it did not end well, and return the exit status.
+    """Print one line about an abnormal end, if any, and return the exit status.
 
     Args:
-        status: Exit status if all was written.
-        ends: Why it did not end well, one phrase each.
-        problems: What could not be written.
-        out: Folder that holds everything logged until then, if that is to be said.
+        status: Exit status if all results were written.
+        ends: Reasons of an abnormal end, one phrase each.
+        problems: Results that could not be written.
+        out: Folder of the log up to then, if it is to be named.
         interrupted: Whether the user stopped it.
     """
     if problems:
         status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
     elif ends and out is not None:
-        ends[-1] += f", everything logged so far is kept in {out}"
+        ends[-1] += f", log written to {out}"
     if ends:
         print_error("; ".join(ends), after_echo=interrupted)
     return status
 
 
 def _missed(broken: Sequence[str]) -> str:
-    """What was promised and not kept, as part of a line."""
+    """Return the missed requirements as part of a line."""
     return f"missed: {'; '.join(broken)}"
 
 
 def print_live(console: Console, session: "LiveSession") -> None:
-    """What a live session has left."""
-    for folder, outcome in session.kept.items():
+    """Print the saved takes of a live session."""
+    for folder, outcome in session.takes.items():
         print_page(console, "Open the report", outcome.report)
         scenario = folder / "scenario.yaml"
-        print_line(console, f"  again, to the last bit: python -m experiments run {scenario}")
+        print_line(console, f"  replay, bit-identical: pfsc run {scenario}")
 
 
 def judge_live(session: "LiveSession") -> int:
-    """Says in one line what went wrong in a session, if anything did; returns the exit status."""
+    """Print fault, interruption and missed requirements of a session; return the exit status."""
     status, ends = 0, []
     if session.interrupted:
         status, ends = INTERRUPTED, [f"interrupted at t = {session.end:.3f} s"]
     if session.fault is not None:
         status, ends = FAULT, [f"fault: {session.fault}; stopped at t = {session.end:.3f} s"]
-    for folder, outcome in session.kept.items():
+    for folder, outcome in session.takes.items():
         if outcome.broken:
             status = status or FAULT
             ends = [*ends, f"{folder.name} {_missed(outcome.broken)}"]
-    problems = [kept.problem for kept in session.kept.values() if kept.problem is not None]
-    out = [*session.kept][-1] if session.kept else None
+    problems = [take.problem for take in session.takes.values() if take.problem is not None]
+    out = [*session.takes][-1] if session.takes else None
     return _judge(status, ends, problems, out, session.interrupted)
 
 
 def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
-    """What came out of a sweep; quietly its last line."""
+    """Print metrics, warnings and report of a sweep; only the last line in quiet mode."""
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
         print_warning(console, warning)
@@ -140,7 +140,7 @@ def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
 
 
 def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
-    """Says in one line why a sweep is not whole, if it is not; returns the exit status."""
+    """Print why a sweep is incomplete, if it is; return the exit status."""
     status, ends = 0, []
     done = f"{len(outcome.rows)} of {outcome.total} runs"
     if outcome.interrupted:
@@ -148,7 +148,7 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
     if outcome.stopped is not None:
         status, ends = FAULT, [f"fault: {outcome.stopped}; stopped after {done}"]
     if ends:
-        ends = [f"{ends[0]}, which are kept in {out}; the same command goes on"]
+        ends = [f"{ends[0]}, written to {out}; repeat the command to continue"]
     elif outcome.refusal is not None:
         status, ends = WRONG_INPUT, [f"error: no run could start: {outcome.refusal}"]
     problems = [] if outcome.problem is None else [outcome.problem]
@@ -158,14 +158,14 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
 def print_export(
     console: Console, controller: "CController", files: Sequence[Path], out: Path
 ) -> None:
-    """What has been exported, in one line."""
-    said = controller.interface()
-    sizes = f"state {said['state_bytes']} bytes, tables {said['table_bytes']} bytes"
+    """Print a summary of an export in one line."""
+    interface = controller.interface()
+    sizes = f"state {interface['state_bytes']} bytes, tables {interface['table_bytes']} bytes"
     print_line(console, f"{out}: {len(files)} files, {sizes}")
 
 
 def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
-    """Tells what a controller in C made of its record; returns the exit status."""
+    """Print the comparison of a C controller with its record; return the exit status."""
     table = number_table("Ticks", "differing", "largest", "median [us]", "p99 [us]", "worst [us]")
     times = [f"{time:.2f}" for time in (replay.median, replay.p99, replay.worst)]
     table.add_row(str(replay.ticks), str(replay.differing), f"{replay.largest:.3g}", *times)
@@ -177,23 +177,23 @@ def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
 
 
 def judge_commands(console: Console, commands: "Commands") -> int:
-    """Tells what drives would have been told; returns the exit status."""
+    """Print the drive commands of a replay; return the exit status."""
     from pfsc_drake.codegen.c_controller import fault_sentences
 
-    told = commands.told
-    change = np.abs(np.diff(told, axis=0)).max(axis=0, initial=0.0)
+    values = commands.values
+    change = np.abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
     columns = {
-        "first": told[0],
-        "lowest": told.min(axis=0),
-        "highest": told.max(axis=0),
+        "first": values[0],
+        "lowest": values.min(axis=0),
+        "highest": values.max(axis=0),
         "largest change": change,
     }
     if commands.difference is not None:
         columns["from the log"] = commands.difference
-    console.print(f"{commands.port} [{commands.unit}], {len(told)} ticks", markup=False)
+    console.print(f"{commands.port} [{commands.unit}], {len(values)} ticks", markup=False)
     table = number_table("Drive", *columns)
-    for i in range(told.shape[1]):
-        table.add_row(str(i + 1), *(f"{values[i]:.5g}" for values in columns.values()))
+    for i in range(values.shape[1]):
+        table.add_row(str(i + 1), *(f"{column[i]:.5g}" for column in columns.values()))
     console.print(table)
     if commands.assumed:
         print_line(console, commands.assumed)
@@ -206,7 +206,7 @@ def judge_commands(console: Console, commands: "Commands") -> int:
 
 
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
-    """The metrics with their targets, one line each."""
+    """Return a table of metrics with their targets."""
     from reporting.metrics import format_quantity
 
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))

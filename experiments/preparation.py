@@ -1,4 +1,4 @@
-"""Everything that is done before a run moves anything, so that wrong input is found out first."""
+"""Preparation of a run: all checks of the input before anything moves."""
 
 import os
 from collections.abc import Iterator
@@ -15,9 +15,10 @@ from experiments.integration import choose_integration
 from experiments.results.requirements import check_targets
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.checks import require
-from pfsc_drake.errors import InputError, nearest_file, shortened
+from pfsc_drake.errors import InputError, nearest_file, shorten
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.reading import resolve_files
+from pfsc_drake.yaml.source import Source
 from pfsc_drake.yaml.typed import load_typed
 from reporting.progress import ProgressListener
 
@@ -34,15 +35,15 @@ _UNITS = (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0), ("m
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A run that can start.
+    """A run that is ready to start.
 
     Attributes:
         settings: The scenario as resolved.
         text: The same as YAML.
         station: The station.
-        integration: How its plant is integrated.
-        drawing: What its robot looks like, if that had to be read.
-        warnings: What may not go as well as hoped, one sentence each.
+        integration: Integration of its plant.
+        drawing: Geometry of the robot for drawing, if needed.
+        warnings: Warnings, one sentence each.
     """
 
     settings: Scenario
@@ -61,24 +62,24 @@ def prepare(
     progress: ProgressListener,
     live: bool = False,
 ) -> PreparedRun:
-    """Build a scenario's station and check everything that can be checked beforehand.
+    """Build a scenario's station and perform all checks before the run.
 
     Args:
         scenario: The scenario as read.
         duration: Simulated time [s] instead of the scenario's, or of a live session's
             LONGEST_SESSION or what the memory of this machine allows.
         recording: Whether the motion will be recorded.
-        progress: Told what goes on.
-        live: Whether there is a person at the controls of an operator.
+        progress: Progress listener.
+        live: Whether a person takes the place of the simulated operator.
 
     Raises:
         InputError: If the scenario is wrong.
     """
-    settings = load_typed(Scenario, scenario.data, str(scenario.path))
+    settings = load_typed(Scenario, scenario.data, scenario.source)
     folder = scenario.path.parent
-    with naming(scenario.path):
-        nobody = settings.operator is not None and not settings.operator.inputs and not live
-        require(not nobody, "operator.inputs", "''", "a file that a live session has recorded")
+    with naming(scenario.source):
+        unattended = settings.operator is not None and not settings.operator.inputs and not live
+        require(not unattended, "operator.inputs", "''", "a file that a live session has recorded")
         station = _build(settings, folder, progress)
         if live and duration is None:
             duration = min(LONGEST_SESSION, _longest(station))
@@ -94,13 +95,13 @@ def prepare(
 def look_at(
     settings: Scenario, folder: Path, station: Station, *, recording: bool
 ) -> tuple[RobotDrawing | None, list[str]]:
-    """Return what a station's robot looks like, and all that is to be said beforehand.
+    """Return the geometry of a station's robot for drawing, and all warnings before the run.
 
-    It is looked at to be recorded, and where obstacles keep away from what it looks like.
+    The geometry is needed for a recording, and for the distance to obstacles.
 
     Args:
         settings: The scenario.
-        folder: Where its relative file names start.
+        folder: Base folder of relative file names.
         station: Its station.
         recording: Whether the motion will be recorded.
     """
@@ -112,13 +113,13 @@ def look_at(
 def settle(
     settings: Scenario, name: str, station: Station, duration: float | None, *, recording: bool
 ) -> None:
-    """Give a scenario its name and its times, and check what depends on them.
+    """Set name and times of a scenario, and check the entries that depend on them.
 
     Args:
         settings: The scenario, which is changed.
-        name: Its name where it tells none.
+        name: Name for a scenario without one.
         station: Its station.
-        duration: How long it takes [s], instead of the scenario's time.
+        duration: Duration [s] instead of the scenario's.
         recording: Whether the motion will be recorded.
 
     Raises:
@@ -135,49 +136,49 @@ def settle(
 
 
 def _build(settings: Scenario, folder: Path, progress: ProgressListener) -> Station:
-    def tell(fraction: float, phase: str) -> None:
+    def report(fraction: float, phase: str) -> None:
         progress(0.0, f"{phase}, {fraction:.0%}")
 
-    return build_station(settings, folder, tell)
+    return build_station(settings, folder, report)
 
 
 def _integrated(settings: Scenario, folder: Path, station: Station) -> tuple[Station, Integration]:
-    """Settle the integration in the settings, and return it and a station that is made for it.
+    """Choose the integration, and return a station built for it, with the integration.
 
-    The settings name scheme and step then, so that the scenario as resolved gives this run again.
+    The settings then name scheme and step, so that the resolved scenario reproduces the run.
     """
     integration = choose_integration(station, settings.simulation, settings.reference.dwell)
     longest = min(settings.simulation.max_step, station.controller.period)
     settings.simulation = integration.applied_to(settings.simulation)
-    if integration.step < longest:  # friction is made for the step
+    if integration.step < longest:  # friction depends on the step
         station = build_station(settings, folder, like=station)
     return station, integration
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
-    """Name the scenario's file in what is said against it."""
+def naming(source: Source) -> Iterator[None]:
+    """Prefix error messages with the scenario's file, and the line of the key they begin with."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise source.refusal([str(error)]) from None
     except OSError as error:  # of a file that the scenario names
-        name = shortened(str(error.filename), 100)
+        name = shorten(str(error.filename), 100)
         nearest = (
             nearest_file(Path(str(error.filename))) if isinstance(error, FileNotFoundError) else ""
         )
-        raise InputError(f"{path}: cannot read {name}: {error.strerror}{nearest}") from None
+        raise source.refusal([f"cannot read {name}: {error.strerror}{nearest}"]) from None
 
 
 def check_length(settings: Scenario, station: Station) -> None:
-    """Refuse a run that takes too many sampling intervals, or more memory than there is.
+    """Reject a run that takes too many sampling intervals or too much memory.
 
     Args:
         settings: The scenario, with its duration.
         station: Its station.
 
     Raises:
-        InputError: One line that says how long the run would take, and how much memory.
+        InputError: With the computing time and memory that the run would need.
     """
     period, duration, longest = station.controller.period, settings.duration, _longest(station)
     if duration <= longest:
@@ -197,19 +198,19 @@ def _longest(station: Station) -> float:
 
 
 def _tick_memory(station: Station) -> float:
-    """Return the memory that a sampling interval of a run takes until its figures are drawn [B]."""
+    """Return the memory of a sampling interval up to the drawing of figures [B]."""
     return 8.0 * _COPIES * sum(rows.stop - rows.start for rows in station.log.rows.values())
 
 
 def check_frames(duration: float, frame_period: float) -> None:
-    """Refuse a recording of more than MAX_FRAMES frames.
+    """Reject a recording of more than MAX_FRAMES frames.
 
     Args:
         duration: Simulated time [s].
         frame_period: Time between two frames [s].
 
     Raises:
-        InputError: One line that says which period would do.
+        InputError: With an admissible period.
     """
     frames = duration / frame_period
     if frames > MAX_FRAMES:
@@ -221,7 +222,7 @@ def check_frames(duration: float, frame_period: float) -> None:
 
 
 def _time(seconds: float) -> str:
-    """A duration in the largest unit that it fills."""
+    """Return a duration in the largest unit that it exceeds."""
     for unit, length in _UNITS:
         if not seconds < length:
             return f"{seconds / length:.3g} {unit}"

@@ -37,7 +37,7 @@ from experiments.outcomes import (
 from experiments.scenario_file import expand_home, list_scenarios
 from experiments.study_commands import study_command
 from pfsc_drake.checks import is_number
-from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.errors import InputError, shorten
 from reporting.progress import ProgressDisplay
 from reporting.registry import as_data, as_text
 from reporting.terminal import interruptible, show_page
@@ -46,9 +46,9 @@ _LONGEST_AFTER_FAULT = 100.0  # s
 
 
 def list_command(
-    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list instead.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
     signals: Annotated[
-        bool, typer.Option("--signals", help="Signals, metrics and figures of runs instead.")
+        bool, typer.Option("--signals", help="List signals, metrics and figures of runs instead.")
     ] = False,
 ) -> None:
     """List the shipped scenarios."""
@@ -70,7 +70,7 @@ def list_command(
 
 def schema_command(
     tags: Annotated[
-        bool, typer.Option("--tags", help="Settings of VS Code for the tags of scenarios instead.")
+        bool, typer.Option("--tags", help="Print VS Code settings for the YAML tags instead.")
     ] = False,
 ) -> None:
     """Print the JSON schema of scenario files, for completion and checks in an editor."""
@@ -78,8 +78,8 @@ def schema_command(
     from pfsc_drake.yaml.json_schema import json_schema, tags_of
 
     mappings = {"yaml.customTags": [f"{tag} mapping" for tag in tags_of(Scenario)]}
-    said = mappings if tags else json_schema(Scenario, "Scenario of pfsc_drake")
-    typer.echo(json.dumps(said, indent=1, ensure_ascii=False))
+    schema = mappings if tags else json_schema(Scenario, "Scenario of pfsc_drake")
+    typer.echo(json.dumps(schema, indent=1, ensure_ascii=False))
 
 
 def run_command(
@@ -87,8 +87,8 @@ def run_command(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for the results: a new one or that of an earlier run, whose results are "
-            "replaced; a user's own files never are. Default: out/SCENARIO"
+            help="Folder for the results. Results of an earlier run are replaced, a user's own "
+            "files never. Default: out/SCENARIO"
         ),
     ] = None,
     chosen: TimedScenario,
@@ -96,11 +96,11 @@ def run_command(
     after_fault: Annotated[
         str,
         typer.Option(
-            metavar="SECONDS", help="Go on for that long after a fault, to see how it ends."
+            metavar="SECONDS", help="Continue the simulation for this time after a fault."
         ),
     ] = "0",
     margins: Annotated[
-        bool, typer.Option("--margins", help="Tell what the loop bears at the start.")
+        bool, typer.Option("--margins", help="Compute stability margins of the loop at the start.")
     ] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -115,10 +115,10 @@ def run_command(
         folder = folder_or(out, loaded.name)
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console(quiet=quiet)
-        said: list[str] = []
+        printed: list[str] = []
 
         def warn(sentence: str) -> None:
-            said.append(sentence)
+            printed.append(sentence)
             print_warning(console, sentence)
 
         with ProgressDisplay(console, loaded.name, seconds) as progress:
@@ -129,7 +129,7 @@ def run_command(
                 progress=progress,
                 warn=warn,
             )
-        print_run(console, outcome, said)
+        print_run(console, outcome, printed)
         raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
 
 
@@ -138,28 +138,26 @@ def live_command(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder in which every take gets one of its own, take_1, take_2, ... "
+            help="Folder for the takes, in subfolders take_1, take_2, ... "
             "Default: out/SCENARIO_live"
         ),
     ] = None,
     chosen: ChosenScenario,
     port: Annotated[
-        int, typer.Option(help="Of the page, on this machine alone; 0 for any that is free.")
+        int, typer.Option(help="Port of the page on localhost; 0 for any free port.")
     ] = 0,
     watch: Annotated[
         bool,
-        typer.Option("--watch", help="Watch a robot that `drive` drives: pause, speed, stop."),
+        typer.Option("--watch", help="Monitor a robot controlled by `drive`: pause, speed, stop."),
     ] = False,
     bus: Bus,
     duration: Annotated[
         str | None,
-        typer.Option(
-            metavar="SECONDS", help="Simulated time in s after which it ends. Default: 600"
-        ),
+        typer.Option(metavar="SECONDS", help="Simulated time of the session in s. Default: 600"),
     ] = None,
     drawn: Drawn,
 ) -> None:
-    """Guide the robot of a scenario yourself, in real time, on a page in your browser."""
+    """Guide the robot of a scenario by hand in real time, on a page in the browser."""
     from experiments.live.start import run_live
 
     seconds = None if duration is None else read_duration(duration)
@@ -168,21 +166,23 @@ def live_command(
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
 
-        def tell(line: str) -> None:
+        def notify(line: str) -> None:
             print_line(console, f"{loaded.name}: {line}")
 
         if watch:
             from experiments.live.watch import run_watch
-            from pfsc_drake.drivers.link import WatchingEnd
+            from pfsc_drake.drivers.link import ObserverEndpoint
             from pfsc_drake.drivers.messages import dialect
 
-            run_watch(loaded, WatchingEnd(open_bus(bus.lcm), dialect(bus.driver)), port, tell)
+            run_watch(
+                loaded, ObserverEndpoint(open_bus(bus.lcm), dialect(bus.driver)), port, notify
+            )
             return
         session = run_live(
             loaded,
             port,
             seconds,
-            tell,
+            notify,
             out=folder_or(out, f"{loaded.name}_live"),
             figures=drawn.figures,
             recording=drawn.recording,
@@ -195,7 +195,7 @@ def compare_command(
     runs: Annotated[list[Path], typer.Argument(help="Folders of two or more runs.")],
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/comparison"),
 ) -> None:
-    """Put several runs on one page."""
+    """Compare several runs on one page."""
     from experiments.compare import write_comparison
 
     with interruptible():
@@ -205,24 +205,24 @@ def compare_command(
 
 @dataclasses.dataclass
 class Variations:
-    """What varies in a sweep."""
+    """Varied parameters of a sweep."""
 
     vary: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY.PATH=VALUES",
-            help="What varies: a,b,c or linspace(low,high,n), in all combinations; or at random "
+            help="Values of a key: a,b,c or linspace(low,high,n), in all combinations; or random "
             "low:high, loguniform(low,high), normal(mean,sd), choice(a,b), each with *n for a "
             "list of n. Repeatable.",
         ),
     ] = None
     samples: Annotated[int | None, typer.Option(help="Number of random draws.")] = None
-    seed: Annotated[int, typer.Option(min=0, help="Of the random draws.")] = 0
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random draws.")] = 0
 
 
 @dataclasses.dataclass
 class Processes:
-    """Where the runs of a sweep are made."""
+    """Processes of a sweep."""
 
     scheduler: Annotated[
         str | None,
@@ -244,17 +244,17 @@ def sweep_command(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for the results; the same command goes on with what is missing there. "
+            help="Folder for the results; a repeated command continues an incomplete sweep. "
             "Default: out/SCENARIO_sweep"
         ),
     ] = None,
     chosen: TimedScenario,
     metric: Annotated[
-        str | None, typer.Option(help="What to draw. Default: max_path_deviation")
+        str | None, typer.Option(help="Metric to draw. Default: max_path_deviation")
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Run a scenario many times, on all cores: grids, ranges, distributions over its keys."""
+    """Run a scenario many times on all cores, over grids or random values of its keys."""
     from experiments.sweep.sweep import define_sweep, run_sweep
 
     seconds = chosen.seconds
@@ -282,10 +282,10 @@ def sweep_command(
 
 
 def _read_after_fault(text: str) -> float:
-    """The value of ``--after-fault`` in s."""
+    """Return the value of ``--after-fault`` [s]."""
     seconds = float(text) if is_number(text) else math.nan
     if not 0.0 <= seconds <= _LONGEST_AFTER_FAULT:
         raise InputError(
-            f"--after-fault {shortened(text)}: allowed: 0 to {_LONGEST_AFTER_FAULT:g} seconds"
+            f"--after-fault {shorten(text)}: allowed: 0 to {_LONGEST_AFTER_FAULT:g} seconds"
         )
     return seconds

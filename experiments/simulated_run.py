@@ -12,17 +12,17 @@ from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.result import MarginAnalysis
 from reporting.folder import check_folder, open_results
-from reporting.interruption import noticed_interruption
+from reporting.interruption import watch_interruption
 from reporting.progress import ProgressListener
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run beside its scenario, those of the command line and of the API.
+    """Options of a run beside its scenario, on the command line and in the API.
 
     Attributes:
         duration: Simulated time [s] instead of the scenario's.
-        after_fault: How long to go on after a fault [s], so that one sees how it ends.
+        after_fault: Simulated time after a fault [s].
         margins: Whether to compute the margins of the loop at the start.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
@@ -43,13 +43,13 @@ def run_scenario(
     progress: ProgressListener,
     warn: Callable[[str], None] = lambda sentence: None,
 ) -> RunOutcome:
-    """Run a scenario and write everything that a run leaves into a folder.
+    """Run a scenario and write all results into a folder.
 
     Args:
         scenario: The scenario as read.
         out: Folder for the results, see :func:`reporting.folder.open_results`.
-        options: What to do beside what the scenario says.
-        progress: Told how far the run is.
+        options: Options beside the scenario.
+        progress: Progress listener.
         warn: Called with each warning that is known before anything moves; they are among those
             of the outcome, too.
 
@@ -64,7 +64,7 @@ def run_scenario(
     for sentence in prepared.warnings:
         warn(sentence)
     analysis = _analyse(prepared, scenario.path.parent, progress) if options.margins else None
-    with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
+    with watch_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
         progress.expect(prepared.settings.duration)
         with steady_clock():
@@ -83,18 +83,18 @@ def run_scenario(
 
 
 def _analyse(prepared: PreparedRun, folder: Path, progress: ProgressListener) -> MarginAnalysis:
-    """Tell the margins of the loop at the start."""
+    """Compute margins of the loop at the start."""
     return analyse(prepared.settings, folder, ErrorBox(), _BeforeStart(progress), only_start=True)
 
 
 class _BeforeStart:
-    """Tells what goes on before the run's own time begins."""
+    """Progress listener for the time before the simulation starts."""
 
     def __init__(self, progress: ProgressListener) -> None:
         self._progress = progress
 
     def expect(self, duration: float) -> None:
-        """Leave it to the run."""
+        """Ignore the duration, which belongs to the run."""
 
     def __call__(self, simulated_time: float, phase: str) -> None:
         self._progress(0.0, phase)

@@ -1,4 +1,4 @@
-"""Running a station: a simulation, and how long one tick of its controller takes."""
+"""Simulation of a station, and computing time of its controller."""
 
 import time
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from experiments.results.run_log import RunLog
 from pfsc_drake.controller.tasks.space_task import SpaceTask
 from reporting.progress import ProgressListener
 
-# progress and faults are looked at this often [s]; between them nothing interrupts the loop
+# interval of progress reports and checks for faults [s]
 _CHUNK = 0.05
 _SAMPLES = 1000
 _JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
@@ -23,13 +23,13 @@ _JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
 
 @dataclass
 class SimulationResult:
-    """What a simulation left.
+    """Result of a simulation.
 
     Attributes:
         root: Context of the diagram at the end.
         real_time_factor: Simulated over wall clock time.
-        fault: Why it was stopped early, or None.
-        fault_time: When that was found [s], or None.
+        fault: Fault that stopped it early, or None.
+        fault_time: Time of detection [s], or None.
     """
 
     root: Context
@@ -49,13 +49,13 @@ def simulate(
     """Simulate until the end, until some time after a fault, or an interruption.
 
     Args:
-        station: What to simulate.
-        parameters: How; ``integrator`` names a scheme.
+        station: The station.
+        parameters: Parameters of the simulation; ``integrator`` names a scheme.
         duration: Simulated time [s].
-        progress: Told how far the run is.
-        interrupted: Whether to stop as soon as the step that is being made is complete.
-        after_fault: How long to go on with a system in its safe state [s]; then the run may
-            be longer than its duration.
+        progress: Progress listener.
+        interrupted: Whether to stop after the current step.
+        after_fault: Simulated time in the safe state after a fault [s], which may exceed the
+            duration.
     """
     simulator = Simulator(station.diagram)
     configure(simulator, parameters.integrator, parameters.max_step, parameters.accuracy)
@@ -85,7 +85,7 @@ def simulate(
 
 
 def chunk_ticks(period: float) -> int:
-    """Return how many ticks are simulated between two looks at faults.
+    """Return the number of ticks between two checks for faults.
 
     Args:
         period: Sampling time of the controller [s].
@@ -94,7 +94,7 @@ def chunk_ticks(period: float) -> int:
 
 
 def configure(simulator: Simulator, scheme: str, max_step: float, accuracy: float = 0.0) -> None:
-    """Let a simulator integrate.
+    """Configure the integrator of a simulator.
 
     Args:
         simulator: The simulator, not yet initialized.
@@ -132,18 +132,20 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     usable = np.flatnonzero(finite[1:] & finite[:-1]) + 1
     chosen = usable[:: max(1, len(usable) // _SAMPLES)]
     plant_states = [station.part.coordinates.plant_state(x) for x in states[chosen]]
-    # a place is told by parameters and, where it is integrated, by arc lengths
-    memory = station.task.place.layout.memory
-    places = np.hstack([log["theta"].values, log["eta"].values])[:, : memory.stop - memory.start]
+    # a projection has parameters and, where it is integrated, arc lengths
+    memory = station.task.projected_manifold.layout.memory
+    projections = np.hstack([log["theta"].values, log["eta"].values])[
+        :, : memory.stop - memory.start
+    ]
     elapsed = []
     for k, x in zip(chosen, plant_states, strict=True):
         root.SetTime(log.time[k])
-        station.set_place(root, places[k - 1])
-        station.place_robot(root, x)
+        station.set_projection(root, projections[k - 1])
+        station.set_robot_state(root, x)
         rest(log["y_t"].values[k - 1])
-        # the controller compares what it measures with what it measured before
+        # the controller compares measurements with the previous ones
         controller.set_last_state(blocks, root, states[k - 1])
-        sensor()  # what the plant needs to know its forces is not the controller's time
+        sensor()  # the plant's own force computation is not part of the controller's time
         begin = time.perf_counter()
         controller.drive(blocks, root)
         elapsed.append(time.perf_counter() - begin)
@@ -151,14 +153,14 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
 
 
 def _known_from(station: Station, root: Context) -> float:
-    """Return the parameter from which on the path is still known, of one whose way points came."""
+    """Return the first path parameter that a streamed path still stores, -inf of another path."""
     if not isinstance(station.task, ScenarioStream):
         return -np.inf
-    return float(station.blocks.output(root, "controller.waypoint_intake.course")[0]) + 1.0
+    return float(station.blocks.output(root, "controller.waypoint_intake.path")[0]) + 1.0
 
 
 def _sensor(station: Station, root: Context) -> Callable[[], object]:
-    """Return what makes the plant work out the forces in its joints, if they are measured."""
+    """Return a function that evaluates the joint reaction forces, if they are measured."""
     name = "joint_reaction"
     if not station.diagram.HasSubsystemNamed(name):
         return lambda: None
@@ -168,11 +170,11 @@ def _sensor(station: Station, root: Context) -> Callable[[], object]:
 
 
 def _guidance(station: Station, root: Context) -> Callable[[np.ndarray], None]:
-    """Return what lets guidance, if there is any, have been at a place before."""
+    """Return a function that sets the state of guidance, if there is any, to a position."""
     task = station.task
     if not isinstance(task, SpaceTask):
         return lambda y_t: None
-    rest = task.lead.start
+    rest = task.command_dynamics.start
     return lambda y_t: station.blocks.set_state(
-        root, "controller.fixture_guidance.lead", np.array(rest(y_t)).ravel()
+        root, "controller.fixture_guidance.command_dynamics", np.array(rest(y_t)).ravel()
     )

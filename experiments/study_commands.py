@@ -1,4 +1,4 @@
-"""Commands that ask more of a scenario than a run: studies, margins, C, inverse kinematics."""
+"""Commands beyond runs: studies, teaching, margins, export and replay."""
 
 import importlib
 import logging
@@ -23,7 +23,7 @@ from experiments.outcomes import (
     print_export,
 )
 from experiments.scenario_file import expand_home
-from pfsc_drake.errors import InputError, shortened, suggestion
+from pfsc_drake.errors import InputError, shorten, suggestion
 from reporting.progress import ProgressDisplay
 from reporting.terminal import FAULT, interruptible, show_page
 
@@ -31,33 +31,33 @@ _LONGEST_RECORD = 600.0  # s, of a run beside an exported controller
 _STUDIES = {
     "robustness": (
         "experiments.studies.robustness.write_robustness",
-        "all laws on robots that are not their models",
+        "robustness of all laws to model errors",
     ),
     "fastest": (
         "experiments.studies.fastest.write_fastest",
-        "the fastest motion on ten paths, and how near it is to the best",
+        "time-optimal motions on ten paths, compared with the optimum",
     ),
     "crossings": (
         "experiments.studies.crossings.write_crossings",
-        "300 persons who walk across a path at random",
+        "300 random persons crossing a path",
     ),
     "two_arms": (
         "experiments.studies.two_arms.write_two_arms",
-        "what must be known of a workpiece's motion, over the speed of two arms",
+        "knowledge of the workpiece's motion, over the speed of two arms",
     ),
     IDENTIFICATION: (
         "experiments.studies.identify.write_identification",
-        "from robots to their models and back",
+        "identification of robot models, and control with them",
     ),
     TEACH_IN: (
         "experiments.teaching.teach.write_teach_in",
-        "a path taught by hand, and followed",
+        "teaching a path by hand guiding, and following it",
     ),
 }
 
 
 def _complete_study(incomplete: str) -> list[tuple[str, str]]:
-    """Return the studies whose names go on like this, with what they are."""
+    """Return the studies that complete a name, with their descriptions."""
     return [(name, text) for name, (_, text) in _STUDIES.items() if name.startswith(incomplete)]
 
 
@@ -72,10 +72,10 @@ def study_command(
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
     quiet: Quiet = False,
 ) -> None:
-    """Many runs on one page, on all cores, in minutes; further studies are pages of the site."""
+    """Run a study: many runs on one page, on all cores, in minutes."""
     if name not in _STUDIES:
         allowed = ", ".join(_STUDIES)
-        raise InputError(f"study {shortened(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
+        raise InputError(f"study {shorten(name)}: allowed: {allowed}{suggestion(name, _STUDIES)}")
     module, _, function = _STUDIES[name][0].rpartition(".")
     write = getattr(importlib.import_module(module), function)
     with interruptible():
@@ -89,30 +89,34 @@ def study_command(
 
 @dataclass
 class TaughtPath:
-    """How a path is made of a motion, and followed."""
+    """Options of a taught path."""
 
-    spacing: Annotated[float, typer.Option(help="Of the waypoints [m].")] = 0.01
+    spacing: Annotated[float, typer.Option(help="Spacing of the waypoints [m].")] = 0.01
     angle: Annotated[
-        float, typer.Option(help="Turn after which a waypoint is taken before that [deg].")
+        float, typer.Option(help="Rotation after which a further waypoint is taken [deg].")
     ] = 3.0
     tolerance: Annotated[
-        float, typer.Option(help="How far the path may be from a waypoint [m].")
+        float, typer.Option(help="Largest distance of the path from a waypoint [m].")
     ] = 2e-3
-    tolerance_deg: Annotated[float, typer.Option(help="The same of the orientation [deg].")] = 1.0
-    closed: Annotated[bool, typer.Option("--closed", help="Go round and round.")] = False
-    velocity: Annotated[float, typer.Option(help="Along the path [m/s].")] = 0.1
+    tolerance_deg: Annotated[
+        float, typer.Option(help="Largest angle of the path from a waypoint's orientation [deg].")
+    ] = 1.0
+    closed: Annotated[
+        bool, typer.Option("--closed", help="Close the path, and follow it periodically.")
+    ] = False
+    velocity: Annotated[float, typer.Option(help="Speed along the path [m/s].")] = 0.1
 
 
 def teach_command(
-    run: Annotated[Path, typer.Argument(help="Folder of a run in which a hand led the tool.")],
+    run: Annotated[Path, typer.Argument(help="Folder of a hand-guiding run.")],
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/taught"),
     *,
     path: TaughtPath,
     follow: Annotated[
-        bool, typer.Option("--follow/--no-follow", help="Run along the path.")
+        bool, typer.Option("--follow/--no-follow", help="Simulate a run that follows the path.")
     ] = True,
 ) -> None:
-    """Turn a run in which a hand led the tool into a path, and follow it."""
+    """Turn a hand-guiding run into a path, and follow it."""
     from experiments.teaching.taught_path import TeachingOptions
     from experiments.teaching.teach import teach
 
@@ -145,22 +149,22 @@ def margins_command(
         Path | None, typer.Option(help="Folder for the page. Default: out/SCENARIO_margins")
     ] = None,
     mass: Annotated[
-        float, typer.Option(help="Relative error of masses and inertias to be borne.")
+        float, typer.Option(help="Relative error of masses and inertias to tolerate.")
     ] = 0.05,
     stiffness: Annotated[
-        float, typer.Option(help="Relative error of joint stiffnesses to be borne.")
+        float, typer.Option(help="Relative error of joint stiffnesses to tolerate.")
     ] = 0.05,
     rotor: Annotated[
-        float, typer.Option(help="Relative error of rotor inertias to be borne.")
+        float, typer.Option(help="Relative error of rotor inertias to tolerate.")
     ] = 0.0,
-    tool: Annotated[float, typer.Option(help="Error of the tool's mass to be borne [kg].")] = 0.1,
+    tool: Annotated[float, typer.Option(help="Error of the tool's mass to tolerate [kg].")] = 0.1,
 ) -> None:
-    """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
+    """Compute stability margins of the sampled loop: modes, drives, delay, model errors."""
     from experiments.scenario_file import read_scenario
     from experiments.studies.margins.box import ErrorBox
     from experiments.studies.margins.margins_page import (
         case_table,
-        place_table,
+        point_table,
         summary,
         write_margins,
     )
@@ -172,7 +176,7 @@ def margins_command(
         console, box = Console(), ErrorBox(mass, stiffness, rotor, tool)
         with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
             analysis, report = write_margins(loaded, folder, box, progress)
-        for table in (place_table(analysis), case_table(analysis)):
+        for table in (point_table(analysis), case_table(analysis)):
             console.print(table)
             console.print()
         console.print(summary(analysis), highlight=False)
@@ -185,12 +189,10 @@ def export_command(
     overrides: Overrides = None,
     check: Annotated[
         bool,
-        typer.Option(
-            "--check", help="Compile it, let it repeat the run and compare; needs gcc for that."
-        ),
+        typer.Option("--check", help="Compile it, replay the recorded run and compare; needs gcc."),
     ] = False,
     duration: Annotated[
-        str, typer.Option(metavar="SECONDS", help="Simulated time of the run beside it in s.")
+        str, typer.Option(metavar="SECONDS", help="Simulated time of the recorded run in s.")
     ] = "1",
 ) -> None:
     """Write a scenario's controller as C99."""
@@ -214,20 +216,20 @@ def export_command(
 
 
 def replay_command(
-    folder: Annotated[Path, typer.Argument(help="Of an exported controller.")],
+    folder: Annotated[Path, typer.Argument(help="Folder of an exported controller.")],
     log: Annotated[
         Path,
         typer.Argument(
-            help="log.h5 of a run, or a CSV of a robot: t, q_1, .., v_1, .., perhaps q_M_1, .., "
-            "v_M_1, .., and name_1, .. of every further input."
+            help="log.h5 of a run, or a CSV file of a robot: t, q_1, .., v_1, .., optionally "
+            "q_M_1, .., v_M_1, .., and name_1, .. of every further input."
         ),
     ],
 ) -> None:
-    """Tell what an exported controller would have commanded, before power is on; needs gcc."""
+    """Compute the commands of an exported controller for a log; needs gcc."""
     from experiments.controller_replay import replay_log
 
     with interruptible():
-        console, place = Console(), expand_home(folder)
-        with ProgressDisplay(console, place.name, None, paced=False) as progress:
-            commands = replay_log(place, expand_home(log), progress)
+        console, exported = Console(), expand_home(folder)
+        with ProgressDisplay(console, exported.name, None, paced=False) as progress:
+            commands = replay_log(exported, expand_home(log), progress)
         raise typer.Exit(judge_commands(console, commands))

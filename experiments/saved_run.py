@@ -1,4 +1,4 @@
-"""A run as it is kept in its folder, for scripts and notebooks."""
+"""A saved run in its folder, for scripts and notebooks."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -28,16 +28,16 @@ _KIND = "run"
 
 @dataclass
 class Run:
-    """What a run left: signals, metrics, figures, recording, and how it ended.
+    """A saved run: signals, metrics, figures, recording and outcome.
 
-    What is not asked for is not read. In a notebook a run shows itself as a short table.
+    Results are read when accessed. In a notebook a run is displayed as a short table.
 
     Attributes:
-        folder: Where it is kept.
-        fault: Why it was stopped; None if it was not.
-        missed: What was promised and not kept, one phrase each.
-        warnings: What may not have gone as well as hoped, one sentence each.
-        interrupted: Whether somebody stopped it.
+        folder: Folder of the results.
+        fault: Fault that stopped the run, or None.
+        missed: Violated requirements, one phrase each.
+        warnings: Warnings, one sentence each.
+        interrupted: Whether the user stopped it.
     """
 
     folder: Path
@@ -70,7 +70,7 @@ class Run:
 
     @property
     def scenario(self) -> "Scenario":
-        """The scenario as resolved, a new one each time: to be changed and run again."""
+        """The resolved scenario, a new object at each access: to be changed and run again."""
         from diagrams.scenario import Scenario
         from pfsc_drake.yaml.typed import load_file
 
@@ -83,12 +83,12 @@ class Run:
 
     @property
     def report(self) -> Path:
-        """The page to open in a browser."""
+        """Page to open in a browser."""
         return self._file("report.html")
 
     @property
     def recording(self) -> Path:
-        """The page that shows the motion.
+        """Page that shows the motion.
 
         Raises:
             InputError: If nothing was recorded.
@@ -96,7 +96,7 @@ class Run:
         return self._file("recording.html")
 
     def to_dataframe(self) -> "pd.DataFrame":
-        """Return all signals as a table of pandas, which is no dependency of this project.
+        """Return all signals as a pandas table; pandas is not a dependency of this project.
 
         Its index is the time ``t`` [s], its columns are pairs of a signal and a component, so that
         ``table["xi"]`` has the components of ``xi``. Signals of names (``mode``, ``fault``) are
@@ -106,7 +106,7 @@ class Run:
 
         columns: dict[tuple[str, str], Any] = {}
         for name, signal in self.log.signals.items():
-            if _tells_names(signal):
+            if _has_names(signal):
                 kinds = pd.Categorical.from_codes(signal.values[:, 0], signal.labels)
                 columns[name, name] = kinds
                 continue
@@ -117,7 +117,7 @@ class Run:
         return table
 
     def show(self, height: int = 480) -> None:
-        """Show the recording: beneath the cell of a notebook, elsewhere say where it is.
+        """Show the recording below a notebook cell; elsewhere print its path.
 
         Args:
             height: Height of the frame in a notebook [pixels].
@@ -131,13 +131,13 @@ class Run:
             Console().print(str(self.recording), soft_wrap=True, highlight=False, markup=False)
 
     def save(self, folder: str | Path) -> "Run":
-        """Copy everything into a folder, and return the run as it is there.
+        """Copy all results into a folder, and return the copied run.
 
         Args:
-            folder: A new folder or that of an earlier run, whose results are replaced.
+            folder: Target folder; results of an earlier run are replaced.
 
         Raises:
-            InputError: If the folder cannot be used, or not be written.
+            InputError: If the folder cannot be used or written.
         """
         target = expand_home(Path(folder))
         names = listed_results(self.folder)
@@ -170,13 +170,13 @@ class Run:
 
 
 def load(folder: str | Path) -> Run:
-    """Return what a run left in a folder.
+    """Load a run from its folder.
 
     Args:
-        folder: That of a run: of this module, of the command line, of a driven robot.
+        folder: Folder of a run, written by this module, the command line or a driven robot.
 
     Raises:
-        InputError: If it is no such folder.
+        InputError: If it is not the folder of a run.
     """
     path = expand_home(Path(folder))
     if not path.is_dir():
@@ -192,8 +192,8 @@ def load(folder: str | Path) -> Run:
     )
 
 
-def _tells_names(signal: Signal) -> bool:
-    """Whether the values of a signal are numbers of names."""
+def _has_names(signal: Signal) -> bool:
+    """Return whether the values of a signal are indices of its labels."""
     values = signal.values
     return bool(
         np.issubdtype(values.dtype, np.integer)

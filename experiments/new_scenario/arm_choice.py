@@ -10,7 +10,8 @@ from pydrake.multibody.tree import Frame, FrameIndex, Joint, RigidBody
 
 from diagrams.robots.arm_model import ArmModel, read_arm
 from diagrams.scenario import RobotParameters
-from pfsc_drake.errors import InputError
+from pfsc_drake.control.law.laws import LAWS
+from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import packages_for, read_with_inclusions, resolve_model
 from pfsc_drake.robot.models.inspection import inspect_model
 from pfsc_drake.robot.models.joint_edits import all_joints, inboard_joints
@@ -52,6 +53,8 @@ class ArmChoice:
     """
 
     def __init__(self, model: str, tool_frame: str, law: str, ask: Ask) -> None:
+        if law and law not in LAWS:
+            raise InputError(f"--law {law}: allowed: {', '.join(LAWS)}{suggestion(law, LAWS)}")
         self.model, self.reasons = model, dict[str, str]()
         plant = self._every_joint()
         self.tool_frame = tool_frame or self._choose_frame(plant, ask)
