@@ -1,8 +1,8 @@
-"""The architecture: its layers, what each package may import, and the picture of both.
+"""Architecture: layers, allowed imports of each package, and the picture of both.
 
-    python -m docs.architecture     # writes docs/images/architecture.svg anew
+    python -m docs.architecture     # redraws docs/images/architecture.svg
 
-The picture is drawn from the packages' own docstrings and imports; tests hold the rules.
+The picture is drawn from the docstrings and imports of the packages; tests check the rules.
 """
 
 import ast
@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 
-# its stub names everything for type checkers, and loads what is used
+# its stub names everything for type checkers; names are loaded on first use
 LIBRARY = "pfsc_drake"
 # from the top down; a file imports from its own package and from those below, not from one beside
 LAYERS = [
@@ -39,7 +39,7 @@ LAYERS = [
     ["pfsc_drake.errors"],
 ]
 PACKAGES = [package for layer in LAYERS for package in layer]
-# packages that a package must not know
+# packages that a package must not import
 UNKNOWN = {
     "pfsc_drake.jets": ["pydrake", "matplotlib"],
     "pfsc_drake.blocks": ["pydrake", "matplotlib"],
@@ -52,7 +52,7 @@ UNKNOWN = {
 }
 
 _WIDTH, _HEIGHT, _GAP, _MARGIN = 1000, 58, 22, 16
-# where boxes begin and end; beside them arrows go past layers
+# edges of the boxes; arrows pass layers beside them
 _LEFT, _RIGHT = 90, 900
 _STYLE = """
 text { font: 13px system-ui, sans-serif; fill: #17202e; }
@@ -108,7 +108,7 @@ def layer_of(package: str) -> int:
 
 
 def arrows() -> set[tuple[str, str]]:
-    """Return which package imports from which other."""
+    """Return pairs of packages of which the first imports from the second."""
     found = set()
     for module, imported in imports().items():
         for other in imported:
@@ -159,7 +159,7 @@ def draw() -> str:
             x += width / 2.0
             lines.append(_arrow([(x, boxes[a][1] + _HEIGHT), (x, boxes[b][1])]))
             continue
-        # past the layers between, on the side where both can be reached
+        # past the layers between, on the side that both boxes touch
         left = any(boxes[package][0] + boxes[package][2] < _RIGHT - 1.0 for package in (a, b))
         lanes[left] += 1
         edges = [
@@ -173,16 +173,16 @@ def draw() -> str:
 
 
 def _arrow(corners: list[tuple[float, float]]) -> str:
-    way = " L".join(f"{x:.0f} {y:.0f}" for x, y in corners)
-    return f'<path d="M{way}" marker-end="url(#tip)"/>'
+    line = " L".join(f"{x:.0f} {y:.0f}" for x, y in corners)
+    return f'<path d="M{line}" marker-end="url(#tip)"/>'
 
 
 def _purpose(package: str) -> str:
-    """Return the first sentence that a package says of itself."""
+    """Return the first line of a package's docstring."""
     path = ROOT.joinpath(*package.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    said = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
-    return said.split("\n")[0]
+    docstring = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+    return docstring.split("\n")[0]
 
 
 def _inside(package: str) -> str:

@@ -1,7 +1,7 @@
-"""The site: Sphinx with MyST Markdown, notebooks in text, and pages made of the code.
+"""Site: Sphinx with MyST Markdown, notebooks as text, and generated pages.
 
-A page says ``<!-- made: NAME -->`` where something of :mod:`docs.making` stands. Notebooks are run
-unless ``PFSC_NOTEBOOKS=off``.
+The mark ``<!-- generated: NAME -->`` of a page is replaced by text of :mod:`docs.making`. Notebooks
+are executed unless ``PFSC_NOTEBOOKS=off``.
 """
 
 import logging
@@ -13,7 +13,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-# kernels of notebooks find the same code
+# notebook kernels use the same code
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 from docs.making.commands import command_line  # noqa: E402
@@ -23,7 +23,7 @@ from docs.making.recordings import copy_recordings  # noqa: E402
 from docs.making.scenario_keys import scenario_keys  # noqa: E402
 from pfsc_drake import __version__ as version  # noqa: E402
 
-MADE: dict[str, Callable[[], str]] = {
+GENERATED: dict[str, Callable[[], str]] = {
     "scenario_keys": scenario_keys,
     "command_line": command_line,
     "interface": interface,
@@ -53,7 +53,7 @@ myst_enable_extensions = [
     "dollarmath",
 ]
 myst_heading_anchors = 4
-# cells that were not run do not say in which language they are
+# cells that were not executed have no language
 suppress_warnings = ["myst-nb.lexer"]
 nb_execution_mode = "off" if os.environ.get("PFSC_NOTEBOOKS") == "off" else "cache"
 nb_execution_cache_path = str(ROOT / "docs" / "tutorials" / "out" / "notebooks")
@@ -81,28 +81,28 @@ html_show_sourcelink = False
 
 
 def _marker(name: str) -> str:
-    return f"<!-- made: {name} -->"
+    return f"<!-- generated: {name} -->"
 
 
 def _fill(app: Any, docname: str, source: list[str]) -> None:
-    """Put what is made of the code where a page asks for it."""
-    for name, make in MADE.items():
+    """Replace the marks of a page by generated text."""
+    for name, generate in GENERATED.items():
         if _marker(name) in source[0]:
-            source[0] = source[0].replace(_marker(name), make())
+            source[0] = source[0].replace(_marker(name), generate())
 
 
-def _made_pages(app: Any, env: Any, *changes: set[str]) -> list[str]:
-    """Return the pages that are read again at every build, as the code may have changed."""
+def _generated_pages(app: Any, env: Any, *changes: set[str]) -> list[str]:
+    """Return the pages with generated text, which every build reads again."""
     pages = {name: Path(env.doc2path(name)).read_text(encoding="utf-8") for name in env.found_docs}
-    return [name for name, text in pages.items() if any(_marker(made) in text for made in MADE)]
+    return [name for name, text in pages.items() if any(_marker(key) in text for key in GENERATED)]
 
 
 def setup(app: Any) -> None:
-    """Connect what is made of the code to the build."""
-    # a chapter without pages is no fault
+    """Connect the generated text to the build."""
+    # a chapter without pages is no error
     logging.getLogger("sphinx.sphinx.directives.other").addFilter(
         lambda record: "didn't match any documents" not in str(record.msg)
     )
     app.connect("source-read", _fill)
-    app.connect("env-get-outdated", _made_pages)
+    app.connect("env-get-outdated", _generated_pages)
     app.connect("build-finished", copy_recordings)

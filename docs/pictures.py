@@ -1,10 +1,10 @@
-"""Pictures of robots that move, made from recordings of runs.
+"""Pictures of moving robots, from recordings of runs.
 
-    python -m docs.pictures [scenario ..]     # docs/images/gallery/SCENARIO.webp anew, some or all
-    python -m docs.pictures --film            # the moving picture of the README
+    python -m docs.pictures [scenario ..]     # redraws docs/images/gallery/SCENARIO.webp
+    python -m docs.pictures --film            # the animated picture of the README
 
-A run goes on until its telling moment and is recorded; a browser without a window draws what the
-recording shows there.
+A run is recorded until its most instructive time; a headless browser draws the recording at that
+time.
 """
 
 import base64
@@ -33,7 +33,7 @@ GALLERY = ROOT / "docs" / "images" / "gallery"
 FILM = ROOT / "docs" / "images" / "two_robots.webp"
 RUNS = ROOT / "out" / "pictures"
 SIZE = (640, 480)
-# when a scenario shows what it is about [s]; others are shown at the end of their run
+# times of the pictures [s]; other scenarios are shown at the end of their run
 MOMENTS = {
     "operator_hand_6r": 6.0,
     "pfc_comau_6r": 1.8,
@@ -73,7 +73,7 @@ MOMENTS = {
     "vf_soft_region": 7.0,
     "vf_wedge": 8.0,
 }
-# what may leave the picture, where something small is what counts
+# parts of the scene that may lie outside the picture, in favour of small objects
 _MAGAZINE = [f"mounting/magazine_rest_{i}" for i in range(4)]
 _NOTCH = ("delta_robot", "path_following")
 _PLATE = ("visualizer", "path_following", "mounting/magazine", *_MAGAZINE)
@@ -86,8 +86,8 @@ LEFT_OUT = {
     "vf_many_surfaces": ("visualizer",),
 }
 _LARGEST = 60_000  # bytes of a picture
-_BACKGROUND, _SEEN = (0.86, 0.89, 0.93), 6  # colour, and how far others are from it, of 255
-_MARGIN = 0.05  # beside what is seen, as a share of it
+_BACKGROUND, _CONTRAST = (0.86, 0.89, 0.93), 6  # colour, and least difference from it, of 255
+_MARGIN = 0.05  # around the content, relative to its size
 _SEE_THROUGH = """for (const one of Object.values(
     viewer.scene_tree.find(["drake", "fixtures"]).children))
   if (one.children.skin) one.children.skin.set_property("modulated_opacity", 0.4)"""
@@ -99,10 +99,10 @@ class Scene:
     """A part of the film.
 
     Attributes:
-        scenario: Its name.
-        begin: Time of the run at which it begins [s].
-        end: And ends [s].
-        left_out: What may leave the picture, by its path in the scene.
+        scenario: Name of the scenario.
+        begin: Time of the run at the beginning [s].
+        end: Time of the run at the end [s].
+        left_out: Scene paths of the parts that may lie outside the picture.
     """
 
     scenario: str
@@ -111,30 +111,30 @@ class Scene:
     left_out: Sequence[str] = ()
 
 
-# side by side, each as fast as makes both last equally long
+# side by side, with playback speeds for equal durations
 SCENES = (
     Scene("pfc_elastic_6r", 0.0, 3.6),
     Scene("vf_forbidden_region", 1.0, 16.0, ("visualizer",)),
 )
-_FRAMES, _PACE, _SIDE = 72, 100, (400, 380)  # pictures, ms for each, pixels
+_FRAMES, _FRAME_TIME, _SIDE = 72, 100, (400, 380)  # pictures, ms for each, pixels
 
 
 class _Silent:
-    """Is told how far a run is, and says nothing."""
+    """Progress display without output."""
 
     def expect(self, duration: float) -> None:
-        """Ignore how long it will take."""
+        """Ignore the duration."""
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """Ignore how far it is."""
+        """Ignore the progress."""
 
 
 class View:
-    """A recording in a browser, at any of its times.
+    """View of a recording in a browser, at any time.
 
     Args:
-        browser: Where it is opened.
-        recording: The page, as a run leaves it.
+        browser: Browser that opens it.
+        recording: Page written by a run.
     """
 
     def __init__(self, browser: Browser, recording: Path) -> None:
@@ -152,11 +152,11 @@ class View:
 
     @property
     def duration(self) -> float:
-        """How long the recording is [s]."""
+        """Duration of the recording [s]."""
         return float(str(self._evaluate("viewer.animator.duration")))
 
     def picture(self, moment: float, size: tuple[int, int]) -> Image.Image:
-        """Return what is to be seen at a time.
+        """Return the picture at a time.
 
         Args:
             moment: Time of the run [s].
@@ -170,18 +170,18 @@ class View:
     def come_close(
         self, moments: Sequence[float], size: tuple[int, int], left_out: Sequence[str] = ()
     ) -> None:
-        """Narrow the view to what is to be seen.
+        """Narrow the view to the visible content.
 
         Args:
-            moments: Times at which it is [s].
-            size: Width and height in pixels of the pictures that are to be taken.
-            left_out: What may leave the picture, by its path in the scene.
+            moments: Times at which the content is drawn [s].
+            size: Width and height of the pictures in pixels.
+            left_out: Scene paths of the parts that may lie outside the picture.
         """
         self._show(left_out, False)
         drawn = [np.asarray(self.picture(moment, size)).astype(int) for moment in moments]
         self._show(left_out, True)
-        seen = np.any([abs(one - one[0, 0]).max(axis=2) > _SEEN for one in drawn], axis=0)
-        rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+        visible = np.any([abs(one - one[0, 0]).max(axis=2) > _CONTRAST for one in drawn], axis=0)
+        rows, columns = np.flatnonzero(visible.any(axis=1)), np.flatnonzero(visible.any(axis=0))
         if not rows.size:
             return
         low, high = np.array([columns[0], rows[0]]), np.array([columns[-1], rows[-1]]) + 1
@@ -193,11 +193,11 @@ class View:
 
     def _show(self, paths: Sequence[str], visible: bool) -> None:
         for path in paths:
-            place = json.dumps(["drake", *path.split("/")])
-            self._evaluate(f"viewer.set_property({place}, 'visible', {json.dumps(visible)})")
+            scene_path = json.dumps(["drake", *path.split("/")])
+            self._evaluate(f"viewer.set_property({scene_path}, 'visible', {json.dumps(visible)})")
 
     def _evaluate(self, expression: str) -> object:
-        """Return what an expression of this page is; others may be open beside it."""
+        """Return the value of an expression on this page; other pages may be open."""
         self._browser.speak_to(self._window)
         return self._browser.evaluate(expression)
 
@@ -209,7 +209,7 @@ class View:
             time.sleep(0.1)
 
     def _settle(self) -> None:
-        """Wait until meshes have been loaded: nothing changes any more."""
+        """Wait until meshes have been loaded, that is, until the picture is constant."""
         end, before = time.monotonic() + _PATIENCE, b""
         while time.monotonic() < end:
             now = self.picture(0.0, (160, 120)).tobytes()
@@ -224,7 +224,7 @@ def opened_browser() -> Iterator[Browser]:
     """Open a browser, and close it at the end.
 
     Raises:
-        FileNotFoundError: If there is none.
+        FileNotFoundError: No browser is installed.
     """
     program = find_browser()
     if program is None:
@@ -237,9 +237,9 @@ def record_run(scenario: str, folder: Path, duration: float | None = None) -> Pa
     """Run a scenario until a time, and return its recording.
 
     Args:
-        scenario: Its name.
-        folder: Where the run leaves its results.
-        duration: How long it is simulated [s]; None as long as it says.
+        scenario: Name of the scenario.
+        folder: Folder of the results.
+        duration: Simulated time [s]; None for the scenario's own.
     """
     outcome: RunOutcome = run_scenario(
         read_scenario(scenario, []),
@@ -257,9 +257,9 @@ def write_picture(view: View, moment: float, file: Path, left_out: Sequence[str]
 
     Args:
         view: The recording.
-        moment: When [s].
-        file: For the picture, as WebP.
-        left_out: What may leave the picture, by its path in the scene.
+        moment: Time of the run [s].
+        file: WebP file to write.
+        left_out: Scene paths of the parts that may lie outside the picture.
     """
     view.come_close([moment], SIZE, left_out)
     picture = view.picture(moment, SIZE)
@@ -273,11 +273,11 @@ def write_picture(view: View, moment: float, file: Path, left_out: Sequence[str]
 
 
 def write_film(views: Sequence[View], file: Path) -> int:
-    """Draw the scenes side by side into a file that moves, and return its size in bytes.
+    """Draw the scenes side by side into an animated file, and return its size in bytes.
 
     Args:
         views: A recording for every scene.
-        file: For the picture, as WebP.
+        file: WebP file to write.
     """
     width, height = _SIDE
     for scene, view in zip(SCENES, views, strict=True):
@@ -290,26 +290,26 @@ def write_film(views: Sequence[View], file: Path) -> int:
             frame.paste(view.picture(moment, _SIDE), (k * width, 0))
         frames.append(frame)
     first, *others = frames
-    options = {"duration": _PACE, "loop": 0, "quality": 70, "method": 4}
+    options = {"duration": _FRAME_TIME, "loop": 0, "quality": 70, "method": 4}
     first.save(file, "WEBP", save_all=True, append_images=others, **options)
     return file.stat().st_size
 
 
 def main() -> None:
-    """Make the pictures that are asked for."""
+    """Draw the requested pictures."""
     parser = ArgumentParser(prog="python -m docs.pictures")
     parser.add_argument("scenarios", nargs="*", help="shipped ones; all by default")
-    parser.add_argument("--film", action="store_true", help="the moving picture instead")
-    given = parser.parse_args()
+    parser.add_argument("--film", action="store_true", help="the animated picture instead")
+    arguments = parser.parse_args()
     logging.getLogger("drake").setLevel(logging.CRITICAL)
     console = Console(highlight=False)
-    if given.film:
+    if arguments.film:
         recordings = [record_run(s.scenario, RUNS / "film" / s.scenario, s.end) for s in SCENES]
         with opened_browser() as browser:
             size = write_film([View(browser, recording) for recording in recordings], FILM)
         console.print(f"{FILM.name}: {size / 1e6:.2f} MB")
         return
-    for name in given.scenarios or scenario_names():
+    for name in arguments.scenarios or scenario_names():
         recording = record_run(name, RUNS / name, MOMENTS.get(name))
         with opened_browser() as browser:
             view = View(browser, recording)

@@ -1,10 +1,10 @@
-"""The table of docs/results.md: what all shipped scenarios give.
+"""The table of docs/results.md: results of all shipped scenarios.
 
-    python -m docs.results [--duration S] [scenario ..]     # writes the table anew
+    python -m docs.results [--duration S] [scenario ..]     # rewrites the table
 
 Every scenario runs under every law that it has targets for, without figures and recordings, on all
-cores. What a run gave is kept in out/results/ and not run again as long as the revision of the
-program is the same and nothing differs from it. A scenario that was not run says so.
+cores. Outcomes are stored in out/results/ and reused as long as the revision of the program is the
+same and its tree is clean. The table marks scenarios that were not run.
 """
 
 import json
@@ -29,9 +29,9 @@ from tests.benchmarks.paces import machine
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "results.md"
-KEPT = ROOT / "out" / "results"
-BEGIN, END = "<!-- what make results writes begins -->", "<!-- and ends -->"
-# how far a tool is from where it should be: the first of them that a run has a target for, or has
+STORE = ROOT / "out" / "results"
+BEGIN, END = "<!-- begin: make results -->", "<!-- end: make results -->"
+# candidates for the deviation: the first with a target in the run, otherwise the first in the run
 DEVIATIONS = (
     "deepest_violation",
     "max_error_from_compliant_reference",
@@ -40,15 +40,15 @@ DEVIATIONS = (
 _HEAD = (
     "scenario",
     "law",
-    "what it is",
+    "description",
     "deviation",
     "target",
     "further targets",
-    "pace",
+    "speed",
     "status",
 )
 NOT_RUN = "not run"
-_ROUNDS = 10  # of the fixed piece of work, before a run and after it
+_ROUNDS = 10  # repetitions of the fixed work before a run and after it
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,10 @@ class Case:
     """A scenario under a law.
 
     Attributes:
-        scenario: Its name.
+        scenario: Name of the scenario.
         law: The law.
-        description: What it is, in a sentence.
-        overrides: What makes the law that of the scenario.
+        description: Description in a sentence.
+        overrides: Overrides that select the law.
     """
 
     scenario: str
@@ -69,8 +69,8 @@ class Case:
 
     @property
     def file(self) -> Path:
-        """Where its outcome is kept."""
-        return KEPT / f"{self.scenario}.{self.law}.json"
+        """File of the stored outcome."""
+        return STORE / f"{self.scenario}.{self.law}.json"
 
     def read(self) -> ScenarioFile:
         """Return the scenario."""
@@ -79,27 +79,27 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run gave.
+    """Outcome of a run.
 
     Attributes:
-        row: Its row.
-        work: How long the fixed piece of work took around it [s].
+        row: Row of the run.
+        work: Duration of the fixed work around the run [s].
     """
 
     row: RunRow
     work: float
 
     @property
-    def pace(self) -> float:
-        """Simulated time in the time of the fixed piece of work [s]."""
+    def speed(self) -> float:
+        """Simulated time per duration of the fixed work [s]."""
         return self.row.metrics["real_time_factor"].value * self.work
 
 
 def cases(names: Sequence[str] = ()) -> list[Case]:
-    """Return scenarios and their laws, the one that is shipped first.
+    """Return scenarios and their laws, the law of the scenario file first.
 
     Args:
-        names: Of the scenarios; all that are shipped if there is none.
+        names: Names of the scenarios; empty for all shipped ones.
     """
     found = []
     for entry in list_scenarios():
@@ -114,11 +114,11 @@ def cases(names: Sequence[str] = ()) -> list[Case]:
 
 
 def run_case(case: Case, duration: float | None = None) -> Outcome:
-    """Run a scenario beside the fixed piece of work.
+    """Run a scenario, with the fixed work before and after it.
 
     Args:
         case: The scenario and its law.
-        duration: How long it is simulated [s]; None as long as it says.
+        duration: Simulated time [s]; None for the scenario's own.
     """
     before = _work()
     row = run_task(RunTask.of(case.read(), duration))
@@ -126,7 +126,7 @@ def run_case(case: Case, duration: float | None = None) -> Outcome:
 
 
 def _work() -> float:
-    """Return how long a fixed piece of work takes by the clock that runs go by [s]."""
+    """Return the duration of the fixed work, by the clock of the real-time factor [s]."""
     begin = time.perf_counter()
     for _ in range(_ROUNDS):
         machine()
@@ -134,41 +134,41 @@ def _work() -> float:
 
 
 def run_all(
-    wanted: Sequence[Case], duration: float | None = None, console: Console | None = None
+    requested: Sequence[Case], duration: float | None = None, console: Console | None = None
 ) -> dict[Case, Outcome]:
-    """Run scenarios on all cores, those whose outcome is kept excepted.
+    """Run scenarios on all cores, except those with a stored outcome.
 
     Args:
-        wanted: The scenarios.
-        duration: How long each is simulated [s], and then not kept; None as long as it says.
-        console: Told one line per run, in the order in which they end.
+        requested: The scenarios.
+        duration: Simulated time of each [s], whose outcome is then not stored; None for their own.
+        console: Console for one line per run, in the order in which they end.
     """
-    keeps, revision = duration is None, git_revision()
-    outcomes = {case: kept for case in wanted if keeps and (kept := _kept(case, revision))}
-    left = [case for case in wanted if case not in outcomes]
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of the processes that are started
+    stores, revision = duration is None, git_revision()
+    outcomes = {case: found for case in requested if stores and (found := _stored(case, revision))}
+    left = [case for case in requested if case not in outcomes]
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the worker processes
     workers = max(1, min(count_cores(), len(left)))
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         running = {pool.submit(run_case, case, duration): case for case in left}
         for ended in as_completed(running):
             case, outcome = running[ended], ended.result()
             outcomes[case] = outcome
-            if keeps:
-                _keep(case, outcome)
+            if stores:
+                _store(case, outcome)
             if console is not None:
-                said = outcome.row.reason or outcome.row.status
-                console.print(f"{case.scenario:28s} {case.law:22s} {said}")
+                status = outcome.row.reason or outcome.row.status
+                console.print(f"{case.scenario:28s} {case.law:22s} {status}")
     return outcomes
 
 
-def _keep(case: Case, outcome: Outcome) -> None:
+def _store(case: Case, outcome: Outcome) -> None:
     case.file.parent.mkdir(parents=True, exist_ok=True)
     data = {"row": outcome.row.to_data(), "work": outcome.work}
     case.file.write_text(json.dumps(data), encoding="utf-8")
 
 
-def _kept(case: Case, revision: str) -> Outcome | None:
-    """Return what is kept of a case, if the same run would give the same."""
+def _stored(case: Case, revision: str) -> Outcome | None:
+    """Return the stored outcome of a case if it has this revision."""
     if not case.file.is_file() or revision == "unknown" or revision.endswith("+dirty"):
         return None
     data = json.loads(case.file.read_text(encoding="utf-8"))
@@ -176,15 +176,15 @@ def _kept(case: Case, revision: str) -> Outcome | None:
     return Outcome(row, data["work"]) if row.is_final and row.revision == revision else None
 
 
-def table(wanted: Sequence[Case], outcomes: Mapping[Case, Outcome]) -> str:
+def table(requested: Sequence[Case], outcomes: Mapping[Case, Outcome]) -> str:
     """Return all scenarios as a table in Markdown.
 
     Args:
-        wanted: Its rows.
-        outcomes: What was run of them.
+        requested: Rows of the table.
+        outcomes: Outcomes of the completed runs.
     """
     lines = [_line(_HEAD), _line(["---"] * len(_HEAD))]
-    for case in wanted:
+    for case in requested:
         outcome = outcomes.get(case)
         cells = [""] * 4 + [NOT_RUN] if outcome is None else _cells(outcome)
         lines.append(_line([f"`{case.scenario}`", f"`{case.law}`", case.description, *cells]))
@@ -196,7 +196,7 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def _cells(outcome: Outcome) -> list[str]:
-    """Return what a run gave: deviation, its target, further ones, pace, status."""
+    """Return the results of a run: deviation, its target, further targets, speed, status."""
     metrics = outcome.row.metrics
     there = [name for name in DEVIATIONS if name in metrics]
     name = next(
@@ -204,17 +204,17 @@ def _cells(outcome: Outcome) -> list[str]:
     )
     judged = {key: m for key, m in metrics.items() if m.passed is not None and key != name}
     others = [f"`{key}` {_value(m)} ({_bound(m)})" for key, m in judged.items()]
-    pace = _rounded(outcome.pace, "s") if "real_time_factor" in metrics else ""
+    speed = _rounded(outcome.speed, "s") if "real_time_factor" in metrics else ""
     deviation = (
         ["", ""] if name is None else [_deviation(name, metrics[name]), _bound(metrics[name])]
     )
-    return [*deviation, "; ".join(others), pace, _status(outcome.row, metrics)]
+    return [*deviation, "; ".join(others), speed, _status(outcome.row, metrics)]
 
 
 def _deviation(name: str, metric: Metric) -> str:
     short = {
         "deepest_violation": " deep",
-        "max_error_from_compliant_reference": " from the reference that yields",
+        "max_error_from_compliant_reference": " from the compliant reference",
     }
     return _value(metric) + short.get(name, "")
 
@@ -228,7 +228,7 @@ def _rounded(value: float, unit: str) -> str:
 
 
 def _bound(metric: Metric) -> str:
-    """Return what is asked of a metric; words as they stand."""
+    """Return the target of a metric; words unchanged."""
     if metric.bound is None:
         return metric.target or "none"
     comparison, number = metric.bound
@@ -240,29 +240,29 @@ def _status(row: RunRow, metrics: Metrics) -> str:
     missed = [name for name, metric in metrics.items() if metric.passed is False]
     if row.status != COMPLETED:
         return f"{row.status}: {row.reason}"
-    return f"missed: {', '.join(missed)}" if missed else "kept"
+    return f"missed: {', '.join(missed)}" if missed else "passed"
 
 
-def page(text: str, wanted: Sequence[Case], outcomes: Mapping[Case, Outcome]) -> str:
-    """Return the page with its table anew.
+def page(text: str, requested: Sequence[Case], outcomes: Mapping[Case, Outcome]) -> str:
+    """Return the page with a new table.
 
     Args:
-        text: The page as it is.
-        wanted: Rows of the table.
-        outcomes: What was run of them.
+        text: Present text of the page.
+        requested: Rows of the table.
+        outcomes: Outcomes of the completed runs.
 
     Raises:
-        ValueError: If the page does not say where the table stands.
+        ValueError: If the page lacks the marks of the table.
     """
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ValueError(f"{PAGE.name}: no lines {BEGIN} and {END}")
-    said = f"{len(outcomes)} of {len(wanted)} runs; revision {_revisions(outcomes)}"
+    summary = f"{len(outcomes)} of {len(requested)} runs; revision {_revisions(outcomes)}"
     if outcomes:
         work = statistics.median(outcome.work for outcome in outcomes.values())
-        said += f"; the fixed piece of work took {1e3 * work:.0f} ms (median)"
-    return f"{before}{begin}\n\n{table(wanted, outcomes)}\n\n{said}.\n\n{end}{after}"
+        summary += f"; the fixed work took {1e3 * work:.0f} ms (median)"
+    return f"{before}{begin}\n\n{table(requested, outcomes)}\n\n{summary}.\n\n{end}{after}"
 
 
 def _revisions(outcomes: Mapping[Case, Outcome]) -> str:
@@ -271,13 +271,15 @@ def _revisions(outcomes: Mapping[Case, Outcome]) -> str:
 
 
 def main() -> None:
-    """Run what is asked for, and write the page."""
+    """Run the requested scenarios and write the page."""
     parser = ArgumentParser(prog="python -m docs.results")
     parser.add_argument("scenarios", nargs="*", help="shipped ones; all by default")
-    parser.add_argument("--duration", type=float, help="simulated time [s]; nothing is kept then")
-    given = parser.parse_args()
+    parser.add_argument(
+        "--duration", type=float, help="simulated time [s]; outcomes are not stored"
+    )
+    arguments = parser.parse_args()
     console = Console(highlight=False)
-    outcomes = run_all(cases(given.scenarios), given.duration, console)
+    outcomes = run_all(cases(arguments.scenarios), arguments.duration, console)
     text = PAGE.read_text(encoding="utf-8")
     PAGE.write_text(page(text, cases(), outcomes), encoding="utf-8")
     console.print(f"{PAGE}: {len(outcomes)} runs")

@@ -1,1 +1,1 @@
-"""Pages of the site that are made of the code: keys, commands, the library's door, the gallery."""
+"""Generated pages of the site: scenario keys, commands, the public interface, the gallery."""

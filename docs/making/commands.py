@@ -1,4 +1,4 @@
-"""The command line, from what it tells of itself."""
+"""Page of the command line, generated from its help."""
 
 import inspect
 import typing
@@ -25,7 +25,7 @@ def command_line() -> str:
     page = []
     for program, (label, module, app) in _PROGRAMS.items():
         group: Any = typer.main.get_command(app)
-        page += [f"## `{program}`", _said(group.help)]
+        page += [f"## `{program}`", _text(group.help)]
         page.append(as_markdown(_status(inspect.getdoc(module) or "")))
         rows = [_row(parameter) for parameter in group.params if parameter.name == "version"]
         page += [table(_HEAD, rows, "options")] if rows else []
@@ -36,16 +36,16 @@ def command_line() -> str:
 
 
 def _status(text: str) -> str:
-    """Return the paragraph of a module's docstring that tells the exit status."""
+    """Return the paragraph of a module's docstring on the exit status."""
     return next((part for part in text.split("\n\n") if part.startswith("Exit status")), "")
 
 
 def _section(program: str, label: str, name: str, command: Any) -> list[str]:
     shown = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
     needed = [p.name.upper() for p in shown if p.param_type_name == "argument" and p.required]
-    words = " ".join([program, name, *needed])
-    parts = [f"({label})=", f"### `{name}`", _said(command.help), f"`{words}`"]
-    parts += [_said(command.epilog)] if command.epilog else []
+    synopsis = " ".join([program, name, *needed])
+    parts = [f"({label})=", f"### `{name}`", _text(command.help), f"`{synopsis}`"]
+    parts += [_text(command.epilog)] if command.epilog else []
     rows = [_row(parameter) for parameter in shown]
     return [*parts, table(_HEAD, rows, "options")] if rows else parts
 
@@ -57,11 +57,11 @@ def _row(parameter: Any) -> list[str]:
         names = [*parameter.opts, *parameter.secondary_opts]
         value = "" if parameter.is_flag else f" {_value(parameter)}"
         name = ", ".join(f"`{option}{value}`" for option in names)
-    return [name, _default(parameter), " ".join(_said(parameter.help).split()).replace("|", r"\|")]
+    return [name, _default(parameter), " ".join(_text(parameter.help).split()).replace("|", r"\|")]
 
 
 def _value(parameter: Any) -> str:
-    """Return what stands for an option's value: what the option says, or its type."""
+    """Return the placeholder of an option's value: its metavar, or its type."""
     if parameter.metavar:
         return str(parameter.metavar)
     kind = parameter.type_descriptor.annotation
@@ -71,7 +71,7 @@ def _value(parameter: Any) -> str:
 
 def _default(parameter: Any) -> str:
     if parameter.required:
-        return "*must be given*"
+        return "*required*"
     value = parameter.default
     if value is None or value in ((), "", []) or callable(value):
         return ""
@@ -81,5 +81,5 @@ def _default(parameter: Any) -> str:
     return f"`{value}`"
 
 
-def _said(text: str | None) -> str:
+def _text(text: str | None) -> str:
     return as_markdown(inspect.cleandoc(text or ""))

@@ -1,4 +1,4 @@
-"""The gallery: every shipped scenario with a picture, a sentence and its command."""
+"""Gallery: every shipped scenario with a picture, a sentence and its command."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ _KINDS = {
     "sfc": "Surfaces",
     "vf": "Fixtures and forbidden regions",
     "plate": "Mounting a plate",
-    "": "Hands, friction, comparison",
+    "": "Operators, friction, comparison",
 }
 _SENTENCE = re.compile(r"^.*?[.](?=\s|$)", re.DOTALL)
 
@@ -35,10 +35,10 @@ def gallery() -> str:
 
 
 def first_sentence(text: str) -> str:
-    """Return the first sentence of a description; all of it if it ends nowhere."""
-    said = " ".join(text.split())
-    found = _SENTENCE.match(said)
-    return found[0] if found else said
+    """Return the first sentence of a description; the whole text if it has no full stop."""
+    line = " ".join(text.split())
+    found = _SENTENCE.match(line)
+    return found[0] if found else line
 
 
 def _card(file: Path) -> str:
@@ -48,10 +48,10 @@ def _card(file: Path) -> str:
     pictures = [_FOLDERS["pictures"] / f"{file.stem}{suffix}" for suffix in (".webp", ".png")]
     for picture in [picture for picture in pictures if picture.exists()][:1]:
         lines.append(f":img-bottom: ../images/gallery/{picture.name}")
-        lines.append(f":img-alt: What {file.stem} shows")
-    said = as_markdown(first_sentence(data.get("description", "")))
-    command = f"```sh\npython -m experiments run {file.stem}\n```"
-    return "\n".join([*lines, "", f"{said}{section}", "", command, ":::", ""])
+        lines.append(f":img-alt: Scene of {file.stem}")
+    sentence = as_markdown(first_sentence(data.get("description", "")))
+    command = f"```sh\npfsc run {file.stem}\n```"
+    return "\n".join([*lines, "", f"{sentence}{section}", "", command, ":::", ""])
 
 
 def _untagged(text: str) -> str:

@@ -1,10 +1,10 @@
-"""The library's door and that of the experiments, as directives that read their docstrings."""
+"""Public interface of the packages, as directives that read the docstrings."""
 
 import importlib
 import inspect
 from types import ModuleType
 
-_DOORS = {
+_MODULES = {
     "pfsc_drake": "The library",
     "experiments": "Runs, exports, robots",
     "identification": "Models from measurements",
@@ -12,24 +12,24 @@ _DOORS = {
 
 
 def interface() -> str:
-    """Return a section for each module that has a door: its functions, then its classes."""
+    """Return a section for each module with public names: its functions, then its classes."""
     page = []
-    for name, title in _DOORS.items():
+    for name, title in _MODULES.items():
         module = importlib.import_module(name)
-        offered = [entry for entry in getattr(module, "__all__", []) if entry[0] != "_"]
-        if offered:
-            page += [f"## {title}: `{name}`", _section(module, offered)]
+        public = [entry for entry in getattr(module, "__all__", []) if entry[0] != "_"]
+        if public:
+            page += [f"## {title}: `{name}`", _section(module, public)]
     return "\n\n".join(page)
 
 
-def _section(module: ModuleType, offered: list[str]) -> str:
+def _section(module: ModuleType, public: list[str]) -> str:
     lines = ["```{eval-rst}"]
-    for kind, wanted in (("function", False), ("class", True)):
-        for name in offered:
+    for kind, is_class in (("function", False), ("class", True)):
+        for name in public:
             value = getattr(module, name)
-            if not callable(value) or inspect.isclass(value) != wanted:
+            if not callable(value) or inspect.isclass(value) != is_class:
                 continue
             lines += ["", f".. auto{kind}:: {module.__name__}.{name}"]
-            if wanted:
+            if is_class:
                 lines.append("   :members:")
     return "\n".join([*lines, "```"])

@@ -1,4 +1,4 @@
-"""Recordings that tutorials have made, beside the pages that show them in frames."""
+"""Recordings of the tutorials, copied beside the pages that show them in frames."""
 
 import shutil
 from pathlib import Path
@@ -8,11 +8,11 @@ _FOLDER = Path("tutorials") / "out"  # where the notebooks write
 
 
 def copy_recordings(app: Any, exception: Exception | None) -> None:
-    """Copy the recordings into the site when it has been built.
+    """Copy the recordings into the built site.
 
     Args:
         app: The application of Sphinx.
-        exception: Why it was not built, or None.
+        exception: Error of the build, or None.
     """
     if exception is not None or app.builder.format != "html":
         return

@@ -1,4 +1,4 @@
-"""The keys of a scenario file, from the dataclasses that read them."""
+"""Page of the keys of a scenario, generated from its dataclasses."""
 
 import dataclasses as dc
 import math
@@ -23,51 +23,51 @@ _SEVERAL = {
     "text": "texts",
     "true or false": "true or false",
 }
-# in brackets stand units, and examples of lists
+# brackets contain units or examples of lists
 _BRACKETS = re.compile(r" ?\[([^\[\]]*)\]")
 _WORD = re.compile(r"[A-Za-z%]+")
-_WORDS_OF_UNITS = "m mm s ms kg N Nm J W V A rad deg Hz Pa K or and"
-_UNITS = set(_WORDS_OF_UNITS.split())
+_UNIT_WORDS = "m mm s ms kg N Nm J W V A rad deg Hz Pa K or and"
+_UNITS = set(_UNIT_WORDS.split())
 _HEAD = ["Key", "Type", "Unit", "Default", "Meaning"]
 
 
 @dc.dataclass
 class _Block:
-    """A dataclass, and the places of a scenario where it stands."""
+    """Dataclass and its key paths in a scenario."""
 
     owner: type
-    places: list[str]
+    key_paths: list[str]
 
 
 def scenario_keys() -> str:
-    """Return all keys of a scenario as Markdown: blocks in the order of a file."""
+    """Return all keys of a scenario as Markdown, blocks in the order of a file."""
     found = blocks()
-    several = [block for block in found.values() if len(block.places) > 1]
+    several = [block for block in found.values() if len(block.key_paths) > 1]
     page = [_own_table(Scenario)]
     for field in dc.fields(Scenario):
         inside = [
             block
             for block in found.values()
-            if len(block.places) == 1 and _top(block.places[0]) == field.name
+            if len(block.key_paths) == 1 and _top(block.key_paths[0]) == field.name
         ]
         if inside and not _is_whole(inside[0], field.name):
             page += [f"## `{field.name}`", cell(attribute(Scenario, field.name))]
         for block in inside:
             page += _section(block, "##" if _is_whole(block, field.name) else "###")
-    page.append("## Blocks that stand in several places")
+    page.append("## Blocks with several key paths")
     for block in several:
         page += _section(block, "###")
     return "\n\n".join(page)
 
 
 def unit_and_meaning(text: str, name: str) -> tuple[str, str]:
-    """Return the unit in brackets of a docstring, and the rest of it.
+    """Return the unit in brackets of a docstring, and the rest of the docstring.
 
     Args:
-        text: What the docstring says of an attribute.
-        name: Its name; ``_deg`` at the end is a unit, too.
+        text: Docstring of an attribute.
+        name: Name of the attribute; ``_deg`` at the end is a unit, too.
     """
-    if text.startswith("["):  # the unit stands for all that is to be said
+    if text.startswith("["):  # the docstring has only a unit
         text = f"{name.replace('_', ' ').capitalize()} {text}"
     units = [unit for unit in _BRACKETS.findall(text) if set(_WORD.findall(unit)) <= _UNITS]
     units = [unit for unit in units if _WORD.search(unit)]
@@ -76,33 +76,33 @@ def unit_and_meaning(text: str, name: str) -> tuple[str, str]:
     return (" or ".join(units) or ("deg" if name.endswith("_deg") else "")), text
 
 
-def _top(place: str) -> str:
-    return re.split(r"[.\[ ]", place)[0]
+def _top(key_path: str) -> str:
+    return re.split(r"[.\[ ]", key_path)[0]
 
 
 def blocks() -> dict[type, _Block]:
-    """Return all blocks by their classes, in the order in which a file may have them."""
+    """Return all blocks by class, in the order of a file."""
     found: dict[type, _Block] = {}
 
-    def walk(owner: type, place: str) -> None:
+    def walk(owner: type, prefix: str) -> None:
         hints = typing.get_type_hints(owner)
         for field in dc.fields(owner):
-            here = f"{place}.{field.name}" if place else field.name
+            here = f"{prefix}.{field.name}" if prefix else field.name
             choices = list(_members(hints[field.name]))
             for kind, suffix in choices:
-                where = f"{here}{suffix}"
+                path = f"{here}{suffix}"
                 if len([c for c in choices if dc.is_dataclass(c[0])]) > 1:
-                    where += f" !{kind.__name__}"
+                    path += f" !{kind.__name__}"
                 if dc.is_dataclass(kind):
-                    found.setdefault(kind, _Block(kind, [])).places.append(where)
-                    walk(kind, where)
+                    found.setdefault(kind, _Block(kind, [])).key_paths.append(path)
+                    walk(kind, path)
 
     walk(Scenario, "")
     return found
 
 
 def _members(kind: Any, suffix: str = "") -> Iterator[tuple[Any, str]]:
-    """Yield the types that a value may have, and what stands between its key and theirs."""
+    """Yield the possible types of a value, and the suffix of the key path for each."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if origin in (typing.Union, types.UnionType):
         for argument in arguments:
@@ -116,21 +116,21 @@ def _members(kind: Any, suffix: str = "") -> Iterator[tuple[Any, str]]:
 
 
 def _is_whole(block: _Block, key: str) -> bool:
-    """Return whether a block is all that a key of the scenario has."""
-    return block.places[0] in (key, f"{key}[]")
+    """Return whether a block is the only content of a key of the scenario."""
+    return block.key_paths[0] in (key, f"{key}[]")
 
 
 def _section(block: _Block, level: str) -> list[str]:
-    alone = len(block.places) == 1
-    tagged = " !" in block.places[0]
+    alone = len(block.key_paths) == 1
+    tagged = " !" in block.key_paths[0]
     name = f"!{block.owner.__name__}" if tagged else block.owner.__name__
     parts = [
         f"({_anchor(block.owner)})=",
-        f"{level} `{block.places[0] if alone else name}`",
+        f"{level} `{block.key_paths[0] if alone else name}`",
         description(block.owner),
     ]
     if not alone:
-        parts.append("Stands at " + ", ".join(f"`{place}`" for place in block.places) + ".")
+        parts.append("At " + ", ".join(f"`{path}`" for path in block.key_paths) + ".")
     if dc.fields(block.owner):
         parts.append(_own_table(block.owner))
     return parts
@@ -151,17 +151,17 @@ def _anchor(owner: type) -> str:
 
 def _kind(field: Field) -> str:
     """Return a field's type in words, blocks as links."""
-    said = _words(field.kind)
+    text = _words(field.kind)
     choices = [rule.allowed for rule in rules_of(field.hint) if isinstance(rule, OneOf)]
     for words in choices:
-        said = said.replace("text", " or ".join(f"`{word}`" for word in words), 1)
+        text = text.replace("text", " or ".join(f"`{word}`" for word in words), 1)
     if field.form == FILE:
-        return said.replace("text", "file", 1)
+        return text.replace("text", "file", 1)
     if field.form == NAME_OR_FILE:
-        return said.replace("text", "name or file", 1)
+        return text.replace("text", "name or file", 1)
     if field.form == ONE_OR_MANY:
-        return f"number, or {said}"
-    return f"`auto`, or {said}" if field.form == AUTO_OR_MANY else said
+        return f"number, or {text}"
+    return f"`auto`, or {text}" if field.form == AUTO_OR_MANY else text
 
 
 def _words(hint: Any) -> str:
@@ -193,14 +193,14 @@ def _tag(owner: type) -> str:
 
 def _default(value: Any, field: Field) -> str:
     if field.required:
-        return "*must be given*"
+        return "*required*"
     if field.form == AUTO_OR_MANY and not value:
         return "`auto`"
     if dc.is_dataclass(value):
         owner = type(value)
         tag = f"`!{owner.__name__}`" if len(list(_members(field.kind))) > 1 else ""
-        given, plain = typed_data(value), typed_data(owner())
-        changed = {key: item for key, item in given.items() if item != plain[key]}
+        data, plain = typed_data(value), typed_data(owner())
+        changed = {key: item for key, item in data.items() if item != plain[key]}
         return " ".join(part for part in (tag, f"`{_yaml(changed)}`" if changed else "") if part)
     if isinstance(value, str):
         return f"`{value}`" if value else "empty"

@@ -1,4 +1,4 @@
-"""Links of a built site: each leads to a page, a place on it, or a file that is there.
+"""Checks of the links of a built site: each target is a page, an anchor or a file that exists.
 
 python -m docs.making.site_links out/site
 """
@@ -9,30 +9,30 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-# what a page loads by itself, unlike what a reader may follow
+# attributes that a page loads by itself, unlike links that a reader follows
 _LOADED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "link": "href"}
 
 
 class _Page(HTMLParser):
-    """Places of a page that can be linked to, and where its links lead.
+    """Anchors and links of a page.
 
     Attributes:
-        places: Names of the places.
+        anchors: Names of the anchors.
         links: Tag and address of every link.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.places: set[str] = set()
+        self.anchors: set[str] = set()
         self.links: list[tuple[str, str]] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Keep what a tag defines and refers to."""
-        given = dict(attrs)
-        self.places |= {value for key in ("id", "name") if (value := given.get(key))}
+        """Store the anchors and links of a tag."""
+        values = dict(attrs)
+        self.anchors |= {value for key in ("id", "name") if (value := values.get(key))}
         for key in ("href", "src"):
-            if given.get(key):
-                self.links.append((tag, given[key] or ""))
+            if values.get(key):
+                self.links.append((tag, values[key] or ""))
 
 
 @cache
@@ -43,7 +43,7 @@ def _page(file: Path) -> _Page:
 
 
 def broken_links(site: Path) -> list[str]:
-    """Return what is wrong with the links of a site, one line each.
+    """Return the broken links of a site, one line each.
 
     Args:
         site: Folder with the built pages.
@@ -67,9 +67,9 @@ def _fault(file: Path, tag: str, link: str) -> str | None:
     target = file if not parts.path else (file.parent / unquote(parts.path)).resolve()
     if not target.is_file():
         return "no such file"
-    place = unquote(parts.fragment)
-    if place and target.suffix == ".html" and place not in _page(target).places:
-        return "no such place on the page"
+    anchor = unquote(parts.fragment)
+    if anchor and target.suffix == ".html" and anchor not in _page(target).anchors:
+        return "no such anchor on the page"
     return None
 
 

@@ -1,4 +1,4 @@
-"""Text of docstrings as MyST Markdown: what stands in a cell, what stands under a heading."""
+"""Text of docstrings as MyST Markdown, for cells of tables and for paragraphs."""
 
 import inspect
 import re
@@ -7,7 +7,7 @@ from pfsc_drake.yaml.fields import attribute_text
 
 _ROLE = re.compile(r":\w+(?::\w+)*:`~?([^`]+)`")
 _LITERAL = re.compile(r"``([^`]+)``")
-# of the sections of a docstring, which begin what is no description
+# sections of a docstring after its description
 _SECTION = re.compile(r"^(Attributes|Args|Returns|Raises|Yields|Note|Examples?):\n", re.MULTILINE)
 
 
@@ -19,7 +19,7 @@ def as_markdown(text: str) -> str:
     """
     text = _ROLE.sub(lambda match: f"`{match[1].rsplit('.', 1)[-1]}`", text)
     text = _LITERAL.sub(r"`\1`", text)
-    # what Markdown would take for mathematics or a tag; in code it is left alone
+    # escape the characters of mathematics and tags, except in code
     parts = re.split(r"(`[^`]*`)", text)
     for k in range(0, len(parts), 2):
         parts[k] = re.sub(r"([$<>*])", r"\\\1", parts[k])
@@ -32,7 +32,7 @@ def cell(text: str) -> str:
 
 
 def description(owner: type) -> str:
-    """Return what a class says of itself before its attributes, as Markdown."""
+    """Return the description of a class before its attributes, as Markdown."""
     text = _SECTION.split(inspect.cleandoc(owner.__dict__.get("__doc__") or ""))[0].strip()
     pieces = []
     for part in re.split(r"\n\n+", text):
@@ -44,18 +44,18 @@ def description(owner: type) -> str:
 
 
 def attribute(owner: type, name: str) -> str:
-    """Return what a class, or one that it inherits from, says of an attribute.
+    """Return the docstring of an attribute, also of an inherited one.
 
     Args:
         owner: The class.
         name: Name of the attribute.
 
     Raises:
-        ValueError: If nobody says anything.
+        ValueError: The attribute has no docstring.
     """
     text = attribute_text(owner, name)
     if text is None:
-        raise ValueError(f"{owner.__name__}.{name}: no docstring says what it is")
+        raise ValueError(f"{owner.__name__}.{name}: has no docstring")
     return text
 
 
@@ -65,7 +65,7 @@ def table(head: list[str], rows: list[list[str]], kind: str = "") -> str:
     Args:
         head: Names of its columns.
         rows: Cells of its rows, as Markdown.
-        kind: Class of the table, for its style.
+        kind: CSS class of the table.
     """
     lines = [f"{{.{kind}}}"] if kind else []
     lines += [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
