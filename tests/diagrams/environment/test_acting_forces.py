@@ -104,6 +104,7 @@ def test_a_law_that_knows_of_a_push_stays_on_the_path(six_axes, source):
     assert has_input == (source == "known")
 
 
+@pytest.mark.slow
 def test_pushes_reach_a_plant_with_coupled_rotors(six_axes):
     """As torques on the link side; with a force on the tool they add up."""
     six_axes.robot.rotor_coupling = "comau_racer_1_4"

@@ -96,6 +96,7 @@ def test_springs_of_hand_and_tool_share_the_displacement(settings):
     np.testing.assert_allclose(log["manifold_force"].values[late, 2], k * share, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_the_hand_sees_the_links_and_the_truth(settings, load_scenario):
     """Not the encoders, and not the motors, which are where the rigid law looks."""
     settings.robot.model = "comau_racer_1_4_elastic_3r"

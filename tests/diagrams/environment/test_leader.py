@@ -148,7 +148,7 @@ def test_turns_need_a_tool_that_yields_and_a_hand_that_turns_a_wrist():
         build_station(settings, SCENARIOS)
 
 
-@pytest.mark.slow(but="position_force")
+@pytest.mark.slow
 @pytest.mark.parametrize("coupling", ["position_force", "four_channel"])
 def test_other_couplings_lead_the_tool_too(coupling):
     settings = region(coupling=coupling)

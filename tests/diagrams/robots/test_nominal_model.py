@@ -208,6 +208,7 @@ def test_the_safe_state_holds_the_nominal_weight(load_scenario):
     assert light.robot.links[0].mass == true.robot.links[0].mass
 
 
+@pytest.mark.slow
 def test_parameters_of_another_robot_as_nominal_model(load_scenario):
     settings = load_scenario("pfc_elastic_6r")
     plain = _build(settings)

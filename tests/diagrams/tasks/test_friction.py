@@ -123,6 +123,7 @@ def test_the_belief_is_the_plants_with_its_error_or_what_is_written(arm):
     np.testing.assert_allclose(torque(-1.0), [-5.0, -7.0, -9.0], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_friction_that_drifts(arm):
     """Nothing else changes: the plant's friction is that of the start times the drift."""
     arm.friction.drift = FrictionDrift(1.5, 0.2, 0.4)

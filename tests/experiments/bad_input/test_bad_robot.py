@@ -125,6 +125,7 @@ def test_what_holds_back_needs_all_of_the_orientation(refused, mine):
     refused(mine(SIX), "hold_back.force = -10", "all of its orientation", changes=changes)
 
 
+@pytest.mark.slow
 def test_a_servo_that_does_not_fit_the_controller(refused, mine):
     gains = "{eta: {poles: [-10]}, xi: {poles: [-10]}}"
     changes = ["controller.law=velocity_servo", f"controller.gains.velocity_servo={gains}"]

@@ -71,7 +71,6 @@ def test_lost_packets_and_what_comes_twice(panda, told):
 
 @pytest.mark.slow(
     but=[
-        "<lambda>-joint 4 jumped by 2.8-faster",
         "<lambda>-not a finite numb-record",
         "<lambda>-the robot went into mode REFLEX-mode",
         "<lambda>-no status of the robot for 30 ms-faster",

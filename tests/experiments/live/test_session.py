@@ -243,6 +243,7 @@ def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
     assert np.isfinite(log["q_J"]).all()
 
 
+@pytest.mark.slow
 def test_who_does_nothing_leaves_nothing(tmp_path):
     rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle")
     rehearsal.play(((lambda _: True), [(END, 1.0)]))

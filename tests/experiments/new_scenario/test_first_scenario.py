@@ -76,6 +76,7 @@ def test_what_is_written_runs(init, run_scenario, tmp_path):
     assert run.stdout.count("warning") == 0
 
 
+@pytest.mark.slow
 def test_kinematics_alone(init):
     """A model without masses: its joints follow velocity servos."""
     status, file, out, err = init(arm(inertial="", more=TOOL), arc(), "--orientation", "free")
@@ -100,6 +101,7 @@ def test_three_joints_and_few_points_of_a_closed_path(init):
     assert content(file)["path"]["orientation"] == {"task": "none"}
 
 
+@pytest.mark.slow
 def test_orientation_of_the_file(init):
     rows = np.column_stack([arc(), np.tile([0.1, 1.4, 0.0], (9, 1))])
     columns = "x,y,z,roll,pitch,yaw"
@@ -117,7 +119,7 @@ def test_orientation_of_the_file(init):
         (arc(), ("--tool-frame", "tool"), "did you mean 'tool0'"),
         (arc(), ("--orientation", "sideways"), "allowed: down, forward, up, free"),
         (arc(), ("--base-position", "1,2"), "--base-position 1,2: allowed: X,Y,Z in m"),
-        (arc(), ("--law", "elastic"), "elastic"),
+        pytest.param(arc(), ("--law", "elastic"), "elastic", marks=pytest.mark.slow),
         (arc(), ("--law", "rigit"), "--law rigit: allowed: velocity_servo, rigid,"),
         (arc()[:1], (), "points.csv: 1 point; allowed: 2 different points or more"),
         (arc()[[1, 1, 1]], (), "points.csv: 1 point; allowed: 2 different points or more"),
@@ -145,6 +147,7 @@ def test_nothing_is_overwritten(init, tmp_path):
     assert file.read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.slow
 def test_a_noisy_recording_is_smoothed(init):
     points = arc(count=200) + np.random.default_rng(0).normal(scale=2e-4, size=(200, 3))
     status, file, out, err = init(arm(inertial="", more=TOOL), points, "--orientation", "free")

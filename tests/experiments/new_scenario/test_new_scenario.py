@@ -21,6 +21,7 @@ def files(tmp_path):
     return folder / "my arm.urdf", folder / "points.csv"
 
 
+@pytest.mark.slow
 def test_the_same_as_of_the_command_line(files, tmp_path, capfd):
     out = tmp_path / "mine.yaml"
     made = init(*files, out, orientation="free", quiet=True)

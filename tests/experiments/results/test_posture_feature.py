@@ -105,6 +105,7 @@ def test_posture_error_and_swivel_angle(pushed_log):
     assert labels == ["tool pushed", "link pushed"]
 
 
+@pytest.mark.slow
 def test_conditioning_over_time_and_path(drawn_log):
     drawn_log.add("rcond", np.full(201, 0.05), "1", limits=[[1e-3, np.inf]])
     assert draw_conditioning(drawn_log) is None  # as many joints as coordinates, far from singular

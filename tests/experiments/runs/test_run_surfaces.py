@@ -81,7 +81,7 @@ def test_exact_laws_follow_to_micrometres(surface_run, name, bound):
     assert np.abs(run["eta"] - run["eta_p"])[late].max() < 20.0 * bound
 
 
-@pytest.mark.slow(but="sfc_viscoelastic_3r")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sfc_viscoelastic_3r", "sfc_elastic_6r", "sfc_delta_cylinder"])
 def test_the_coordinates_are_those_of_the_tool(surface_run, name):
     """The distance of y_t from the closed form of the surface is |xi|."""
