@@ -194,7 +194,7 @@ def add_controlled_robot(
     """
     nominal, scenario, period = part.nominal_model.robot, chosen.scenario, chosen.period
     remote, parameters = isinstance(part, RemoteArm), scenario.controller
-    friction = nominal_friction(part, parameters.friction.believed, chosen.friction)
+    friction = nominal_friction(part, parameters.friction.nominal, chosen.friction)
     if not remote:
         check_sides(nominal, parameters, scenario.encoders)
     with naming_reference():

@@ -276,7 +276,7 @@ def inverted_start(task: Task, start: StartPoint) -> tuple[ToolTarget, str] | No
     turned = axes @ np.diag([1.0, -1.0, -1.0]) @ axes.T @ R_e
     advice = (
         f"with the normal {np.round(axes[:, 2], 3).tolist()} inverted it is within reach: let "
-        "the shape's axis, inward or seen_from turn the normal over, or "
+        "the shape's axis, inward or visible_from turn the normal over, or "
         "surface.orientation.angles_deg the tool"
     )
     return replace(start.target, R_e=turned), advice

@@ -59,7 +59,7 @@ class Turntable:
     def known_motion(self) -> TurntableMotion:
         """Motion of the workpiece in the model of the robot's controller."""
         table = self.parameters
-        delay = table.delay if table.believed_delay is None else table.believed_delay
+        delay = table.delay if table.nominal_delay is None else table.nominal_delay
         derivatives = cast(Derivatives, table.derivatives)
         return TurntableMotion(self._nominal, self.command, delay, derivatives, table.highest)
 

@@ -19,7 +19,7 @@ from pfsc_drake.errors import InputError, nearest_file, shorten
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.reading import resolve_files
 from pfsc_drake.yaml.source import Source
-from pfsc_drake.yaml.typed import load_typed
+from pfsc_drake.yaml.typed import collected_renames, load_typed
 from reporting.progress import ProgressListener
 
 MAX_TICKS = 1_000_000  # of the controller; 1000 s at 1 kHz
@@ -75,7 +75,8 @@ def prepare(
     Raises:
         InputError: If the scenario is wrong.
     """
-    settings = load_typed(Scenario, scenario.data, scenario.source)
+    with collected_renames() as renames:
+        settings = load_typed(Scenario, scenario.data, scenario.source)
     folder = scenario.path.parent
     with naming(scenario.source):
         unattended = settings.operator is not None and not settings.operator.inputs and not live
@@ -89,7 +90,7 @@ def prepare(
         drawing, warnings = look_at(settings, folder, station, recording=recording)
     resolve_files(settings, folder)
     text = dump_typed(settings)
-    return PreparedRun(settings, text, station, integration, drawing, warnings)
+    return PreparedRun(settings, text, station, integration, drawing, renames + warnings)
 
 
 def look_at(

@@ -204,4 +204,4 @@ def payload_of(mounting: Mounting, gravity: np.ndarray) -> Payload:
         gravity: Gravitational acceleration, world axes [m/s^2], shape (3,).
     """
     plate = mounting.parameters
-    return Payload(plate.believed_mass, np.array([0.0, 0.0, plate.size[2] / 2.0]), gravity)
+    return Payload(plate.nominal_mass, np.array([0.0, 0.0, plate.size[2] / 2.0]), gravity)

@@ -180,7 +180,7 @@ def nominal_friction(
 
     Args:
         part: The robot.
-        nominal: ``controller.friction.believed``; if it is empty, the plant's coefficients with the
+        nominal: ``controller.friction.nominal``; if it is empty, the plant's coefficients with the
             error of the nominal model.
         options: Friction of the plant.
 
@@ -188,7 +188,7 @@ def nominal_friction(
         InputError: If they do not suit the robot.
     """
     if nominal.is_given:
-        key = "controller.friction.believed"
+        key = "controller.friction.nominal"
         return _read_coefficients(nominal, part.robot, options.folder, key)
     actual = _coefficients(options, part)
     if actual is None:

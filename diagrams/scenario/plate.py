@@ -10,7 +10,7 @@ from pfsc_drake.checks import require
 from pfsc_drake.geometry.workpiece_bodies import FEWEST_WEDGES
 from pfsc_drake.physics.mounting_hand import MountingHandParameters
 from pfsc_drake.physics.suction import SuctionParameters
-from pfsc_drake.yaml.fields import equal
+from pfsc_drake.yaml.fields import equal, former
 from pfsc_drake.yaml.rules import (
     Count,
     NotNegative,
@@ -161,7 +161,7 @@ class PlateParameters(Parameters):
     Attributes:
         size: Length, width and thickness [m].
         mass: Mass [kg].
-        believed_mass: Mass whose weight is removed from the measured force while it is gripped
+        nominal_mass: Mass whose weight is removed from the measured force while it is gripped
             [kg].
         pins: Its pins.
         rests: Points of its underside that lie on magazine and frame, ``[x, y]`` each [m].
@@ -181,7 +181,9 @@ class PlateParameters(Parameters):
         default_factory=lambda: [0.24, 0.16, 0.008]
     )
     mass: Annotated[float, Range(_LIGHTEST, _HEAVIEST, "kg")] = 0.83
-    believed_mass: Annotated[float, Range(0.0, _HEAVIEST, "kg")] = 0.8
+    nominal_mass: Annotated[float, Range(0.0, _HEAVIEST, "kg")] = dc.field(
+        default=0.8, metadata=former("believed_mass")
+    )
     pins: PinParameters = dc.field(default_factory=PinParameters)
     rests: Annotated[list[Pair], Count(3, words="three [x, y] or more")] = dc.field(
         default_factory=lambda: _corners(0.06, 0.065)

@@ -8,6 +8,7 @@ import numpy as np
 from diagrams.scenario.holder import HolderWorkpiece
 from diagrams.scenario.robot import PoseParameters
 from pfsc_drake.checks import require, require_between, require_numbers
+from pfsc_drake.yaml.fields import former
 from pfsc_drake.yaml.rules import (
     Direction,
     NotNegative,
@@ -60,7 +61,7 @@ class TurntableParameters(Parameters):
         increments: Increments of each encoder per turn; 0 for exact ones.
         lag: Lag of the axes behind their command, which the controllers do not model [s].
         delay: Delay of the reported angles, a whole number of sampling times [s].
-        believed_delay: Delay that the robot's controller compensates; ``delay`` if null [s].
+        nominal_delay: Delay that the robot's controller compensates; ``delay`` if null [s].
         placement_error: Pose of its base in the controller's model relative to the actual one, axes
             of the base.
         derivatives: Derivatives of the motion in the robot's controller: ``known``: those of the
@@ -78,7 +79,7 @@ class TurntableParameters(Parameters):
     increments: NotNegative = 0.0
     lag: Annotated[float, Range(0.0, _LATEST, "s")] = 0.0
     delay: Annotated[float, Range(0.0, _LATEST, "s")] = 0.0
-    believed_delay: float | None = None
+    nominal_delay: float | None = dc.field(default=None, metadata=former("believed_delay"))
     placement_error: PoseParameters = dc.field(default_factory=PoseParameters)
     derivatives: Annotated[str, OneOf(DERIVATIVES)] = "known"
     highest: Annotated[int, Range(0, 4)] = 4
@@ -89,8 +90,8 @@ class TurntableParameters(Parameters):
         Raises:
             InputError: If a parameter is invalid.
         """
-        if self.believed_delay is not None:
-            require_between("turntable.believed_delay", self.believed_delay, 0.0, _LATEST, "s")
+        if self.nominal_delay is not None:
+            require_between("turntable.nominal_delay", self.nominal_delay, 0.0, _LATEST, "s")
         key, count = "turntable.stops_deg", len(self.axes)
         require(1 <= count <= 6, "turntable.axes", f"{count} given", "1 to 6")
         require(len(self.stops_deg) > 1, key, self.stops_deg, "two stops or more")

@@ -223,7 +223,7 @@ def _scenarios(circle: CircularRun, model: Path) -> dict[tuple[str, str], Scenar
     for name, drive in circle.drives.items():
         identified = [f"controller.model={folder / drive.model}", "model_error={}"]
         if drive.friction:
-            identified.append(f"controller.friction.believed.file={folder / 'parameters.yaml'}")
+            identified.append(f"controller.friction.nominal.file={folder / 'parameters.yaml'}")
         models = {TRUE: ["model_error={}"], WRONG: [_ERROR], IDENTIFIED: identified}
         for kind, changes in models.items():
             found[name, kind] = read_scenario(drive.scenario, [*drive.overrides, *changes])

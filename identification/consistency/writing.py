@@ -30,7 +30,7 @@ class WrittenModel:
 
     Attributes:
         parameters: The parameter file, for ``controller.model``, for
-            ``controller.friction.believed.file`` and, for a DELTA robot, for ``robot.model``; None
+            ``controller.friction.nominal.file`` and, for a DELTA robot, for ``robot.model``; None
             for robots from a bare model.
         models: SDF files, one for each variant of the parameter file; for another robot its own
             model file with identified inertias.

@@ -178,7 +178,7 @@ def near_expression(task: SpaceTask) -> ca.Function | None:
         task: Task of the tool.
     """
     options = task.options
-    if len(task.fixtures) > MOST_NEAR or options.looks:
+    if len(task.fixtures) > MOST_NEAR or options.distance_evaluations:
         return None
     within = reaches(options.guidance, task.admittance.period, task.speeds)
     try:
@@ -199,5 +199,5 @@ def scheduled_regions(task: SpaceTask) -> ScheduledRegions:
         options.guidance,
         task.admittance.period,
         speeds=task.speeds,
-        budget=options.looks or None,
+        budget=options.distance_evaluations or None,
     )

@@ -155,7 +155,7 @@ def _require_coefficients(coefficients: Coefficients | None, choice: str) -> Coe
     if coefficients is None:
         raise InputError(
             f"controller.friction.{choice}: no nominal friction; write "
-            "controller.friction.believed: {f_c: [..], f_v: [..]} or {file: ..}, in a diagram "
+            "controller.friction.nominal: {f_c: [..], f_v: [..]} or {file: ..}, in a diagram "
             "FollowerOptions(friction=(f_c, f_v))"
         )
     return coefficients

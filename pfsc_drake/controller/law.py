@@ -231,7 +231,7 @@ def choose_poles(
             sampled_robot(parameters, robot, linearization, rest(), posture),
             tried,
             [gains.bandwidth for gains in automatic.values()],
-            max(gains.bears for gains in automatic.values()),
+            max(gains.tolerated_error for gains in automatic.values()),
         )
     for gains in automatic.values():
         poles = rule_of_poles(gains.bandwidth, fast, r)

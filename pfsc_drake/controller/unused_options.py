@@ -190,7 +190,7 @@ def _friction_rules(options: FollowerOptions, law: str) -> list[Rule]:
             "needs kalman.intervals mean",
         ),
         Rule(f"{key}.watched", False, "nothing is logged; see source observer"),
-        Rule(f"{key}.believed", False, "coefficients are the option friction"),
+        Rule(f"{key}.nominal", False, "coefficients are the option friction"),
     ]
 
 
@@ -323,8 +323,8 @@ def _refuse_unused_gains(options: FollowerOptions, law: str, used: list[str]) ->
                 f"{key}.bandwidth = {own.bandwidth:g}: has no effect beside poles; allowed: 0"
             )
         chosen = own.bandwidth > 0.0 and degree > 2
-        if own.bears != GainParameters().bears and not chosen:
+        if own.tolerated_error != GainParameters().tolerated_error and not chosen:
             raise InputError(
-                f"{key}.bears = {own.bears:g}: has no effect; needs a bandwidth and a law of "
-                "elastic joints"
+                f"{key}.tolerated_error = {own.tolerated_error:g}: has no effect; needs a "
+                "bandwidth and a law of elastic joints"
             )

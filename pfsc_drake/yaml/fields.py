@@ -59,6 +59,15 @@ def equal(count: int, parts: int = 1) -> dict[str, Any]:
     return {"equal": count, "parts": parts}
 
 
+def former(name: str) -> dict[str, str]:
+    """Return metadata of a renamed key, whose former name is still read, with a warning.
+
+    Args:
+        name: Former name.
+    """
+    return {"former": name}
+
+
 class OneForAll(list[float]):
     """A list of one number that stands for as many equal ones as are needed."""
 
@@ -129,6 +138,13 @@ def fields_of(owner: type) -> dict[str, Field]:
         )
         for field in dataclasses.fields(owner)
     }
+
+
+@cache
+def former_names(owner: type) -> dict[str, str]:
+    """Return the present names of the renamed keys of a dataclass, by their former names."""
+    fields = fields_of(owner).values()
+    return {field.form["former"]: field.name for field in fields if "former" in field.form}
 
 
 def attribute_text(owner: type, name: str) -> str | None:

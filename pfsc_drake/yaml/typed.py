@@ -11,7 +11,9 @@ import dataclasses
 import re
 import types
 import typing
-from contextlib import suppress
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,7 +21,7 @@ import numpy as np
 
 from pfsc_drake.checks import is_number
 from pfsc_drake.errors import did_you_mean, gathered_refusals
-from pfsc_drake.yaml.fields import Field, OneForAll, fields_of
+from pfsc_drake.yaml.fields import Field, OneForAll, fields_of, former_names
 from pfsc_drake.yaml.misfits import (
     MAX_INTEGER,
     SCALARS,
@@ -81,7 +83,20 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str | S
     problems = reader.misfits + reader.refusals
     if problems:
         raise (Source(source) if isinstance(source, str) else source).refusal(problems)
+    for message in reader.renamed:
+        name = source if isinstance(source, str) else source.name
+        warnings.warn(f"{name}: {message}", FutureWarning, stacklevel=2)
     return result
+
+
+@contextmanager
+def collected_renames() -> Iterator[list[str]]:
+    """Collect the warnings about former names of keys, instead of showing them."""
+    messages: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FutureWarning)
+        yield messages
+    messages += [str(one.message) for one in caught if one.category is FutureWarning]
 
 
 class _Reader:
@@ -90,11 +105,13 @@ class _Reader:
     Attributes:
         misfits: Messages about values that do not fit the schema, in the order of the file.
         refusals: Messages about values that fit and are refused.
+        renamed: Messages about former names of keys.
     """
 
     def __init__(self) -> None:
         self.misfits: list[str] = []
         self.refusals: list[str] = []
+        self.renamed: list[str] = []
 
     def block(self, schema: Any, data: Any, key_path: KeyPath, base: Any) -> Any:
         """Return a dataclass.
@@ -110,15 +127,20 @@ class _Reader:
             return self._misfit(data, key_path, expectation(schema))
         if TAG_KEY in data:
             return self._misfit(data[TAG_KEY], key_path, "a mapping without a tag")
-        values = {}
+        values, former = {}, former_names(schema)
         for name, item in data.items():
-            here = (*key_path, name)
-            if name in fields:
-                values[name] = self._field(fields[name], item, here, base)
+            here, present = (*key_path, name), former.get(name, name)
+            if present in fields and (present == name or present not in data):
+                values[present] = self._field(fields[present], item, here, base)
             else:
                 values[name] = self._unknown(data, name, here, fields)
+            if present != name:
+                self.renamed.append(
+                    f"{join_keys(here)} is now called '{present}'; the former name is read in this "
+                    "version only"
+                )
         for name, field in fields.items():
-            if name not in data and field.required:
+            if name not in values and field.required:
                 here = (*key_path, name)
                 values[name] = self._note(
                     f"missing key '{join_keys(here)}': expected {expectation(field.kind)}"

@@ -19,8 +19,8 @@ PERIOD = 1e-3
 BALL = SphereRegion((0.0, 0.0, 0.0), 0.1, inside=False)
 
 
-def guided(regions, looks=0):
-    options = FixtureOptions(looks=looks)
+def guided(regions, distance_evaluations=0):
+    options = FixtureOptions(distance_evaluations=distance_evaluations)
     command_dynamics = make_command_dynamics(2, options, PERIOD, lag=0.0, delay=0.0)
     fixtures = [Fixture(region) for region in regions]
     motion = Admittance(3.0, 60.0, PERIOD)
@@ -36,7 +36,7 @@ def test_what_has_no_formula_is_left_to_a_schedule():
 def test_many_regions_and_those_on_a_budget_are_left_to_a_schedule():
     assert isinstance(near_expression(guided([BALL] * 8)), ca.Function)
     assert near_expression(guided([BALL] * 9)) is None
-    assert near_expression(guided([BALL], looks=2)) is None
+    assert near_expression(guided([BALL], distance_evaluations=2)) is None
 
 
 def test_before_servos_their_lag_counts_before_torques_a_filter():

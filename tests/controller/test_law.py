@@ -105,7 +105,10 @@ def test_poles_are_chosen_for_the_largest_error_and_the_delay(load_arm, monkeypa
     chain, asked = load_arm("comau_racer_1_4_elastic_3r").chain, []
     monkeypatch.setattr(law_module, "sampled_robot", lambda parameters, *_: parameters.delay)
     monkeypatch.setattr(law_module, "choose_fast_pole", lambda *given: asked.append(given) or 100.0)
-    eta, xi = GainParameters(bandwidth=20.0, bears=0.2), GainParameters(bandwidth=30.0, bears=0.1)
+    eta, xi = (
+        GainParameters(bandwidth=20.0, tolerated_error=0.2),
+        GainParameters(bandwidth=30.0, tolerated_error=0.1),
+    )
     parameters = controller("elastic", eta, xi, delay=2e-3)
     rest = RestPosture(np.array([0.3, 1.3, -0.5]), np.zeros(1))
     make_law(parameters, chain, PathManifold(4, oriented=False), lambda: rest)

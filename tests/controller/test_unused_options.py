@@ -75,10 +75,10 @@ OTHERS = {
     "controller.friction.observer": "kalman",
     "controller.friction.velocity": "reference",
     "controller.friction.kalman.intervals": "begin",
-    "controller.friction.believed.f_c": [3.0],
-    "controller.friction.believed.f_v": [3.0],
-    "controller.friction.believed.file": "comau_racer_1_4",
-    "controller.friction.believed.drift": FrictionDrift(),
+    "controller.friction.nominal.f_c": [3.0],
+    "controller.friction.nominal.f_v": [3.0],
+    "controller.friction.nominal.file": "comau_racer_1_4",
+    "controller.friction.nominal.drift": FrictionDrift(),
     "controller.posture.task": "limits",
     "controller.posture.reference_deg": [5.0] * 6,
     "controller.posture.weight": "range",
@@ -100,7 +100,7 @@ OTHERS = {
     "obstacles": ObstacleOptions([ObstacleShape("person", 0.2)]),
     "measures": "joint_state",
     "frame": np.array([0.01, 0.0, 0.0, *np.eye(3).ravel()]),
-    "fixtures.looks": 2,
+    "fixtures.distance_evaluations": 2,
     "operator": OperatorOptions(),
     "known_forces": ("wrench_ext",),
     "frame_motion": lambda: None,
@@ -315,7 +315,10 @@ GAINS = [
         {"rigid": LawGains(xi=GainParameters(poles=[-9.0, -8.0], bandwidth=9.0))},
         "rigid.xi.bandwidth = 9: has no effect beside poles",
     ),
-    ({"rigid": LawGains(xi=GainParameters(bandwidth=9.0, bears=0.1))}, "rigid.xi.bears = 0.1: has"),
+    (
+        {"rigid": LawGains(xi=GainParameters(bandwidth=9.0, tolerated_error=0.1))},
+        "rigid.xi.tolerated_error = 0.1: has",
+    ),
 ]
 
 

@@ -147,7 +147,7 @@ def test_gains_too_fast_for_the_sampling(scenario):
 
 def test_chosen_poles_are_robust_and_saved():
     scenario = shipped_scenario("pfc_elastic_6r")
-    slow, quick = {"bandwidth": 40.0}, {"bandwidth": 60.0, "bears": 0.08}
+    slow, quick = {"bandwidth": 40.0}, {"bandwidth": 60.0, "tolerated_error": 0.08}
     given = with_gains(scenario, eta=slow, xi=quick, phi={"poles": [-50.0, -50.0, -200.0, -300.0]})
     assert warnings(given) == []
     gains = given.controller.gains["elastic"]
@@ -177,7 +177,7 @@ def test_poles_are_not_chosen_without_a_bandwidth(scenario):
     [
         ({"bandwidth": -1.0}, "bandwidth"),
         ({"bandwidth": float("nan")}, "bandwidth"),
-        ({"bears": 0.7}, "bears"),
+        ({"tolerated_error": 0.7}, "tolerated_error"),
         ({"bandwidth": 5.0, "coefficients": [1.0, 2.0]}, "bandwidth"),
     ],
 )

@@ -68,7 +68,7 @@ def test_the_demand_on_the_drives_includes_the_table(late):
 
 @pytest.mark.slow(but="table0-0.0001")
 @pytest.mark.parametrize(
-    ("table", "least"), [({"believed_delay": 0.0}, 0.1e-3), ({"derivatives": "none"}, 0.1e-3)]
+    ("table", "least"), [({"nominal_delay": 0.0}, 0.1e-3), ({"derivatives": "none"}, 0.1e-3)]
 )
 def test_an_uncompensated_delay_costs_accuracy(late, table, least):
     _, _, log = run(exact(**table), like=late[0])
@@ -111,7 +111,7 @@ WRONG = {
     ),
     "turntable.stops_deg[0]": lambda s: s.turntable.stops_deg.__setitem__(0, [1.0]),
     "turntable.delay = 0.0035": lambda s: setattr(s.turntable, "delay", 0.0035),
-    "turntable.believed_delay = 1.0": lambda s: setattr(s.turntable, "believed_delay", 1.0),
+    "turntable.nominal_delay = 1.0": lambda s: setattr(s.turntable, "nominal_delay", 1.0),
     "turntable = given": two_carriers,
     "driver = given; allowed: left out with a turntable": lambda s: setattr(
         s.driver, "delay", 1e-3

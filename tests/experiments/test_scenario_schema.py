@@ -79,7 +79,7 @@ def test_each_shipped_scenario_is_valid(name: str) -> None:
         "controller.law=magic",
         "controller.sampling_time=0",
         "controller.delay=-0.1",
-        "controller.gains.elastic.eta.bears=0.9",
+        "controller.gains.elastic.eta.tolerated_error=0.9",
         "robot=null",
         "robot.fixed_joints={one: much}",
         "name=3",

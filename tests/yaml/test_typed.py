@@ -14,9 +14,9 @@ from pydrake.common.yaml import yaml_load_typed
 
 from pfsc_drake import InputError
 from pfsc_drake.yaml.dumping import typed_data
-from pfsc_drake.yaml.fields import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED, former
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import load_file, load_typed
+from pfsc_drake.yaml.typed import collected_renames, load_file, load_typed
 
 
 @dataclass
@@ -417,6 +417,45 @@ def test_a_union_of_a_class_and_its_subclass_is_a_fault_of_the_program() -> None
     # Drake reads !Circle as a Spiral here, because the default is one and thereby a Circle
     with pytest.raises(NotImplementedError, match="Spiral is a subclass"):
         load_typed(Ambiguous, {"path": {"radius": 0.2, "_tag": "!Circle"}}, "x")
+
+
+@dataclass
+class Renamed:
+    """A key with a former name."""
+
+    tolerance: float = field(default=0.1, metadata=former("bears"))
+    inner: Gains = field(default_factory=Gains)
+
+
+@dataclass
+class Outer:
+    """A renamed key below another one."""
+
+    block: Renamed = field(default_factory=Renamed, metadata=former("house") | REQUIRED)
+
+
+def test_a_former_name_is_read_with_a_warning():
+    with collected_renames() as renames:
+        outer = load_typed(Outer, {"house": {"bears": 0.3}}, "my.yaml")
+    assert outer.block.tolerance == 0.3
+    assert [message.split(";")[0] for message in renames] == [
+        "my.yaml: house.bears is now called 'tolerance'",
+        "my.yaml: house is now called 'block'",
+    ]
+    with pytest.warns(FutureWarning, match="'tolerance'; the former name is read in this version"):
+        load_typed(Renamed, {"bears": 0.3}, "my.yaml")
+
+
+def test_a_present_name_has_no_warning(recwarn):
+    assert load_typed(Outer, {"block": {"tolerance": 0.3}}, "my.yaml").block.tolerance == 0.3
+    assert not recwarn.list
+
+
+def test_both_names_of_a_key_are_one_too_many():
+    with pytest.raises(
+        InputError, match=r"unknown key 'bears' = 0\.3: .*allowed: tolerance, inner"
+    ):
+        load_typed(Renamed, {"bears": 0.3, "tolerance": 0.2}, "my.yaml")
 
 
 def test_a_decimal_comma_is_named():

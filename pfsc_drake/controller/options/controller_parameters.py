@@ -8,7 +8,7 @@ from pfsc_drake.control.estimation.link_deviation import StateUncertainty
 from pfsc_drake.control.law.following_law import BEYOND_END_RANGE, MAX_BEYOND_END
 from pfsc_drake.control.law.laws import LAWS, Law
 from pfsc_drake.controller.options.friction_parameters import FrictionCompensationParameters
-from pfsc_drake.yaml.fields import AUTO_OR_MANY, NAME_OR_FILE, ONE_FOR_ALL
+from pfsc_drake.yaml.fields import AUTO_OR_MANY, NAME_OR_FILE, ONE_FOR_ALL, former
 from pfsc_drake.yaml.rules import (
     NotNegative,
     Numbers,
@@ -98,7 +98,8 @@ class GainParameters(Parameters):
             them for a bandwidth: two slow ones for the convergence, faster ones for the
             robustness. A run's resolved scenario lists the chosen poles.
         bandwidth: Magnitude of the slow poles [1/s] with ``auto``.
-        bears: Relative error of masses and joint stiffnesses that poles by ``auto`` tolerate.
+        tolerated_error: Relative error of masses and joint stiffnesses that poles by ``auto``
+            tolerate.
         free: Whether only its velocity is controlled, for hand guiding; then there are r - 1
             poles, or the coefficients ``a_2 .. a_r``. For ``eta`` and ``phi``.
         coefficients: ``a_1 .. a_r``, alternatively.
@@ -112,7 +113,9 @@ class GainParameters(Parameters):
     integral: float = 0.0
     integral_pole: Annotated[float, Range(most=0.0, words="zero or a negative number")] = 0.0
     bandwidth: NotNegative = 0.0
-    bears: Annotated[float, Range(0.0, 0.5, words="a fraction from 0 to 0.5")] = 0.05
+    tolerated_error: Annotated[float, Range(0.0, 0.5, words="a fraction from 0 to 0.5")] = dc.field(
+        default=0.05, metadata=former("bears")
+    )
     free: bool = False
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ from pfsc_drake.controller.options.compliance_parameters import ComplianceParame
 from pfsc_drake.controller.options.controller_parameters import ControllerParameters
 from pfsc_drake.controller.options.motion_limits import MotionLimits
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.yaml.fields import ONE_OR_MANY
+from pfsc_drake.yaml.fields import ONE_OR_MANY, former
 from pfsc_drake.yaml.rules import Count, NotNegative, NotNegatives, Parameters, Positive, Range
 
 
@@ -81,16 +81,16 @@ class FixtureOptions(Parameters):
         limits: Limits of the robot.
         smoothing: Time constant [s] of each of the r - 1 lags that make the reference smooth
             enough for laws that command torques.
-        looks: Largest number of distance evaluations in a sample beside those of near regions; 0
-            for all that are due, else 2 or more.
+        distance_evaluations: Largest number of distance evaluations in a sample beside those of
+            near regions; 0 for all that are due, else 2 or more.
     """
 
     guidance: GuidanceParameters = dc.field(default_factory=GuidanceParameters)
     limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
     smoothing: Annotated[float, Range(0.001, 0.1, "s")] = 0.003
-    looks: Annotated[
+    distance_evaluations: Annotated[
         int, Range(_FEWEST_EVALUATIONS, besides=0, words=f"0, or {_FEWEST_EVALUATIONS} and more")
-    ] = 0
+    ] = dc.field(default=0, metadata=former("looks"))
 
 
 @dc.dataclass

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pfsc_drake.checks import require
 from pfsc_drake.physics.friction import FrictionDrift
-from pfsc_drake.yaml.fields import NAME_OR_FILE, ONE_FOR_ALL, ONE_OR_MANY
+from pfsc_drake.yaml.fields import NAME_OR_FILE, ONE_FOR_ALL, ONE_OR_MANY, former
 from pfsc_drake.yaml.rules import (
     NotNegative,
     NotNegatives,
@@ -102,7 +102,7 @@ class KalmanParameters(Parameters):
 class FrictionCompensationParameters(Parameters):
     """Friction compensation by the drive torques, (2.42), (3.29), (3.58), (3.65).
 
-    The nominal friction is the friction of the plant, unless ``believed`` is not empty. The law
+    The nominal friction is the friction of the plant, unless ``nominal`` is not empty. The law
     ``velocity_servo`` does not use it.
 
     Attributes:
@@ -117,7 +117,7 @@ class FrictionCompensationParameters(Parameters):
         rate: L of the disturbance observer [1/s].
         kalman: The friction Kalman filter.
         watched: Whether the observer also runs with ``none`` or ``model``, for the log only.
-        believed: Nominal coefficients.
+        nominal: Nominal coefficients.
         hold_at_rest: Whether sticking drives get constant torques while the reference rests, see
             :class:`RestHold`; not with ``none``.
     """
@@ -129,7 +129,9 @@ class FrictionCompensationParameters(Parameters):
     rate: Positive = 300.0
     kalman: KalmanParameters = dc.field(default_factory=KalmanParameters)
     watched: bool = False
-    believed: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
+    nominal: JointFrictionParameters = dc.field(
+        default_factory=JointFrictionParameters, metadata=former("believed")
+    )
     hold_at_rest: bool = True
 
     def __post_init__(self) -> None:
@@ -137,11 +139,11 @@ class FrictionCompensationParameters(Parameters):
         is_possible = self.velocity == "measured" or self.source == "none" or self.has_coefficients
         allowed = "measured; the disturbance observer has no model of friction by velocity"
         require(is_possible, "velocity", self.velocity, allowed)
-        drift = self.believed.drift
-        require(drift is None, "believed.drift", drift, "null; nominal friction does not drift")
-        bristles = self.believed.presliding
+        drift = self.nominal.drift
+        require(drift is None, "nominal.drift", drift, "null; nominal friction does not drift")
+        bristles = self.nominal.presliding
         require(
-            not bristles, "believed.presliding", bristles, "empty; presliding is not compensated"
+            not bristles, "nominal.presliding", bristles, "empty; presliding is not compensated"
         )
 
     @property

@@ -22,7 +22,7 @@ from pfsc_drake.geometry.surfaces.parametric_surface import Surface
 from pfsc_drake.geometry.surfaces.point_file import read_surface_file
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
-from pfsc_drake.yaml.fields import FILE
+from pfsc_drake.yaml.fields import FILE, former
 from pfsc_drake.yaml.rules import Count, MaybeDirection, MaybePoint, OneOf, Range
 
 _BASES = ("auto", "plane", "cylinder")
@@ -53,7 +53,7 @@ class Fitted(PlacedSurface):
         base: Surface over which scattered points are heights: ``auto``, ``plane``, ``cylinder``.
         base_axis: Axis of that cylinder; empty to estimate it.
         base_point: A point on that axis [m].
-        seen_from: A point on the side that the normal points to, world axes [m]; empty for
+        visible_from: A point on the side that the normal points to, world axes [m]; empty for
             upwards on a plane, outward on a cylinder.
         along: Direction that theta_1 leans to on a plane, world axes; empty for the longer side.
         largest_hole: Largest distance on the surface to the nearest scattered point [m]; zero for
@@ -71,7 +71,7 @@ class Fitted(PlacedSurface):
     base: Annotated[str, OneOf(_BASES)] = "auto"
     base_axis: MaybeDirection = dc.field(default_factory=list)
     base_point: MaybePoint = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    seen_from: MaybePoint = dc.field(default_factory=list)
+    visible_from: MaybePoint = dc.field(default_factory=list, metadata=former("seen_from"))
     along: MaybeDirection = dc.field(default_factory=list)
     largest_hole: _Tolerance = 0.0
     trim: bool = False
@@ -87,7 +87,7 @@ class Fitted(PlacedSurface):
     def _require_of_grids(self) -> None:
         """Refuse options that do not apply to the kind of points."""
         if self.grid:
-            scattered = {"base": self.base != "auto", "seen_from": bool(self.seen_from)}
+            scattered = {"base": self.base != "auto", "visible_from": bool(self.visible_from)}
             scattered |= {
                 "along": bool(self.along),
                 "largest_hole": self.largest_hole > 0.0,
@@ -168,18 +168,19 @@ class Fitted(PlacedSurface):
             smoothness=smoothness,
             tolerance=self.tolerance or None,
             base=base,
-            seen_from=self.seen_from or None,
+            visible_from=self.visible_from or None,
             along=self.along or None,
             largest_hole=self.largest_hole or None,
             trim=self.trim,
         )
         fit = fit_scattered(points, options)
         notes: tuple[str, ...] = ()
-        if not self.seen_from:
+        if not self.visible_from:
             normal = ", ".join(f"{value:.3g}" for value in _normal_in_the_middle(fit.surface))
             notes = (
-                f"{self.file}: the normal of the surface points to [{normal}] in its middle, as no "
-                "seen_from says which side it is (upwards from a plane, outwards from a cylinder)",
+                f"{self.file}: the normal of the surface points to [{normal}] in its middle, as "
+                "no visible_from says which side it is (upwards from a plane, outwards from a "
+                "cylinder)",
             )
         if fit.hole > _HOLE * fit.spacing:
             centre = ", ".join(f"{value:.4g}" for value in fit.hole_at)

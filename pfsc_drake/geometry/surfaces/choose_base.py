@@ -221,7 +221,7 @@ def choose_base(
     points: np.ndarray,
     near: Neighbourhoods,
     choice: BaseChoice,
-    seen_from: ArrayLike | None,
+    visible_from: ArrayLike | None,
     along: ArrayLike | None,
 ) -> Base:
     """Return the plane or cylinder over which points are a function of two parameters.
@@ -232,14 +232,14 @@ def choose_base(
         choice: "auto" takes the plane that fits the normals best, or, where they lean away
             from it by more than 45 degrees, the better of it and the cylinder whose axis they
             meet; or "plane", "cylinder", or the axis of a cylinder.
-        seen_from: A point on the side that the normal points to, [3], m. By default it points
+        visible_from: A point on the side that the normal points to, [3], m. By default it points
             upwards on a plane, and outward on a cylinder.
         along: Direction that theta_1 leans to, on a plane.
 
     Raises:
         InputError: The points fold over in every base tried, or an unknown choice.
     """
-    view = None if seen_from is None else _vector("seen_from", seen_from)
+    view = None if visible_from is None else _vector("visible_from", visible_from)
 
     def on_plane() -> Base:
         return _plane(points, near, view, along)

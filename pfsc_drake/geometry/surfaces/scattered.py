@@ -55,7 +55,7 @@ class ScatteredFitOptions:
             is taken, which follows the noise no closer than necessary. None: the surface that
             predicts left-out points best, by cross-validation.
         base: Surface that the points are projected onto, see `choose_base`.
-        seen_from: A point on the side that the normal points to, [3], m; by default upwards on
+        visible_from: A point on the side that the normal points to, [3], m; by default upwards on
             a plane, and outward on a cylinder.
         along: Direction that theta_1 leans to, on a plane; by default the longer side.
         largest_hole: Largest distance on the surface to the nearest point, m; by default twice the
@@ -67,7 +67,7 @@ class ScatteredFitOptions:
     smoothness: int = 5
     tolerance: float | None = None
     base: BaseChoice = "auto"
-    seen_from: ArrayLike | None = None
+    visible_from: ArrayLike | None = None
     along: ArrayLike | None = None
     largest_hole: float | None = None
     trim: bool = False
@@ -126,7 +126,7 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     _check_length("tolerance", options.tolerance)
     _check_length("largest_hole", options.largest_hole)
     near = neighbourhoods(cloud)
-    base = choose_base(cloud, near, options.base, options.seen_from, options.along)
+    base = choose_base(cloud, near, options.base, options.visible_from, options.along)
     selected, domain, (centre, hole) = _select(cloud, base, options)
     cloud = cloud[selected]
     theta = base.parameters(cloud)

@@ -167,7 +167,7 @@ def test_defaults_are_a_plate_that_fits():
     """Believed to be nearly as heavy as it is; cups, rests and pins on it, pins within bores."""
     plate = PlateParameters()
     half = np.array(plate.size[:2]) / 2.0
-    assert plate.believed_mass == pytest.approx(plate.mass, rel=0.05)
+    assert plate.nominal_mass == pytest.approx(plate.mass, rel=0.05)
     assert np.all(np.abs(plate.pins.positions) + plate.pins.radius < half)
     assert np.all(np.abs(plate.suction.cups) < half)
     assert 0.0 < plate.frame.clearance < plate.pins.radius

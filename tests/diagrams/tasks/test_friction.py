@@ -119,7 +119,7 @@ def test_the_belief_is_the_plants_with_its_error_or_what_is_written(arm):
         return model.GetOutputPort("friction_torque").Eval(context)
 
     np.testing.assert_allclose(torque(), 0.5 * (np.array(F_C) + F_V), rtol=1e-12)
-    arm.controller.friction.believed = JointFrictionParameters([1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
+    arm.controller.friction.nominal = JointFrictionParameters([1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
     np.testing.assert_allclose(torque(-1.0), [-5.0, -7.0, -9.0], rtol=1e-12)
 
 
@@ -163,8 +163,8 @@ def test_wrong_choices_are_refused(arm):
     with pytest.raises(InputError, match=r"kalman.momentum_noise: 2 values; allowed: 1 or 3"):
         build_station(arm, Path())
     friction.kalman.momentum_noise = [1.0]
-    friction.believed = JointFrictionParameters([1.0], [1.0, 2.0, 3.0])
-    with pytest.raises(InputError, match=r"controller.friction.believed.f_c = \[1\.0\]; allowed: "):
+    friction.nominal = JointFrictionParameters([1.0], [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match=r"controller.friction.nominal.f_c = \[1\.0\]; allowed: "):
         build_station(arm, Path())
 
 

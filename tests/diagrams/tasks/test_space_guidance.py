@@ -60,7 +60,7 @@ def test_as_many_distances_are_computed_as_the_scenario_has_it(scenario, looks):
     scenario.fixtures.regions = [
         RegionParameters(shape=Plane(origin=[0.95, 0.0, 0.8 - 1e-4 * i])) for i in range(5)
     ]
-    scenario.fixtures.looks = looks
+    scenario.fixtures.distance_evaluations = looks
     x, y, z = scenario.start.position = [0.95, 0.0, 0.801]
     task = make_task(scenario, SCENARIOS)
     assert (near_expression(task) is None) == bool(looks)

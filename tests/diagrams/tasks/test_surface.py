@@ -120,7 +120,7 @@ def test_scattered_points_are_placed_and_as_smooth_as_the_law_needs(tmp_path, la
     rows = 1e3 * np.column_stack([x, y, x**2 - y**2])
     name = csv(tmp_path, "x,y,z", rows)
     said = []
-    shape = Fitted(file=name, unit="mm", along=[0.0, 1.0, 0.0], seen_from=[9.0, 0, 0], **PLACED)
+    shape = Fitted(file=name, unit="mm", along=[0.0, 1.0, 0.0], visible_from=[9.0, 0, 0], **PLACED)
     made = make_surface(shape, law, tmp_path, lambda fraction, phase: said.append(phase))
     assert made.surface.smoothness == max(2, RELATIVE_DEGREE[law] + 1)
     assert any("400 points" in phase for phase in said)
@@ -265,7 +265,7 @@ def test_a_bridged_hole_is_reported(tmp_path):
     for name, rows in {"whole": points, "holed": left}.items():
         text = "\n".join(",".join(map(repr, row)) for row in rows.tolist())
         (tmp_path / f"{name}.csv").write_text(f"x,y,z\n{text}\n")
-        shape = Fitted(file=f"{name}.csv", largest_hole=0.05, seen_from=[0.1, 0.1, 1.0])
+        shape = Fitted(file=f"{name}.csv", largest_hole=0.05, visible_from=[0.1, 0.1, 1.0])
         made[name] = shape.surface(ShapeInputs(tmp_path, 3)).notes
     assert made["whole"] == ()
     (note,) = made["holed"]
@@ -280,7 +280,9 @@ def test_the_side_of_the_normal_is_reported_by_default(tmp_path):
     text = "\n".join(",".join(map(repr, row)) for row in (flat @ R.T).tolist())
     (tmp_path / "scan.csv").write_text(f"x,y,z\n{text}\n")
     (note,) = Fitted(file="scan.csv").surface(ShapeInputs(tmp_path, 3)).notes
-    said = re.search(r"scan\.csv: the normal .* to \[(.*)\] in its middle, as no seen_from", note)
+    said = re.search(
+        r"scan\.csv: the normal .* to \[(.*)\] in its middle, as no visible_from", note
+    )
     normal = np.array([float(value) for value in said[1].split(",")])
     np.testing.assert_allclose(normal, -R[:, 2], atol=2e-3)
     assert normal[2] > 0.5

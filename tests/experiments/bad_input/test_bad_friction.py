@@ -18,9 +18,9 @@ import pytest
         ("friction.kalman.coulomb_noise=[-1.0]", "coulomb_noise = [-1.0]"),
         ("friction.kalman.start=-1", "start = -1"),
         ("friction.source=model", "friction.source = model: no nominal friction"),
-        ("friction={source: model, believed: {f_c: [1.0]}}", "believed.f_c = [1.0]; allowed: "),
+        ("friction={source: model, nominal: {f_c: [1.0]}}", "nominal.f_c = [1.0]; allowed: "),
         (
-            "friction.believed={f_c: [1.0], drift: {factor: 2.0}}",
+            "friction.nominal={f_c: [1.0], drift: {factor: 2.0}}",
             "nominal friction does not drift",
         ),
         ("external_torque.source=observed", "bandwidth = 0.0; allowed: a positive number with"),

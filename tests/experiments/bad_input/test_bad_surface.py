@@ -156,7 +156,7 @@ def test_grids(wrong, tmp_path):
         ("tolerance: -1", "tolerance"),
         ("largest_hole: .inf", "largest_hole"),
         ("axis: [0, 0, 0]", "axis"),
-        ("seen_from: [1, 2]", "seen_from"),
+        ("visible_from: [1, 2]", "visible_from"),
         ("along: [1, 2, .nan]", "along"),
         ("base_axis: [0, 0, 1]", "base"),
     ],

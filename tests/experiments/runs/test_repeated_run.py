@@ -50,7 +50,7 @@ def test_files_beside_a_scenario_are_found_from_its_copy(run_scenario, tmp_path,
     shutil.copy(parameters, mine / "believed.yaml")
     changes = (
         "controller.friction.source=model",
-        "controller.friction.believed.file=believed.yaml",
+        "controller.friction.nominal.file=believed.yaml",
         "friction.file=believed.yaml",
     )
     flags = [argument for change in changes for argument in ("--set", change)]

@@ -144,7 +144,10 @@ def test_a_soft_region_yields_like_its_spring(tmp_path):
         (["fixtures.guidance.approach_time=0"], "approach_time = 0.0; allowed: a positive number"),
         (["fixtures.guidance.tank.initial=2"], "fixtures.guidance.tank.initial = 2"),
         (["fixtures.servo_lag=1"], "servo_lag = 1.0; allowed: below 0.1 s"),
-        (["fixtures.looks=1"], "looks = 1; allowed: 0, or 2 and more"),
+        (
+            ["fixtures.distance_evaluations=1"],
+            "distance_evaluations = 1; allowed: 0, or 2 and more",
+        ),
         (["fixtures.regions=[{admissible: inside}]"], "fixtures.regions[0]"),
         (["fixtures.orientation.kind=normal"], "orientation.kind = normal; allowed: none, given"),
     ],

@@ -29,3 +29,11 @@ def test_one_number_is_as_good_as_equal_ones(three_axes, law, pole, order):
     assert one.status == several.status == 0
     for name in one.log:
         np.testing.assert_array_equal(one[name], several[name])
+
+
+def test_a_run_warns_of_a_former_key_and_writes_the_present_one(three_axes):
+    gains = "controller.gains.elastic.eta={poles: auto, bandwidth: 20, bears: 0.03}"
+    run = three_axes(gains, duration="0.02")
+    assert run.status == 0
+    assert "controller.gains.elastic.eta.bears is now called 'tolerated_error'" in run.stdout
+    assert "tolerated_error: 0.03" in (run.folder / "scenario.yaml").read_text(encoding="utf-8")

@@ -135,10 +135,10 @@ def test_points_that_bend_over_are_projected_from_their_axis(span):
 
 @pytest.mark.slow
 def test_the_normal_points_to_where_the_surface_is_seen_from():
-    inside = ScatteredFitOptions(seen_from=[0.01, 0.1, 0.0])
+    inside = ScatteredFitOptions(visible_from=[0.01, 0.1, 0.0])
     rows = samples(fit_scattered(tube(2.0 * np.pi), inside).surface)
     assert np.all(np.sum(np.cross(rows[:, 1], rows[:, 2]) * rows[:, 0] * [1, 0, 1], axis=1) < 0.0)
-    below = ScatteredFitOptions(seen_from=ORIGIN - np.sign(R[2, 2]) * R[:, 2])
+    below = ScatteredFitOptions(visible_from=ORIGIN - np.sign(R[2, 2]) * R[:, 2])
     rows = samples(fit_scattered(workpiece(500), below).surface)
     assert np.all(np.sign(R[2, 2]) * np.cross(rows[:, 1], rows[:, 2]) @ R[:, 2] < 0.0)
 
@@ -221,7 +221,7 @@ def changed(row, value):
         (workpiece(60), {"largest_hole": np.nan}, "largest_hole: nan m"),
         (workpiece(60), {"base": "sphere"}, "'sphere'; 'auto', 'plane', 'cylinder'"),
         (workpiece(60), {"smoothness": 9}, "smoothness: 9"),
-        (workpiece(60), {"seen_from": [0.0, 1.0]}, "seen_from"),
+        (workpiece(60), {"visible_from": [0.0, 1.0]}, "visible_from"),
     ],
 )
 def test_points_that_make_no_surface_are_refused(points, options, reason):
