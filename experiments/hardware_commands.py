@@ -59,7 +59,7 @@ class LinkOptions:
     """Packet loss and delay of the link."""
 
     lose: Annotated[float, typer.Option(metavar="SHARE", help="Share of lost packets.")] = 0.0
-    delay: Annotated[int, typer.Option(metavar="TICKS", help="Delay of commands in ticks.")] = 0
+    delay: Annotated[int, typer.Option(metavar="SAMPLES", help="Delay of commands in samples.")] = 0
 
 
 def robot_command(
@@ -160,7 +160,10 @@ def drive_command(
     drawn: Drawn,
     quiet: Quiet = False,
 ) -> None:
-    """Control a robot by a scenario; Ctrl-C brings it to rest. This is no safety function."""
+    """Run the controller of a scenario on a robot.
+
+    Ctrl-C brings it to rest. This is no safety function.
+    """
     from experiments.hardware.driven_run import (
         DriveOptions,
         drive_scenario,

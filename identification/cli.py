@@ -105,7 +105,7 @@ def simulate_command(
     excitation: Annotated[
         Path | None, typer.Option(help="excitation.yaml. Default: the shipped one")
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, max=MOST_RUNS, help="How often.")] = 7,
+    runs: Annotated[int, typer.Option(min=1, max=MOST_RUNS, help="Number of simulated runs.")] = 7,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 1,
     realistic: Annotated[
         bool,
@@ -183,7 +183,7 @@ def consistent_command(
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_model")] = None,
     known: BoundsOptions,
     direct: Annotated[
-        bool, typer.Option("--direct", help="In one step from the first run's torques.")
+        bool, typer.Option("--direct", help="In one step, from the torques of the first run.")
     ] = False,
     tool: Tool = False,
 ) -> None:

@@ -18,7 +18,7 @@ Robot = Annotated[
     str, typer.Argument(help="Shipped robot, SDF or URDF file, or scenario with a robot.")
 ]
 Tool = Annotated[
-    bool, typer.Option("--tool/--no-tool", help="Whether the shipped robot carries its tool.")
+    bool, typer.Option("--tool/--no-tool", help="Include the tool of the shipped robot.")
 ]
 Validation = Annotated[
     Path | None, typer.Option(help="Record of another motion, to choose friction and to predict.")
@@ -116,7 +116,10 @@ class BoundsOptions:
         ),
     ] = None
     margin: Annotated[
-        float, typer.Option(help="With it: how far bodies extend beyond their joints [m].")
+        float,
+        typer.Option(
+            help="With --total-mass: distance by which bodies extend beyond their joints [m]."
+        ),
     ] = 0.1
 
     def read(self, subject: "Subject") -> "PhysicalBounds":

@@ -37,8 +37,8 @@ def elastic_command(
         str | None,
         typer.Option(
             metavar="VALUES",
-            help="Viscous friction of the drives where links were held, one number or one for "
-            "each [Nm s/rad]; 0 takes it for damping of the joint.",
+            help="Viscous friction of the drives with locked links, one number or one for "
+            "each [Nm s/rad]; 0 attributes it to the damping of the joint.",
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_elastic")] = None,
