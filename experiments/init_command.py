@@ -52,7 +52,9 @@ class Chosen:
         """
         words = self.base_position.split(",") if self.base_position else []
         if words and (len(words) != 3 or not all(is_number(word) for word in words)):
-            raise InputError(f"--base-position {self.base_position}: allowed: X,Y,Z in m")
+            raise InputError(
+                f"--base-position {self.base_position}: allowed: three numbers X,Y,Z [m]"
+            )
         return tuple(float(word) for word in words)
 
 

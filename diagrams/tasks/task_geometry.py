@@ -191,14 +191,11 @@ def require_orientation(path: Path, task: str, num_joints: int) -> None:
         num_outputs, outputs = 6, "position and orientation"
     counts = f"path: {num_joints} joints for {num_outputs} outputs ({outputs})"
     if num_joints < num_outputs:
-        advice = ["3 joints follow a path without orientation, 6 one with"]
-        if num_joints == 5:
-            advice.append("5 the direction of an axis: write path.orientation.task: tool_axis")
-        if num_joints in (4, 5):
-            advice.append("4 a turn about the vertical: write path.orientation.task: yaw")
-        if num_joints >= 3:
-            advice.append("for a position only write path.orientation.task: none")
-        raise InputError("; ".join([counts, *advice]))
+        words = ["tool_axis (position and an axis of the tool)"] * (num_joints == 5)
+        words += ["yaw (position and turn about the vertical)"] * (num_joints in (4, 5))
+        words.append("none (position only)")
+        allowed = f"path.orientation.task: {' or '.join(words)}"
+        raise InputError(f"{counts}; allowed: {allowed if num_joints >= 3 else '3 joints or more'}")
     if num_joints > 3 and path.orientation is None and task != "none":
         advice = [_give_orientation(path), "if none is meant, write path.orientation.task: none"]
         if num_joints != 6:

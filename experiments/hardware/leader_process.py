@@ -67,7 +67,7 @@ def lead_scenario(
     builder = DiagramBuilder()
     with naming(scenario.source):
         coupling = settings.teleoperation
-        require(coupling is not None, "teleoperation", "null", "required for a leader process")
+        require(coupling is not None, "teleoperation", "null", "a teleoperation, as in teleop_path")
         assert coupling is not None
         lasts = settings.duration if duration is None else duration
         require(lasts > 0.0, "duration", lasts, "a positive number [s]")

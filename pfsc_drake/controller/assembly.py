@@ -49,7 +49,7 @@ _GUIDANCE = {"guidance": "record", "mode": "mode", "guides": "guides"}
 
 
 class Assembly:
-    """Adds the systems of one controller to a builder.
+    """Builder of the diagram of one controller.
 
     Args:
         builder: Builder of the controller's diagram.
@@ -131,7 +131,7 @@ class Assembly:
             measured: ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
 
         Raises:
-            InputError: If options, law and task do not go together.
+            InputError: If options, law and task are incompatible.
         """
         links = self._links(measured)
         self._measured = measured

@@ -66,9 +66,10 @@ class Controller(Diagram):
         frame_jet (input): With ``frame``: motion of the frame of path or surface,
             derivatives 0..r of ``[p_WC, R_WC by rows]``, shape (12 (r + 1),) [m, 1, per s, ..].
         stop_request (input): With ``stop_request``: any value except 0 stops the robot, shape (1,).
-        drive_torque (output): Drive torques within their limits, shape (N,) [Nm or N]; of velocity
-            servos
-        velocity_reference (output): joint velocities, shape (N,) [rad/s or m/s].
+        drive_torque (output): With laws that command torques: drive torques within their limits,
+            shape (N,) [Nm or N].
+        velocity_reference (output): With ``velocity_servo``: joint velocities, shape (N,) [rad/s or
+            m/s].
         reference (output): Derivatives 0..r of the virtual output's reference by rows.
         manifold_force (output): With compliance: forces along the coordinates, shape (m,) [N, Nm].
         limit_force (output): With hand guiding along a manifold: forces by which limits of the
@@ -247,7 +248,7 @@ class Controller(Diagram):
         return self._assembly.planned_frame(placement)
 
     def warn(self) -> list[str]:
-        """Return doubts about task, motion, law, gains and robot, one sentence each."""
+        """Return warnings about task, motion, law, gains and robot, one sentence each."""
         plan, chosen, law = self.task.drive_plan, self.options.controller, self.law
         link_state = np.append(self.start_posture, np.zeros(self.robot.dimension))
         return [

@@ -14,7 +14,7 @@ _COARSE = 1e-7
 _BEYOND = 1e-9
 # Smallest eigenvalue of H relative to the first form that Newton's step is taken with.
 _DEFINITE = 1e-6
-# Largest part of a step by which it is corrected for the curvature along it.
+# Largest correction for the curvature along a step, relative to the step.
 _CORRECTION = 0.5
 
 # Status of an iteration.
@@ -213,7 +213,9 @@ _STALLED = 1e-8
 
 
 class ClosestPointFinder:
-    """Local minimum of f(theta) = |y - sigma(theta)|^2 / 2 near a guess, (3.6), (4.9).
+    """Newton iteration for the closest point, (3.6), (4.9).
+
+    It finds a local minimum of f(theta) = |y - sigma(theta)|^2 / 2 near a guess.
 
     Newton's method (3.72), (4.48) in one or two parameters, with a bounded number of masked steps.
     A step is corrected for the curvature along it, limited, halved while f grows, and taken with a

@@ -85,7 +85,10 @@ class ForcePulse(Parameters):
         if not self.link and self.point.any():
             raise InputError(f"point = {self.point.tolist()}: must be [0, 0, 0] without a link")
         if not (np.isfinite(self.begin) and self.begin < self.end < np.inf):
-            raise InputError(f"begin, end = {self.begin}, {self.end}: must be finite and ascending")
+            raise InputError(
+                f"begin, end = {self.begin}, {self.end}; allowed: finite numbers [s], begin "
+                "before end"
+            )
         longest = (self.end - self.begin) / 2.0
         if not 0.0 < self.ramp <= longest * (1.0 + 1e-9):
             raise InputError(

@@ -92,7 +92,7 @@ def test_pulses_add_up_over_frames():
     [
         ({"force": [1.0, 2.0]}, r"^force = \[1.0, 2.0\]: must be 3 finite numbers$"),
         ({"torque": [0, 0, np.nan]}, "^torque = .*: must be 3 finite"),
-        ({"end": 1.5}, r"^begin, end = 1.5, 1.5: must be finite and ascending$"),
+        ({"end": 1.5}, r"^begin, end = 1.5, 1.5; allowed: finite numbers \[s\], begin before end$"),
         ({"ramp": 0.3}, r"^ramp = 0.3: must be positive and at most 0.25, half the pulse$"),
         ({"ramp": 0.0}, "^ramp = 0.0: must be positive"),
         ({"frame": "tool"}, "^frame = tool; allowed: world, manifold$"),

@@ -70,7 +70,7 @@ def analyse(
     run = walk(
         exact_loop,
         duration,
-        lambda time: progress(time, "walking the path"),
+        lambda time: progress(time, "evaluating the path"),
         only_start=only_start,
     )
     if not run.instants:

@@ -28,7 +28,7 @@ Projection = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class TrajectoryError(InputError):
-    """Joints cannot follow a reference.
+    """Error: the joints cannot follow a reference.
 
     Attributes:
         trajectory: Joint coordinates up to the failure, shape (samples, N).
@@ -55,7 +55,7 @@ class TrajectoryStart:
 
 
 class TrajectoryFinder:
-    """Finds the joint trajectory along which the virtual output equals its reference.
+    """Solver for the joint trajectory on which the virtual output equals its reference.
 
     At every instant, order by order: with ``yhat^(k) = A q^(k) + b_k``, where ``b_k`` depends on
     lower orders only, ``q^(k)`` is corrected by the inverse of A until ``yhat^(k)`` is the

@@ -215,7 +215,7 @@ def test_weight_above_the_reserve_is_said_and_not_waited_for(settings):
     """It is the same torque whatever the drives can do, and a little less than that in motion."""
     slow, weights = {"velocity": 0.2, "acceleration": 0.5}, []
     strong = build_station(settings(**slow), Path()).task.drive_plan
-    assert not strong.said
+    assert not strong.messages
     demand = np.abs(strong.demand[:, :3]).max(axis=0) / strong.limits[:3]
     axis = np.argmax(demand)
     for share, words in ((0.9, "would leave the weight"), (1.25, "cannot be held there")):

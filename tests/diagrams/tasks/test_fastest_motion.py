@@ -127,7 +127,7 @@ def test_a_posture_that_moves_is_reported(fastest):
     settings = fastest("pfc_panda_7r", -0.05)
     settings.controller.posture.task = "limits"
     (said,) = build(settings, "pfc_panda_7r").task.drive_plan.messages
-    assert "planned for a posture that stays" in said
+    assert "planned for a constant posture" in said
 
 
 @pytest.mark.slow

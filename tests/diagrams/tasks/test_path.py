@@ -280,12 +280,24 @@ def test_axes_of_a_circle_may_have_any_length():
 @pytest.mark.parametrize(
     ("num_joints", "task", "said"),
     [
-        (2, "full", r"path: 2 joints for 6 outputs \(position and orientation\); 3 joints [^;]*$"),
-        (3, "full", r"3 joints for 6 outputs.*; for a position only write [a-z.]+task: none$"),
-        (4, "full", r"4 joints for 6 outputs [^_]*task: none$"),
-        (5, "full", r"5 joints for 6 outputs.*task: tool_axis; .*task: none$"),
-        (4, "tool_axis", r"4 joints for 5 outputs \(position and direction of .*task: none$"),
-        (2, "none", r"path: 2 joints for 3 outputs \(position only\); 3 joints [^;]*$"),
+        (
+            2,
+            "full",
+            r"path: 2 joints for 6 outputs \(position and .*\); allowed: 3 joints or more$",
+        ),
+        (3, "full", r"3 joints for 6 outputs.*; allowed: [a-z.]+task: none \(position only\)$"),
+        (4, "full", r"4 joints for 6 outputs [^_]*task: yaw \(.*\) or none \(position only\)$"),
+        (
+            5,
+            "full",
+            r"5 joints for 6 outputs.*task: tool_axis \(.*\) or yaw \(.*\) or none \(.*\)$",
+        ),
+        (
+            4,
+            "tool_axis",
+            r"4 joints for 5 outputs \(.* direction of .*task: yaw \(.*\) or none \(.*\)$",
+        ),
+        (2, "none", r"path: 2 joints for 3 outputs \(position only\); allowed: 3 joints or more$"),
     ],
 )
 def test_too_few_joints_for_the_path(num_joints, task, said):

@@ -112,7 +112,7 @@ def test_as_many_outputs_as_joints(refused, mine):
 
 def test_more_outputs_than_joints_and_what_would_fit(refused, mine):
     changes = ["robot.model=comau_racer_1_4", "robot.fixed_joints={joint_6: 0}"]
-    parts = ("5 joints for 6 outputs", "path.orientation.task: tool_axis", "task: none")
+    parts = ("5 joints for 6 outputs", "path.orientation.task: tool_axis", "none (position only)")
     refused(mine(SIX), *parts, changes=changes)
     refused(
         mine(), "task = tool_axis", "no orientation", changes=["path.orientation.task=tool_axis"]

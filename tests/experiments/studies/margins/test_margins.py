@@ -102,7 +102,7 @@ def test_the_command_writes_a_page(tmp_path, capsys):
     status = main(["margins", "pfc_elastic_3r", *changes, "--tool", "0", "--out", str(out)])
     assert status == 0
     text = capsys.readouterr().out
-    assert "the loop is stable" in text
+    assert "The scenario's loop is stable" in text
     assert "The most critical single error is that in" in text
     assert "The weakest drive is" in text
     data = json.loads((out / "margins.json").read_text(encoding="utf-8"))
