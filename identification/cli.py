@@ -29,6 +29,7 @@ from identification.options import (
     read_pairs,
 )
 from identification.output import check_folder
+from pfsc_drake.errors import InputError
 from reporting.progress import fraction_display
 from reporting.terminal import flatten_options, interruptible, run_app, show_page
 
@@ -249,7 +250,13 @@ def information_command(
         regressor = Regressor(subject)
         base = base_parameters(regressor)
         for file in excitations or shipped_excitations(subject):
-            found = information(regressor, base, FourierTrajectory.load(file))
+            motion, joints = FourierTrajectory.load(file), subject.dimension
+            if motion.dimension != joints:
+                raise InputError(
+                    f"{file}: a motion of {motion.dimension} joints; allowed: of {joints}, which "
+                    f"{subject.name} has (pfsc identify excite {subject.name})"
+                )
+            found = information(regressor, base, motion)
             console.print(
                 f"{file.name}: log det {found.log_determinant:.1f}, condition number "
                 f"{found.condition_number:.0f}, {found.base_parameters} parameters",

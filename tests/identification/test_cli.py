@@ -143,6 +143,12 @@ def test_log_det_of_the_printed_excitation(capsys):
     assert shipped.startswith("excitation_optimal.yaml: log det 680.2,")
 
 
+def test_motions_of_another_robot_have_no_information(capsys):
+    assert main(["information", "comau_racer_1_4_3r"]) == 2
+    line = capsys.readouterr().err
+    assert "a motion of 6 joints; allowed: of 3, which comau_racer_1_4_3r has" in line
+
+
 @pytest.mark.slow
 def test_an_identification_of_another_robot_is_refused(work, tmp_path, capsys):
     out = str(tmp_path / "model")
