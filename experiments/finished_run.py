@@ -206,8 +206,7 @@ def _metrics(run: FinishedRun, log: RunLog, tick: NDArray[np.float64]) -> Metric
         metrics |= {f"margins_{name}": m for name, m in metrics_of(run.analysis).items()}
     set_targets(metrics, settings)
     # the context's own time is that of the last sample that was measured
-    end = float(log.time[-1]) if log.time.size else 0.0
-    lasted = end > settings.judged_after - 1.5 * settings.controller.sampling_time
+    lasted = log.end > settings.judged_after - 1.5 * settings.controller.sampling_time
     if result.fault is not None or not lasted:
         leave_unjudged(metrics, fault=result.fault is not None)
     return metrics

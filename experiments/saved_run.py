@@ -152,7 +152,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return the run as a short table."""
-        end = self.log.time[-1] if self.log.time.size else 0.0
+        end = self.log.end
         ends = [f"interrupted at t = {end:.3f} s"] if self.interrupted else []
         if self.fault is not None:
             ends.append(f"fault: {self.fault}; stopped at t = {end:.3f} s")

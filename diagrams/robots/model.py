@@ -7,8 +7,6 @@ from pathlib import Path as FilePath
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
-    FrameIndex,
-    JointIndex,
 )
 
 from diagrams.scenario import (
@@ -19,7 +17,7 @@ from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.delta.delta_parameters import SHIPPED_ROBOTS, load_delta_parameters
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.models.files import packages_for, read_with_inclusions, resolve_model
-from pfsc_drake.robot.models.joint_edits import frame_named
+from pfsc_drake.robot.models.joint_edits import frame_named, model_frames
 from pfsc_drake.robot.models.model_xml import read_model_xml
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.yaml.reading import read_yaml
@@ -118,11 +116,7 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
     except InputError as error:
         raise InputError(f"robot.tool_frame: {error}") from None
     if frame is None:
-        frames = [plant.get_frame(FrameIndex(i)).name() for i in range(1, plant.num_frames())]
-        joints = [plant.get_joint(JointIndex(i)).name() for i in plant.GetJointIndices()]
-        # Drake's own frames at joints are not the user's
-        drakes = {f"{joint}_{end}" for joint in joints for end in ("parent", "child", "base")}
-        names = [name for name in frames if name and name not in drakes]
+        names = [one.name() for one in model_frames(plant)]
         raise InputError(
             f"robot.tool_frame: the model {parameters.model} has no frame "
             f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, FrameIndex, Joint, RigidBody
+from pydrake.multibody.tree import Frame, Joint, RigidBody
 
 from diagrams.robots.arm_model import ArmModel, read_arm
 from diagrams.scenario import RobotParameters
@@ -14,8 +14,8 @@ from pfsc_drake.control.law.laws import LAWS
 from pfsc_drake.errors import InputError, suggestion
 from pfsc_drake.robot.models.files import packages_for, read_with_inclusions, resolve_model
 from pfsc_drake.robot.models.inspection import inspect_model
-from pfsc_drake.robot.models.joint_edits import all_joints, inboard_joints
-from pfsc_drake.robot.models.model_xml import ModelXml, read_model_xml
+from pfsc_drake.robot.models.joint_edits import all_joints, inboard_joints, model_frames
+from pfsc_drake.robot.models.model_xml import read_model_xml
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 
 # names of tool frames, the most telling first
@@ -65,10 +65,12 @@ class ArmChoice:
         """Return the model with all joints that it can move; its masses do not matter."""
         file = resolve_model(self.model)
         packages = packages_for(file, read_model_xml(file).content, {})
-        models = read_with_inclusions(file, packages)
-        mimics = inspect_model(models).mimics
-        leaders = sorted({m.leader for m in mimics.values()} - mimics.keys())
-        self._leaders = {name: _nearest_to_zero(*_limits(models, name)) for name in leaders}
+        facts = inspect_model(read_with_inclusions(file, packages))
+        leaders = sorted({m.leader for m in facts.mimics.values()} - facts.mimics.keys())
+        free = (-math.inf, math.inf)
+        self._leaders = {
+            name: _nearest_to_zero(*facts.position_limits.get(name, free)) for name in leaders
+        }
         plant = MultibodyPlant(0.0)
         read_model(plant, file, ModelOptions(fixed_joints=self._leaders, by_velocity=True))
         return plant
@@ -144,22 +146,9 @@ def _nearest_to_zero(lower: float, upper: float) -> float:
     return float(min(max(0.0, lower), upper))
 
 
-def _limits(models: Sequence[ModelXml], name: str) -> tuple[float, float]:
-    """Return the limits of a joint of a URDF or SDF file [rad or m]; infinite for none."""
-    limits = {"lower": -math.inf, "upper": math.inf}
-    joints = (e for model in models for e in model.root.within() if e.name == "joint")
-    for joint in (joint for joint in joints if joint.attributes.get("name") == name):
-        for limit in [*joint.all("limit"), *joint.all("axis", "limit")]:
-            texts = limit.attributes | {child.name: child.text for child in limit.children}
-            limits |= {key: float(texts[key]) for key in limits if key in texts}
-    return limits["lower"], limits["upper"]
-
-
 def _frames(plant: MultibodyPlant) -> list[Frame]:
-    """Return the frames that a model names, without the world's and Drake's own at joints."""
-    own = {f"{j.name()}_{end}" for j in all_joints(plant) for end in ("parent", "child", "base")}
-    frames = [plant.get_frame(FrameIndex(i)) for i in range(1, plant.num_frames())]
-    return [f for f in frames if f.name() and f.name() not in own and "_welds_to_" not in f.name()]
+    """Return the frames of a model that may be meant as the tool's, not those of Drake's welds."""
+    return [frame for frame in model_frames(plant) if "_welds_to_" not in frame.name()]
 
 
 def _joints_to(plant: MultibodyPlant, body: RigidBody) -> list[Joint]:

@@ -16,7 +16,6 @@ from experiments.finished_run import RunOutcome
 from experiments.new_scenario.arm_choice import ArmChoice, Ask
 from experiments.new_scenario.points_choice import PointsChoice
 from experiments.new_scenario.scenario_text import ScenarioText
-from experiments.preparation import prepare
 from experiments.scenario_file import SCENARIO_DIRECTORY, ScenarioFile
 from experiments.simulated_run import RunOptions, run_scenario
 from pfsc_drake.errors import InputError
@@ -108,11 +107,10 @@ class FirstScenario:
         for orientation in self._points.orientations(dimension, self._options.orientation):
             self._orientation, self._speed, self._slower = orientation, fastest, ""
             try:
-                prepare(self._file(), None, recording=False, progress=progress)
+                outcome, fault = self._slow_down(progress)
             except InputError as error:
                 refused.append(str(error))
                 continue
-            outcome, fault = self._slow_down(progress)
             if outcome is not None:
                 return outcome
             stopped = stopped or fault

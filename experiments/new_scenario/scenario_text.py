@@ -32,12 +32,11 @@ class ScenarioText:
         """
         words = [f"{'  ' * indent}{key}:"] + [tag] * bool(tag)
         line = " ".join(words + ([] if value is None else [_flow(value)]))
-        if reason:
-            line = f"{line:<{_COMMENT_COLUMN}}  # {reason}"
-            if len(line) > _WIDEST:
-                self._lines.append(f"{'  ' * indent}# {reason}")
-                line = line[: line.index("  # ")].rstrip() if "  # " in line else line
-        self._lines.append(line)
+        commented = f"{line:<{_COMMENT_COLUMN}}  # {reason}" if reason else line
+        if len(commented) <= _WIDEST:
+            self._lines.append(commented)
+        else:
+            self._lines += [f"{'  ' * indent}# {reason}", line]
 
     def __str__(self) -> str:
         return "\n".join(self._lines) + "\n"

@@ -48,11 +48,10 @@ def key_facts(log: RunLog, metrics: Metrics, planned: float, *, simulated: bool)
         planned: Planned duration [s].
         simulated: Whether the robot was simulated.
     """
-    end = float(log.time[-1]) if log.time.size else 0.0
-    notes = [] if end > _COMPLETE * planned else [f"of {format_quantity(planned, 's')}"]
+    notes = [] if log.end > _COMPLETE * planned else [f"of {format_quantity(planned, 's')}"]
     if simulated and "real_time_factor" in metrics:
         notes.append(f"simulated at {_speed(metrics['real_time_factor'].value)}")
-    facts = [Fact("Duration", format_quantity(end, "s"), ", ".join(notes))]
+    facts = [Fact("Duration", format_quantity(log.end, "s"), ", ".join(notes))]
     if "saturated_samples" in metrics:
         count, share = metrics["saturated_samples"].value, metrics["saturated_share"].value
         if count:

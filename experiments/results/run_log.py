@@ -73,6 +73,11 @@ class RunLog:
         for name, signal in self.signals.items():
             self._check(name, signal)
 
+    @property
+    def end(self) -> float:
+        """Time of the last sample [s], 0 without samples."""
+        return float(self.time[-1]) if self.time.size else 0.0
+
     def __getitem__(self, name: str) -> Signal:
         try:
             return self.signals[name]

@@ -4,6 +4,7 @@ Drake replaces an unphysical inertia, ends the program at other invalid numbers,
 rest. Here each is refused in one line that names file, line, part and value.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -31,6 +32,8 @@ class ModelFacts:
         without_inertia: Location of each link without ``<inertial>``, by its name.
         assumed_inertia: Links for whose moments of inertia SDF takes 1 kg m^2.
         effort_limits: Effort limits of joints of URDF and MJCF, by name [Nm or N].
+        position_limits: Position limits of joints of URDF and SDF, by name [rad or m]; infinite
+            where there are none.
         drives: Drives of MJCF joints, by name.
         friction: Joints with dry friction.
         springs: Stiffness of the sprung joints of the model itself, by name.
@@ -41,6 +44,7 @@ class ModelFacts:
     without_inertia: dict[str, str] = field(default_factory=dict)
     assumed_inertia: list[str] = field(default_factory=list)
     effort_limits: dict[str, float] = field(default_factory=dict)
+    position_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     drives: dict[str, MjcfDrive] = field(default_factory=dict)
     friction: list[str] = field(default_factory=list)
     springs: dict[str, float] = field(default_factory=dict)
@@ -156,6 +160,8 @@ def _take_joint(
 ) -> None:
     """Check a joint of a URDF or SDF model, and store data that Drake's plant does not provide."""
     numbers = check_joint(joint, values, fixed)
+    lower, upper = numbers.get("lower", -math.inf), numbers.get("upper", math.inf)
+    facts.position_limits[joint.name] = lower, upper
     if "effort" in numbers and joint.model.root.name == "robot":
         facts.effort_limits[joint.name] = numbers["effort"]
     if numbers.get("friction", 0.0) > 0.0:

@@ -57,6 +57,17 @@ def all_joints(plant: MultibodyPlant) -> list[Joint]:
     return [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
 
 
+def model_frames(plant: MultibodyPlant) -> list[Frame]:
+    """Return the named frames of a plant, without the world's and those that Drake adds at joints.
+
+    Args:
+        plant: A plant.
+    """
+    added = {f"{j.name()}_{end}" for j in all_joints(plant) for end in ("parent", "child", "base")}
+    frames = [plant.get_frame(FrameIndex(i)) for i in range(1, plant.num_frames())]
+    return [frame for frame in frames if frame.name() and frame.name() not in added]
+
+
 def force_elements(plant: MultibodyPlant) -> list[ForceElement]:
     """Return gravity, springs and all other force elements of a plant."""
     return [
